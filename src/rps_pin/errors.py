@@ -1,0 +1,110 @@
+"""The errors of rps_pin: one small hierarchy under one base class.
+
+Every message says what was asked, what is possible, and by how much it failed; the numbers are
+attributes too, so that a program need not read the sentence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+
+class RPSPinError(Exception):
+    """Base class of every error that rps_pin raises on purpose."""
+
+
+class InputError(RPSPinError, ValueError):
+    """An argument has the wrong shape, is not finite, or names something that does not exist."""
+
+
+class ParameterError(InputError):
+    """A parameter of a robot breaks a rule.
+
+    Attributes
+    ----------
+    field : str
+        Name of the offending field.
+    value : object
+        What was given.
+    rule : str
+        What the field has to satisfy.
+    """
+
+    def __init__(self, field: str, value: object, rule: str) -> None:
+        self.field = field
+        self.value = value
+        self.rule = rule
+        super().__init__(f"{field} = {value!r}: {rule}")
+
+
+class MechanismError(InputError):
+    """A mechanism's description does not hold together (unknown frame, joint, closure, file)."""
+
+
+class LimitViolation(NamedTuple):
+    """One quantity of one leg beyond its limits."""
+
+    leg: int
+    """Leg number, 1 to 3, as in the paper."""
+    quantity: str
+    """What is beyond its limit: ``"length"``, ``"angle"`` or ``"spherical joint"``."""
+    value: float
+    """The value asked for, in `unit`."""
+    lower: float
+    """Smallest allowed value, in `unit`."""
+    upper: float
+    """Largest allowed value, in `unit`."""
+    unit: str
+    """``"m"`` or ``"rad"``."""
+
+    def __str__(self) -> str:
+        return (
+            f"leg {self.leg}: {self.quantity} would be {self.value:.6g} {self.unit}; "
+            f"its limits are {self.lower:.6g} to {self.upper:.6g} {self.unit}"
+        )
+
+
+class UnreachableError(RPSPinError, ValueError):
+    """A pose asks more of a leg than its limits, or its geometry, allow.
+
+    Attributes
+    ----------
+    violations : tuple of LimitViolation
+        Every limit that the first refused pose breaks; empty where no limit is the reason.
+    """
+
+    def __init__(self, message: str, violations: Sequence[LimitViolation] = ()) -> None:
+        self.violations = tuple(violations)
+        super().__init__(message)
+
+
+class ClosureError(RPSPinError):
+    """A loop is open: at position, velocity or acceleration level.
+
+    Attributes
+    ----------
+    gap : float
+        How far the worst closure is from being satisfied, in the unit the message states.
+    """
+
+    def __init__(self, message: str, gap: float) -> None:
+        self.gap = gap
+        super().__init__(message)
+
+
+class SingularityError(RPSPinError, ArithmeticError):
+    """The actuators do not determine the motion, or the forces, at this configuration.
+
+    Attributes
+    ----------
+    condition : float
+        Condition number that was found (``inf`` at an exact singularity).
+    limit : float
+        Largest condition number that is accepted.
+    """
+
+    def __init__(self, message: str, condition: float, limit: float) -> None:
+        self.condition = condition
+        self.limit = limit
+        super().__init__(message)

@@ -1,0 +1,315 @@
+"""The parameters of a 3-RPS: validated, immutable, in SI units, read from and written to YAML."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.error import YAMLError
+
+from rps_pin.errors import InputError, ParameterError
+from rps_pin.files import whole_file
+
+#: A printed table rounds its inertias (the paper's Table 1 by 0.5 %): this much of the largest
+#: principal moment may be missing from the triangle inequality.
+INERTIA_ROUNDING = 0.01
+
+
+def _array(*shape: int) -> BeforeValidator:
+    """Return a validator that makes a finite, read-only float array of the given shape."""
+
+    def convert(value: object) -> NDArray[np.float64]:
+        try:
+            array = np.array(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"must be {' x '.join(map(str, shape))} numbers") from None
+        if array.shape != shape:
+            raise ValueError(f"must have shape {shape}, not {array.shape}")
+        if not np.isfinite(array).all():
+            raise ValueError("must be finite")
+        array.setflags(write=False)
+        return array
+
+    return BeforeValidator(convert)
+
+
+_ToList = PlainSerializer(lambda array: array.tolist(), return_type=list)
+Vector3 = Annotated[np.ndarray, _array(3), _ToList]
+Matrix3 = Annotated[np.ndarray, _array(3, 3), _ToList]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Bound = Annotated[float, Field(gt=0)]  # infinity means: no bound
+
+
+class RPSParameters(BaseModel):
+    """Everything that makes one 3-RPS robot: geometry, masses, limits, gravity. SI units.
+
+    Immutable; compare with ``==``, derive a changed copy with :meth:`replace`. Each symbol of the
+    paper has its field, and so has what the paper leaves out (the moving rods, the limits, the
+    direction of gravity). Fields that the paper leaves out default to "none".
+
+    Raises
+    ------
+    ParameterError
+        If a value breaks a rule; the error names the field, the value and the rule.
+    """
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", arbitrary_types_allowed=True, validate_default=True
+    )
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$")] = Field(
+        "rps", description="name of the robot; letters, digits, - and _"
+    )
+
+    base_radius: Positive = Field(description="g: revolute joints' distance from base centre, m")
+    platform_radius: Positive = Field(
+        description="h: spherical joints' distance from the platform centre, m"
+    )
+    platform_mass: Positive = Field(description="m: mass of the platform, kg")
+    platform_inertia: Matrix3 = Field(
+        description="I: of the platform about its centre, in its own axes, kg m^2"
+    )
+
+    leg_mass: NonNegative = Field(
+        description="m_leg: mass of a leg's cylinder (the part that only turns), kg"
+    )
+    leg_com: NonNegative = Field(
+        description="r: cylinder's centre of mass from its revolute joint, along the leg, m"
+    )
+    leg_inertia: NonNegative = Field(
+        description="I_leg: cylinder's moment of inertia, in the plane the leg moves in, kg m^2"
+    )
+    leg_inertia_about: Literal["joint", "com"] = Field(
+        "joint", description="point leg_inertia is about: the revolute 'joint' or the 'com'"
+    )
+
+    rod_mass: NonNegative = Field(
+        0.0, description="mass of a leg's rod (the part that also slides), kg"
+    )
+    rod_com: Finite = Field(
+        0.0, description="rod's centre of mass behind the spherical joint, along the leg, m"
+    )
+    rod_inertia: NonNegative = Field(
+        0.0, description="rod's moment of inertia about its centre of mass, kg m^2"
+    )
+
+    leg_length_limits: tuple[float, float] = Field(
+        (0.0, math.inf), description="shortest and longest leg (the paper's d), m"
+    )
+    leg_angle_limits: tuple[float, float] = Field(
+        (-math.pi, math.pi), description="least and greatest leg angle (the paper's phi), rad"
+    )
+    spherical_cone_limit: Bound = Field(
+        math.pi, description="greatest angle between a leg and the platform's normal, rad"
+    )
+    actuator_force_limit: Bound = Field(
+        math.inf, description="greatest force of an actuator, push or pull, N"
+    )
+    actuator_speed_limit: Bound = Field(
+        math.inf, description="greatest speed of an actuator, out or in, m/s"
+    )
+    gravity: Vector3 = Field(
+        np.array([0.0, 0.0, -9.81]), description="gravity's acceleration in base axes, m/s^2"
+    )
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            raise _parameter_error(error) from None
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_booleans(cls, value: object) -> object:
+        if isinstance(value, bool):
+            raise ValueError("must be a number, not a truth value")
+        return value
+
+    @field_validator("platform_inertia")
+    @classmethod
+    def _inertia_of_a_rigid_body(cls, inertia: NDArray[np.float64]) -> NDArray[np.float64]:
+        scale = float(np.abs(inertia).max())
+        if np.abs(inertia - inertia.T).max() > 1e-9 * scale:
+            raise ValueError("must be symmetric")
+        smallest, middle, largest = np.linalg.eigvalsh(inertia)
+        if smallest < -1e-9 * scale or largest <= 0:
+            raise ValueError(f"must be positive: its smallest principal moment is {smallest:.6g}")
+        excess = largest - (smallest + middle)
+        if excess > INERTIA_ROUNDING * largest:
+            raise ValueError(
+                "no rigid body has it: its largest principal moment "
+                f"{largest:.6g} exceeds the sum of the others by {excess:.3g}, more than "
+                f"{INERTIA_ROUNDING:.0%} of it, which rounding would explain"
+            )
+        return inertia
+
+    @field_validator("leg_length_limits", "leg_angle_limits")
+    @classmethod
+    def _limits_in_order(cls, limits: tuple[float, float]) -> tuple[float, float]:
+        lower, upper = limits
+        if math.isnan(lower) or math.isnan(upper):
+            raise ValueError("must not be NaN")
+        if not lower < upper:
+            raise ValueError("the lower limit must be below the upper one")
+        return limits
+
+    @field_validator("leg_length_limits")
+    @classmethod
+    def _lengths_are_positive(cls, limits: tuple[float, float]) -> tuple[float, float]:
+        if limits[0] < 0:
+            raise ValueError("a leg's length cannot be negative")
+        return limits
+
+    @field_validator("leg_angle_limits")
+    @classmethod
+    def _angles_within_a_turn(cls, limits: tuple[float, float]) -> tuple[float, float]:
+        if limits[0] < -math.pi or limits[1] > math.pi:
+            raise ValueError("angles lie between -pi and pi")
+        return limits
+
+    @model_validator(mode="after")
+    def _bodies_exist(self) -> Self:
+        if self.leg_mass == 0 and self.leg_inertia > 0:
+            _refuse("leg_inertia", self.leg_inertia, "a leg without mass has no inertia")
+        if self.rod_mass == 0 and self.rod_inertia > 0:
+            _refuse("rod_inertia", self.rod_inertia, "a rod without mass has no inertia")
+        offset = self.leg_mass * self.leg_com**2
+        if self.leg_inertia_about == "joint" and self.leg_inertia < offset * (1 - 1e-9):
+            _refuse(
+                "leg_inertia",
+                self.leg_inertia,
+                f"about the joint it must be at least leg_mass * leg_com^2 = {offset:.6g}; "
+                "if it is about the centre of mass, set leg_inertia_about to 'com'",
+            )
+        return self
+
+    @property
+    def leg_inertia_about_com(self) -> float:
+        """Moment of inertia of a leg's cylinder about its own centre of mass, kg m^2."""
+        if self.leg_inertia_about == "com":
+            return self.leg_inertia
+        return max(0.0, self.leg_inertia - self.leg_mass * self.leg_com**2)
+
+    def replace(self, **changes: Any) -> RPSParameters:
+        """Return a copy with some fields changed, validated anew."""
+        values = {field: getattr(self, field) for field in type(self).model_fields}
+        return RPSParameters(**(values | changes))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RPSParameters):
+            return NotImplemented
+        return self.model_dump() == other.model_dump()
+
+    def __hash__(self) -> int:
+        return hash(self.model_dump_json())
+
+    # Files ----------------------------------------------------------------------------------------
+
+    @classmethod
+    def presets(cls) -> tuple[str, ...]:
+        """Return the names of the presets that come with the package."""
+        folder = resources.files("rps_pin.rps") / "presets"
+        return tuple(
+            sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
+        )
+
+    @classmethod
+    def from_preset(cls, name: str) -> RPSParameters:
+        """Return a preset by name: ``"sokolov"`` (the paper's Table 1) or ``"micro"``.
+
+        Raises
+        ------
+        InputError
+            If there is no such preset; the message lists those there are.
+        """
+        if name not in cls.presets():
+            raise InputError(f"no preset {name!r}; there are: {', '.join(cls.presets())}")
+        text = (resources.files("rps_pin.rps") / "presets" / f"{name}.yaml").read_text("utf-8")
+        return cls._from_text(text, f"preset {name}")
+
+    @classmethod
+    def from_yaml(cls, path: str | os.PathLike[str]) -> RPSParameters:
+        """Read parameters from a YAML file: one ``field: value`` a line, SI units.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read or is not such a mapping (with the line where it fails).
+        ParameterError
+            If a value breaks a rule, a field is missing, or one is unknown.
+        """
+        try:
+            text = Path(path).read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or "not a UTF-8 text"
+            raise InputError(f"cannot read the parameter file {path}: {reason}") from None
+        return cls._from_text(text, str(path))
+
+    @classmethod
+    def _from_text(cls, text: str, origin: str) -> RPSParameters:
+        try:
+            values = YAML(typ="safe", pure=True).load(text)
+        except YAMLError as error:
+            raise InputError(f"{origin} is not valid YAML: {_first_lines(error)}") from None
+        if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
+            raise InputError(f"{origin} must hold 'field: value' lines")
+        return cls(**values)
+
+    def to_yaml(self, path: str | os.PathLike[str]) -> None:
+        """Write the parameters to a YAML file, each with its meaning and unit beside it."""
+        document = CommentedMap(self.model_dump())
+        for field, info in type(self).model_fields.items():
+            document.yaml_set_comment_before_after_key(field, before=info.description)
+        yaml = YAML()
+        yaml.width = 200
+        yaml.default_flow_style = None
+        with whole_file(path) as scratch:
+            yaml.dump(document, scratch)
+
+
+def _refuse(field: str, value: object, rule: str) -> None:
+    raise ParameterError(field, value, rule)
+
+
+def _parameter_error(error: ValidationError) -> ParameterError:
+    """Turn the first complaint of pydantic into ours, and name the fields there are if need be."""
+    first = error.errors(include_url=False)[0]
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, ParameterError):
+        return cause
+    field, *inner = [str(part) for part in first["loc"]] or ["parameters"]
+    kind, value = first["type"], first["input"]
+    if kind == "extra_forbidden":
+        rule = f"unknown field; the fields are {', '.join(RPSParameters.model_fields)}"
+    elif kind == "missing" and not inner:
+        return ParameterError(field, None, "is required and was not given")
+    elif inner:
+        rule = "must be two numbers, (lower, upper)"
+    else:
+        rule = first["msg"].removeprefix("Value error, ")
+    return ParameterError(field, value, rule)
+
+
+def _first_lines(error: Exception) -> str:
+    """Return a YAML error's text in one line: what, and at which line and column."""
+    return " ".join(str(error).split())

@@ -1,0 +1,246 @@
+"""The 3-RPS parallel robot: closed-form kinematics, and dynamics through its closed-loop model."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rps_pin.closed_loop import ClosedLoopModel, InverseDynamics, LoopClosure
+from rps_pin.errors import InputError, UnreachableError
+from rps_pin.rps import legs as leg_kinematics
+from rps_pin.rps.legs import LegMotion, Legs
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.pose import (
+    Array,
+    PlatformMotion,
+    checked_motion,
+    checked_pose,
+    platform_motion,
+    position,
+    quaternion,
+    rotation,
+)
+from rps_pin.rps.urdf import LEGS, ball_frames, build_urdf
+
+
+class RPSRobot:
+    """A 3-RPS parallel robot.
+
+    Poses are ``(z, tilt_x, tilt_y)``: the height of the platform's centre (m) and the platform's
+    rotation vector (rad), which lies in the base plane; see `rps_pin.rps.pose`. Arrays of poses
+    carry leading batch dimensions, ``(..., 3)``. Legs are counted 1 to 3 in messages, 0 to 2 in
+    arrays. One object serves one thread (see `ClosedLoopModel`).
+
+    Parameters
+    ----------
+    parameters
+        Geometry, masses and limits.
+
+    Attributes
+    ----------
+    parameters : RPSParameters
+        As given.
+    urdf : str
+        The URDF of the open tree, generated from the parameters.
+    mechanism : ClosedLoopModel
+        The tree with its three spherical closures ``leg_1``, ``leg_2``, ``leg_3``; nv = 12, nine
+        rows, mobility 3, the prismatic joints actuated. Its characteristic length is h.
+    """
+
+    def __init__(self, parameters: RPSParameters) -> None:
+        self.parameters = parameters
+        self.urdf = build_urdf(parameters)
+        self.mechanism = ClosedLoopModel.from_urdf(
+            self.urdf,
+            closures=[LoopClosure(*ball_frames(leg), name=f"leg_{leg}") for leg in LEGS],
+            actuated=[f"leg_{leg}_prismatic" for leg in LEGS],
+            gravity=parameters.gravity,
+            characteristic_length=parameters.platform_radius,
+        )
+        joints = self.mechanism.model.joints
+        index = self.mechanism.model.getJointId
+        free = joints[index("platform_free")]
+        revolute = [joints[index(f"leg_{leg}_revolute")] for leg in LEGS]
+        prismatic = [joints[index(f"leg_{leg}_prismatic")] for leg in LEGS]
+        self._free_q, self._free_v = free.idx_q, free.idx_v
+        self._angle_q = [joint.idx_q for joint in revolute]
+        self._angle_v = [joint.idx_v for joint in revolute]
+        self._length_q = [joint.idx_q for joint in prismatic]
+        self._length_v = [joint.idx_v for joint in prismatic]
+
+    @classmethod
+    def from_preset(cls, name: str) -> RPSRobot:
+        """Return a preset robot: ``"sokolov"`` (the paper's Table 1) or ``"micro"``."""
+        return cls(RPSParameters.from_preset(name))
+
+    def __repr__(self) -> str:
+        p = self.parameters
+        return f"RPSRobot({p.name!r}, g = {p.base_radius} m, h = {p.platform_radius} m)"
+
+    # Kinematics -----------------------------------------------------------------------------------
+
+    def platform_placement(self, pose: ArrayLike) -> tuple[Array, Array]:
+        """Return the platform's position (..., 3) in m and rotation (..., 3, 3), both in base axes.
+
+        Raises
+        ------
+        InputError
+            If the pose has the wrong shape or is not finite.
+        """
+        x = checked_pose(pose)
+        return position(x, self.parameters.platform_radius), rotation(x)
+
+    def inverse_kinematics(
+        self, pose: ArrayLike, *, errors: Literal["raise", "mask"] = "raise"
+    ) -> Legs:
+        """Return leg lengths and angles in closed form: Eq. 1, 4 and 6.
+
+        Parameters
+        ----------
+        pose
+            Shape (..., 3).
+        errors
+            ``"raise"`` refuses a pose beyond a limit of leg length, leg angle or spherical joint;
+            ``"mask"`` computes it all the same and says so in `Legs.reachable`.
+
+        Returns
+        -------
+        Legs
+            `length` (..., 3) in m, `angle` (..., 3) in rad, `reachable` (...).
+
+        Raises
+        ------
+        InputError
+            If the pose has the wrong shape or is not finite.
+        UnreachableError
+            If a pose breaks a limit (names leg, value and limits), or gives a leg no length.
+        """
+        if errors not in ("raise", "mask"):
+            raise InputError(f"errors = {errors!r}; it must be 'raise' or 'mask'")
+        x = checked_pose(pose)
+        p = self.parameters
+        turn = rotation(x)
+        tip = leg_kinematics.tips(position(x, p.platform_radius), turn, p.platform_radius)
+        length, angle = leg_kinematics.leg_angles_and_lengths(tip, p.base_radius)
+        reachable = self._reachable(x, length, angle, turn, refuse=errors == "raise")
+        return Legs(length, angle, reachable)
+
+    def motion(
+        self, pose: ArrayLike, rate: ArrayLike, acceleration: ArrayLike
+    ) -> tuple[PlatformMotion, LegMotion]:
+        """Return how the platform and the legs move, in closed form.
+
+        Parameters
+        ----------
+        pose, rate, acceleration
+            Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
+
+        Raises
+        ------
+        InputError, UnreachableError
+            As `inverse_kinematics`.
+        """
+        return self._motion(*checked_motion(pose, rate, acceleration))
+
+    def state(
+        self, pose: ArrayLike, rate: ArrayLike, acceleration: ArrayLike
+    ) -> tuple[Array, Array, Array]:
+        """Return the full Pinocchio state whose loops are closed, by formula.
+
+        Parameters
+        ----------
+        pose, rate, acceleration
+            Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
+
+        Returns
+        -------
+        q, v, a : arrays
+            Configuration (..., 13), velocity (..., 12) and acceleration (..., 12) of
+            ``mechanism.model``.
+
+        Raises
+        ------
+        InputError, UnreachableError
+            As `inverse_kinematics`.
+        """
+        x, dx, ddx = checked_motion(pose, rate, acceleration)
+        platform, legs = self._motion(x, dx, ddx)
+        model = self.mechanism.model
+        q = np.empty((*x.shape[:-1], model.nq))
+        v = np.empty((*x.shape[:-1], model.nv))
+        a = np.empty_like(v)
+
+        # A free-flyer's velocity and spatial acceleration are in body axes:
+        # v = R' p', and a = R' p'' - w x v.
+        to_body = np.swapaxes(platform.rotation, -1, -2)
+        linear = (to_body @ platform.velocity[..., None])[..., 0]
+        spin = platform.angular_velocity
+        pull = (to_body @ platform.acceleration[..., None])[..., 0] - np.cross(spin, linear)
+        i, j = self._free_q, self._free_v
+        q[..., i : i + 7] = np.concatenate([platform.position, quaternion(x)], axis=-1)
+        v[..., j : j + 6] = np.concatenate([linear, spin], axis=-1)
+        a[..., j : j + 6] = np.concatenate([pull, platform.angular_acceleration], axis=-1)
+
+        q[..., self._length_q], q[..., self._angle_q] = legs.length, legs.angle
+        v[..., self._length_v], v[..., self._angle_v] = legs.speed, legs.angle_rate
+        a[..., self._length_v] = legs.acceleration
+        a[..., self._angle_v] = legs.angle_acceleration
+        return q, v, a
+
+    # Dynamics -------------------------------------------------------------------------------------
+
+    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> InverseDynamics:
+        """Return actuator forces and joint reactions of one state, through the constraint models.
+
+        Parameters
+        ----------
+        q, v, a
+            One state as `state` gives it: (13,), (12,), (12,).
+
+        Returns
+        -------
+        InverseDynamics
+            `tau`: the force of each actuator (3,), N, positive pushes the leg out;
+            `constraint_forces`: the reactions at the spherical joints (9,), N;
+            ``constraint_forces.reshape(3, 3)[i]`` is the force of leg i + 1 on the platform in base
+            axes.
+
+        Raises
+        ------
+        InputError, SingularityError
+            As `ClosedLoopModel.inverse_dynamics`.
+        """
+        return self.mechanism.inverse_dynamics(q, v, a)
+
+    # Inner workings -------------------------------------------------------------------------------
+
+    def _motion(
+        self, pose: Array, rate: Array, acceleration: Array
+    ) -> tuple[PlatformMotion, LegMotion]:
+        p = self.parameters
+        platform = platform_motion(pose, rate, acceleration, p.platform_radius)
+        legs = leg_kinematics.leg_motion(platform, p.platform_radius, p.base_radius)
+        self._reachable(pose, legs.length, legs.angle, platform.rotation, refuse=True)
+        return platform, legs
+
+    def _reachable(
+        self, pose: Array, length: Array, angle: Array, turn: Array, *, refuse: bool
+    ) -> NDArray[np.bool_]:
+        """Return whether each pose keeps its limits, or refuse the first that does not."""
+        cone = leg_kinematics.cone_angles(angle, turn)
+        reachable = leg_kinematics.within_limits(self.parameters, length, angle, cone)
+        if refuse and not reachable.all():
+            first = tuple(int(i) for i in np.argwhere(~reachable)[0])
+            broken = leg_kinematics.violations(
+                self.parameters, length[first], angle[first], cone[first]
+            )
+            where = f" (entry {first} of {reachable.size})" if first else ""
+            z, tilt_x, tilt_y = pose[first]
+            raise UnreachableError(
+                f"pose z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad{where} is out of "
+                f"reach: {'; '.join(map(str, broken))}",
+                broken,
+            )
+        return reachable

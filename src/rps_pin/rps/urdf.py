@@ -1,0 +1,295 @@
+"""The URDF of a 3-RPS, generated from its parameters through yourdfpy's object model.
+
+The tree has no loops, as URDF demands: the base carries three open legs (revolute, then prismatic)
+and a free platform. Frames stand where the spherical joints belong, one on the rod and one on the
+platform, for loop closures to join::
+
+    base ─┬─ platform_free ── platform ── platform_ball_1, _2, _3
+          └─ leg_i_revolute ── leg_i_cylinder ── leg_i_prismatic ── leg_i_rod ── leg_i_ball
+
+A leg's frame lies in its revolute joint: x along the leg (at angle 0: towards the base's centre),
+z up, and the joint turns about -y. The joint positions are then the paper's phi and d themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+import yourdfpy
+from lxml import etree
+from numpy.typing import NDArray
+
+from rps_pin.rps.parameters import RPSParameters
+
+LEGS = (1, 2, 3)
+#: Direction of each leg in the base plane, and of its spherical joint in the platform, rad.
+LEG_DIRECTIONS = (0.0, 2 * math.pi / 3, -2 * math.pi / 3)
+
+#: URDF knows no infinite limit: what it says for an effort (N) or a speed (m/s, rad/s) without one.
+URDF_UNLIMITED = 1e6
+
+_STEEL = ("steel", (0.62, 0.65, 0.70, 1.0))
+_DARK = ("dark", (0.23, 0.26, 0.31, 1.0))
+_BLUE = ("blue", (0.16, 0.39, 0.68, 1.0))
+_BRASS = ("brass", (0.83, 0.62, 0.22, 1.0))
+_RED = ("red", (0.80, 0.20, 0.16, 1.0))
+
+Shape: TypeAlias = yourdfpy.Box | yourdfpy.Cylinder | yourdfpy.Sphere
+Paint = tuple[str, tuple[float, float, float, float]]
+
+
+def ball_frames(leg: int) -> tuple[str, str]:
+    """Return the names of the two frames that the spherical joint of a leg (1 to 3) holds together.
+
+    The first is on the platform, the second at the rod's tip.
+    """
+    return f"platform_ball_{leg}", f"leg_{leg}_ball"
+
+
+def build_urdf(parameters: RPSParameters) -> str:
+    """Return the URDF of the robot as XML text.
+
+    Numbers are written with all their digits, so that what is read back is what was meant. A joint
+    without a limit gets a stand-in, since URDF has no infinity: `URDF_UNLIMITED` for efforts and
+    speeds, ten times the sum of the radii for lengths. Gravity is no part of a URDF.
+
+    Parameters
+    ----------
+    parameters
+        The robot.
+
+    Returns
+    -------
+    str
+        The URDF, SI units.
+    """
+    size = _Sizes(parameters)
+    links = [_base(parameters, size), _platform(parameters, size)]
+    joints = [_joint("platform_free", "floating", "base", "platform")]
+    for leg, direction in zip(LEGS, LEG_DIRECTIONS, strict=True):
+        links += [_cylinder_link(parameters, size, leg), _rod_link(parameters, size, leg)]
+        joints += _leg_joints(parameters, leg, direction)
+        on_platform, on_rod = ball_frames(leg)
+        links += [yourdfpy.Link(on_platform), yourdfpy.Link(on_rod)]
+        ball = _polar(parameters.platform_radius, direction)
+        joints += [
+            _joint(f"{on_platform}_fixed", "fixed", "platform", on_platform, _at(*ball)),
+            _joint(f"{on_rod}_fixed", "fixed", f"leg_{leg}_rod", on_rod),
+        ]
+    robot = yourdfpy.Robot(name=parameters.name, links=links, joints=joints)
+    tree = yourdfpy.URDF(robot=robot, build_scene_graph=False, load_meshes=False).write_xml()
+    etree.indent(tree, space="  ")
+    text: str = etree.tostring(tree, encoding="unicode")
+    return text + "\n"
+
+
+class _Sizes:
+    """Sizes that only the pictures and the collision shapes need, m."""
+
+    def __init__(self, parameters: RPSParameters) -> None:
+        radius = max(parameters.base_radius, parameters.platform_radius)
+        shortest, longest = parameters.leg_length_limits
+        if math.isinf(longest):  # drawn for legs about as long as the robot is wide
+            longest = max(1.2 * radius, 1.5 * shortest)
+        #: Length of a cylinder and of a rod: they overlap at full stroke.
+        self.part = _to_micrometre(max(0.75 * shortest, 0.52 * longest))
+        #: Radii of cylinder, rod and ball.
+        self.cylinder = _to_micrometre(0.05 * self.part)
+        self.rod = _to_micrometre(0.03 * self.part)
+        self.ball = _to_micrometre(0.04 * self.part)
+        #: Thickness of the base plate, height of the clevises above it.
+        self.plate = _to_micrometre(0.05 * radius)
+        self.clevis = _to_micrometre(0.12 * self.part)
+
+
+def _to_micrometre(length: float) -> float:
+    return round(length, 6)
+
+
+# Links --------------------------------------------------------------------------------------------
+
+
+def _base(parameters: RPSParameters, size: _Sizes) -> yourdfpy.Link:
+    """Return the base: a plate below the revolute joints, and a clevis for each of them."""
+    link = yourdfpy.Link("base")
+    radius = parameters.base_radius + 2.5 * size.clevis
+    plate = _at(0.0, 0.0, -size.clevis - size.plate / 2)
+    _add(link, "plate", yourdfpy.Cylinder(radius, size.plate), plate, _DARK)
+    gap = 1.3 * size.cylinder
+    cheek = np.array([1.6 * size.cylinder, 0.5 * size.cylinder, 2 * size.clevis])
+    for leg, direction in zip(LEGS, LEG_DIRECTIONS, strict=True):
+        joint = _leg_placement(parameters, direction)
+        for side, offset in (("left", gap), ("right", -gap)):
+            place = joint @ _at(0, offset, 0)
+            _add(link, f"clevis_{leg}_{side}", yourdfpy.Box(cheek), place, _STEEL)
+        pin = yourdfpy.Cylinder(0.45 * size.cylinder, 3.4 * size.cylinder)
+        _add(link, f"pin_{leg}", pin, joint @ _turn_x(math.pi / 2), _BRASS)
+    return link
+
+
+def _platform(parameters: RPSParameters, size: _Sizes) -> yourdfpy.Link:
+    """Return the platform: a disc with three balls, its leg-1 side marked in red."""
+    inertial = yourdfpy.Inertial(
+        origin=np.eye(4),
+        mass=parameters.platform_mass,
+        inertia=np.array(parameters.platform_inertia),
+    )
+    link = yourdfpy.Link("platform", inertial=inertial)
+    thickness = 0.8 * size.plate
+    radius = parameters.platform_radius
+    _add(link, "disc", yourdfpy.Cylinder(radius, thickness), np.eye(4), _BLUE)
+    mark = yourdfpy.Box(np.array([0.35 * radius, 0.06 * radius, 0.3 * thickness]))
+    _add(link, "mark", mark, _at(0.7 * radius, 0, 0.55 * thickness), _RED)
+    for leg, direction in zip(LEGS, LEG_DIRECTIONS, strict=True):
+        ball = _at(*_polar(radius, direction))
+        _add(link, f"ball_{leg}", yourdfpy.Sphere(size.ball), ball, _BRASS)
+    return link
+
+
+def _cylinder_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfpy.Link:
+    """Return the part of a leg that only turns; x runs along the leg from the revolute joint."""
+    inertia = _bar_inertia(parameters.leg_mass, parameters.leg_inertia_about_com, size.cylinder)
+    link = yourdfpy.Link(
+        f"leg_{leg}_cylinder",
+        inertial=_bar_inertial(parameters.leg_mass, parameters.leg_com, inertia),
+    )
+    tube = yourdfpy.Cylinder(size.cylinder, size.part - size.cylinder)
+    middle = _at((size.part + size.cylinder) / 2, 0, 0) @ _TO_X
+    _add(link, "tube", tube, middle, _DARK)
+    hub = yourdfpy.Sphere(1.15 * size.cylinder)
+    _add(link, "hub", hub, np.eye(4), _DARK)
+    return link
+
+
+def _rod_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfpy.Link:
+    """Return the part of a leg that also slides; its origin is the tip, x runs on outwards."""
+    inertia = _bar_inertia(parameters.rod_mass, parameters.rod_inertia, size.rod)
+    link = yourdfpy.Link(
+        f"leg_{leg}_rod",
+        inertial=_bar_inertial(parameters.rod_mass, -parameters.rod_com, inertia),
+    )
+    rod = yourdfpy.Cylinder(size.rod, size.part)
+    _add(link, "rod", rod, _at(-size.part / 2, 0, 0) @ _TO_X, _STEEL)
+    return link
+
+
+def _bar_inertia(mass: float, across: float, radius: float) -> NDArray[np.float64]:
+    """Return the inertia of a bar along x about its centre of mass, shape (3, 3).
+
+    Only the moment across the bar, in the plane the leg moves in, does work; the bar is taken as a
+    body of revolution. The moment along it is a solid cylinder's, at most what a rigid body allows.
+    """
+    along = min(mass * radius**2 / 2, 2 * across)
+    return np.diag([along, across, across])
+
+
+def _bar_inertial(
+    mass: float, com: float, inertia: NDArray[np.float64]
+) -> yourdfpy.Inertial | None:
+    if mass == 0:
+        return None
+    return yourdfpy.Inertial(origin=_at(com, 0, 0), mass=mass, inertia=inertia)
+
+
+def _add(
+    link: yourdfpy.Link, name: str, shape: Shape, origin: NDArray[np.float64], paint: Paint
+) -> None:
+    """Give a link a shape, to be seen and to be hit."""
+    geometry = yourdfpy.Geometry(**{type(shape).__name__.lower(): shape})
+    colour = yourdfpy.Material(name=paint[0], color=yourdfpy.Color(np.array(paint[1])))
+    full_name = f"{link.name}_{name}"
+    link.visuals.append(
+        yourdfpy.Visual(name=full_name, origin=origin, geometry=geometry, material=colour)
+    )
+    link.collisions.append(yourdfpy.Collision(name=full_name, origin=origin, geometry=geometry))
+
+
+# Joints -------------------------------------------------------------------------------------------
+
+
+def _leg_joints(parameters: RPSParameters, leg: int, direction: float) -> list[yourdfpy.Joint]:
+    low_angle, high_angle = parameters.leg_angle_limits
+    shortest, longest = parameters.leg_length_limits
+    if math.isinf(longest):
+        longest = 10 * (parameters.base_radius + parameters.platform_radius)
+    revolute = _joint(
+        f"leg_{leg}_revolute",
+        "revolute",
+        "base",
+        f"leg_{leg}_cylinder",
+        origin=_leg_placement(parameters, direction),
+        axis=(0.0, -1.0, 0.0),
+        limit=yourdfpy.Limit(URDF_UNLIMITED, URDF_UNLIMITED, low_angle, high_angle),
+    )
+    prismatic = _joint(
+        f"leg_{leg}_prismatic",
+        "prismatic",
+        f"leg_{leg}_cylinder",
+        f"leg_{leg}_rod",
+        axis=(1.0, 0.0, 0.0),
+        limit=yourdfpy.Limit(
+            min(parameters.actuator_force_limit, URDF_UNLIMITED),
+            min(parameters.actuator_speed_limit, URDF_UNLIMITED),
+            shortest,
+            longest,
+        ),
+    )
+    return [revolute, prismatic]
+
+
+def _joint(
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    origin: NDArray[np.float64] | None = None,
+    axis: Sequence[float] | None = None,
+    limit: yourdfpy.Limit | None = None,
+) -> yourdfpy.Joint:
+    return yourdfpy.Joint(
+        name=name,
+        type=kind,
+        parent=parent,
+        child=child,
+        origin=np.eye(4) if origin is None else origin,
+        axis=None if axis is None else np.array(axis),
+        limit=limit,
+    )
+
+
+# Placements, homogeneous (4, 4) -------------------------------------------------------------------
+
+
+def _polar(radius: float, direction: float) -> tuple[float, float, float]:
+    return radius * math.cos(direction), radius * math.sin(direction), 0.0
+
+
+def _at(x: float, y: float, z: float) -> NDArray[np.float64]:
+    placement = np.eye(4)
+    placement[:3, 3] = x, y, z
+    return placement
+
+
+def _turn(axis_1: int, axis_2: int, angle: float) -> NDArray[np.float64]:
+    """Return the rotation by `angle` that carries axis 1 towards axis 2."""
+    placement = np.eye(4)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    placement[axis_1, axis_1] = placement[axis_2, axis_2] = cosine
+    placement[axis_2, axis_1], placement[axis_1, axis_2] = sine, -sine
+    return placement
+
+
+def _turn_x(angle: float) -> NDArray[np.float64]:
+    return _turn(1, 2, angle)
+
+
+#: URDF's cylinders lie along z; ours lie along x.
+_TO_X = _turn(2, 0, math.pi / 2)
+
+
+def _leg_placement(parameters: RPSParameters, direction: float) -> NDArray[np.float64]:
+    """Return the frame of a leg's revolute joint: x towards the base's centre, z up."""
+    return _at(*_polar(parameters.base_radius, direction)) @ _turn(0, 1, direction + math.pi)

@@ -1,0 +1,181 @@
+"""The paper's helix (Eq. 26 to 29): the platform's centre climbs on a cylinder.
+
+The centre of a 3-RPS moves sideways only by tilting (Eq. 4). On the circle p_x = r cos(phi),
+p_y = r sin(phi), Eq. 5 gives a constant tilt beta and an axis that turns at half the speed:
+
+    r = h/2 (1 - cos(beta)),    alpha = +-pi/2 - phi/2,    w = beta (-sin(alpha), cos(alpha)).
+
+The two signs are the paper's (alpha, beta) and (alpha, -beta): two branches with the same centre
+and opposite tilts. One turn of the helix leads from each to the other.
+
+phi(t) is Eq. 29 with its last branch corrected (4 (1 + sqrt(1 + 9 pi^2)) t - 4 t^2 instead of
+... t^2 - 4 t^2): it rises with a constant acceleration for half a second, at a constant speed, and
+is braked likewise. With r_h : p_h = 3 : 2 in one unit, the speed along the helix is one unit a
+second at its highest. Other proportions keep the same phi(t).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.errors import InputError
+from rps_pin.trajectories.path import Array, PathSample, checked_times
+
+#: Eq. 29: t_a and t_t of Table 1, the latter unrounded (5.2387 s).
+PAPER_RAMP = 0.5
+PAPER_DURATION = 0.5 + math.sqrt(1 + 9 * math.pi**2) / 2
+
+Branch = Literal["+", "-"]
+
+
+class _HasParameters(Protocol):
+    @property
+    def platform_radius(self) -> float: ...
+
+
+class _Robot(Protocol):
+    @property
+    def parameters(self) -> _HasParameters: ...
+
+
+class HelixPath:
+    """A helix of the platform's centre, as a trajectory of poses.
+
+    Made by `helix`; see there for the parameters.
+    """
+
+    def __init__(
+        self,
+        platform_radius: float,
+        radius: float,
+        pitch: float,
+        height: float,
+        *,
+        branch: Branch = "+",
+        duration: float = PAPER_DURATION,
+    ) -> None:
+        _check(platform_radius, radius, pitch, height, branch, duration)
+        self.radius = radius
+        self.pitch = pitch
+        self.height = height
+        self.branch = branch
+        self.duration = duration
+        #: The constant tilt of the platform, rad: r = h/2 (1 - cos(beta)) = h sin^2(beta/2).
+        self.tilt = 2 * math.asin(math.sqrt(radius / platform_radius))
+        #: Duration of the rise and of the fall of the speed, s.
+        self.ramp = duration * PAPER_RAMP / PAPER_DURATION
+
+    def __repr__(self) -> str:
+        return (
+            f"HelixPath(radius={self.radius}, pitch={self.pitch}, height={self.height}, "
+            f"branch={self.branch!r}, duration={self.duration:.6g})"
+        )
+
+    def turn(self, t: ArrayLike) -> tuple[Array, Array, Array]:
+        """Return phi and its first and second time derivatives at times t: Eq. 29, corrected.
+
+        The acceleration jumps at the ends of the ramps; there it is the later piece's.
+        """
+        times = checked_times(t, self.duration)
+        speed = 2 * math.pi / (self.duration - self.ramp)  # of the middle piece
+        push = speed / self.ramp
+        left = self.duration - times
+        rising, falling = times < self.ramp, left <= self.ramp
+        phi = np.select(
+            [rising, falling],
+            [push * times**2 / 2, 2 * math.pi - push * left**2 / 2],
+            speed * (times - self.ramp / 2),
+        )
+        rate = np.select([rising, falling], [push * times, push * left], speed)
+        acceleration = np.select([rising, falling], [push, -push], 0.0)
+        return phi, rate, acceleration
+
+    def sample(self, t: ArrayLike) -> PathSample:
+        """Return pose, rate and acceleration at times t of shape (...), s; exact.
+
+        Raises
+        ------
+        InputError
+            If a time lies outside the trajectory.
+        """
+        phi, dphi, ddphi = self.turn(t)
+        sign = 1.0 if self.branch == "+" else -1.0
+        # alpha = pi/2 - phi/2: (-sin(alpha), cos(alpha)) = (-cos(phi/2), sin(phi/2))
+        along = np.stack([-np.cos(phi / 2), np.sin(phi / 2)], axis=-1)
+        across = np.stack([np.sin(phi / 2), np.cos(phi / 2)], axis=-1)
+        w = sign * self.tilt * along
+        dw = sign * self.tilt * across * (dphi / 2)[..., None]
+        ddw = (
+            sign * self.tilt * (across * (ddphi / 2)[..., None] - along * (dphi**2 / 4)[..., None])
+        )
+        climb = self.pitch / (2 * math.pi)
+        return PathSample(
+            _pose(self.height + climb * phi, w), _pose(climb * dphi, dw), _pose(climb * ddphi, ddw)
+        )
+
+
+def helix(
+    robot: _Robot,
+    *,
+    radius: float,
+    pitch: float,
+    height: float,
+    branch: Branch = "+",
+    duration: float = PAPER_DURATION,
+) -> HelixPath:
+    """Return one turn of the paper's helix for a robot (Eq. 26 to 29, Eq. 29 corrected).
+
+    Parameters
+    ----------
+    robot
+        The 3-RPS whose platform's centre shall follow the helix.
+    radius
+        r_h of Table 1, m; at most the platform's radius.
+    pitch
+        p_h: the climb in the one turn, m.
+    height
+        z_0: where it starts, m.
+    branch
+        ``"+"`` for the paper's (alpha, beta), which starts at alpha = pi/2; ``"-"`` for
+        (alpha, -beta), the opposite tilt with the same centre.
+    duration
+        In s; Eq. 29's 5.2387 s if left out. The shape of phi(t) stays.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, the radius exceeds the platform's, or the branch is unknown.
+    """
+    return HelixPath(
+        robot.parameters.platform_radius, radius, pitch, height, branch=branch, duration=duration
+    )
+
+
+def _pose(z: Array, tilt: Array) -> Array:
+    return np.concatenate([z[..., None], tilt], axis=-1)
+
+
+def _check(
+    platform_radius: float,
+    radius: float,
+    pitch: float,
+    height: float,
+    branch: str,
+    duration: float,
+) -> None:
+    for name, value in (("pitch", pitch), ("height", height)):
+        if not math.isfinite(value):
+            raise InputError(f"{name} = {value}: it must be a finite number of metres")
+    if not 0 <= radius <= platform_radius:
+        raise InputError(
+            f"radius = {radius} m: the centre of a platform of radius h = {platform_radius} m "
+            f"reaches 0 to {platform_radius} m sideways"
+        )
+    if not (math.isfinite(duration) and duration > 0):
+        raise InputError(f"duration = {duration}: it must be a positive number of seconds")
+    if branch not in ("+", "-"):
+        raise InputError(f"branch = {branch!r}; it must be '+' or '-'")
