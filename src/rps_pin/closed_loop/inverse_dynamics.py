@@ -63,6 +63,17 @@ class InverseDynamics:
         rows, jacobian, columns = self._scaled_jacobian
         return condition_number(rows * jacobian * columns)
 
+    @property
+    def orientation(self) -> int:
+        """Sign of det J_p: it changes where a motion crosses a singularity.
+
+        0 where J_p is not square, or its determinant vanishes. Computed when asked for.
+        """
+        rows, jacobian, columns = self._scaled_jacobian
+        if jacobian.shape[0] != jacobian.shape[1]:
+            return 0
+        return int(np.linalg.slogdet(rows * jacobian * columns)[0])
+
     def __repr__(self) -> str:
         return (
             f"InverseDynamics(tau={self.tau}, constraint_forces={self.constraint_forces}, "

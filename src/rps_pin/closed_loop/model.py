@@ -96,7 +96,7 @@ class ClosedLoopModel:
             self._constraints.append(constraint)
             self._constraint_data.append(constraint.createData())
         # Iterating a StdVec makes new Python objects each time; kept pairs cost a tenth.
-        self._calls = [
+        calls = self._calls = [
             (constraint.calc, data)
             for constraint, data in zip(self._constraints, self._constraint_data, strict=True)
         ]
@@ -110,8 +110,19 @@ class ClosedLoopModel:
         )
         self._passive_scale = self._column_scale[self._passive]
         self._square = self.constraint_size == self._passive.size > 0
-        self._probe = _probe(self._passive.size)
-        self._probe_limit = self._largest_harmless_growth()
+        self._rows = self._row_scale[:, None]
+        self._right = _right_hand_sides(self._passive.size)
+        self._harmless_growth = self._largest_harmless_growth()
+        #: What a call of `inverse_dynamics` needs, in one look-up.
+        self._hot = (
+            model,
+            self._data,
+            calls,
+            self._constraints,
+            self._constraint_data,
+            self._actuated,
+            self._passive,
+        )
 
     @classmethod
     def from_urdf(
@@ -225,7 +236,7 @@ class ClosedLoopModel:
         q = close_gaps(
             guess,
             gaps=lambda q: self._row_scale * self._gaps(q),
-            jacobian=lambda q: self._row_scale[:, None] * self._jacobian(q) * self._column_scale,
+            jacobian=lambda q: self._rows * self._jacobian(q) * self._column_scale,
             integrate=lambda q, step: pin.integrate(self.model, q, self._column_scale * step),
             tolerance=_CLOSED * self.characteristic_length,
         )
@@ -335,38 +346,38 @@ class ClosedLoopModel:
             If the configuration is singular (condition number above `max_condition`), or actuators
             and mobility do not match.
         """
-        model, data = self.model, self._data
+        model, data, calls, constraints, constraint_data, actuated, passive = self._hot
         try:
             force = pin.rnea(model, data, q, v, a)
             pin.computeJointJacobians(model, data, q)
         except (TypeError, ValueError):  # a list, an array of integers, or a wrong shape
             return self._inverse_dynamics_of_any(q, v, a)
-        for calc, constraint_data in self._calls:  # getConstraintsJacobian reads what they refresh
-            calc(model, data, constraint_data)
-        jacobian = pin.getConstraintsJacobian(model, data, self._constraints, self._constraint_data)
+        for calc, scratch in calls:  # getConstraintsJacobian reads what they refresh
+            calc(model, data, scratch)
+        jacobian = pin.getConstraintsJacobian(model, data, constraints, constraint_data)
         if not self._square:
             return self._inverse_dynamics_by_motions(jacobian, force)
 
-        passive_jacobian = jacobian.take(self._passive, axis=1)
-        # J_p' [lambda, probe'] = [rnea_p, probe]: the second column shows how J_p' amplifies.
-        right = self._probe.copy(order="F")
-        right[:, 0] = force.take(self._passive)
-        _, _, solution, singular = dgesv(passive_jacobian.T, right, overwrite_b=True)
+        # J_p' [lambda, x] = [rnea_p, probe]: |x| shows how much J_p'^-1 can amplify.
+        passive_jacobian = jacobian.take(passive, axis=1)
+        right = self._right
+        force.take(passive, out=right[:, 0], mode="clip")
+        _, _, solution, singular = dgesv(passive_jacobian.T, right)
         multipliers = solution[:, 0]
         growth = dnrm2(solution[:, 1]) * dnrm2(passive_jacobian.ravel())
-        if singular or not growth < self._probe_limit:
+        if singular or not growth < self._harmless_growth:
             self._refuse_bad_input(q, v, a)
             self._refuse_singular(jacobian)
         # rnea - J' lambda: the actuated rows are tau, the passive ones the residual.
         rest = dgemv(-1.0, jacobian.T, multipliers, 1.0, force)
-        residual = dnrm2(rest.take(self._passive))
+        residual = dnrm2(rest.take(passive))
         if not residual < np.inf:
             self._refuse_bad_input(q, v, a)
         return InverseDynamics(
-            rest.take(self._actuated),
+            rest.take(actuated),
             multipliers,
             residual,
-            (self._row_scale[:, None], passive_jacobian, self._passive_scale),
+            (self._rows, passive_jacobian, self._passive_scale),
         )
 
     def _inverse_dynamics_of_any(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> InverseDynamics:
@@ -380,7 +391,7 @@ class ClosedLoopModel:
             raise InputError("q, v and a must be finite")
         self._refuse_singular(jacobian)
         tau, multipliers = solve_by_allowed_motions(
-            self._row_scale[:, None] * jacobian, self._actuated, force, self._column_scale
+            self._rows * jacobian, self._actuated, force, self._column_scale
         )
         multipliers = self._row_scale * multipliers
         rest = force - jacobian.T @ multipliers
@@ -388,7 +399,7 @@ class ClosedLoopModel:
             tau,
             multipliers,
             float(np.linalg.norm(rest[self._passive])),
-            (self._row_scale[:, None], jacobian[:, self._passive], self._passive_scale),
+            (self._rows, jacobian[:, self._passive], self._passive_scale),
         )
 
     # Inner workings -------------------------------------------------------------------------------
@@ -462,9 +473,7 @@ class ClosedLoopModel:
         return full
 
     def _condition(self, jacobian: Array) -> float:
-        return condition_number(
-            self._row_scale[:, None] * jacobian[:, self._passive] * self._passive_scale
-        )
+        return condition_number(self._rows * jacobian[:, self._passive] * self._passive_scale)
 
     def _refuse_singular(self, jacobian: Array) -> None:
         condition = self._condition(jacobian)
@@ -557,8 +566,8 @@ def _gap(closure: LoopClosure, a: pin.SE3, b: pin.SE3) -> Array:
     return gap
 
 
-def _probe(size: int) -> Array:
-    """Return the right-hand sides' buffer: a column for rnea_p, a random unit vector beside it."""
+def _right_hand_sides(size: int) -> Array:
+    """Return a buffer with a column for rnea_p and, beside it, a random unit vector: the probe."""
     columns = np.zeros((size, 2), order="F")
     direction = np.random.default_rng(seed=3).standard_normal(size)
     columns[:, 1] = direction / max(float(np.linalg.norm(direction)), 1e-300)

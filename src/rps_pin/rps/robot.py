@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.closed_loop import ClosedLoopModel, InverseDynamics, LoopClosure
@@ -213,6 +214,10 @@ class RPSRobot:
             As `ClosedLoopModel.inverse_dynamics`.
         """
         return self.mechanism.inverse_dynamics(q, v, a)
+
+    def visual_model(self) -> pin.GeometryModel:
+        """Return the shapes of the robot's links, for `rps_pin.viewer`."""
+        return pin.buildGeomFromUrdfString(self.mechanism.model, self.urdf, pin.GeometryType.VISUAL)
 
     # Inner workings -------------------------------------------------------------------------------
 

@@ -97,9 +97,9 @@ class _Sizes:
         #: Length of a cylinder and of a rod: they overlap at full stroke.
         self.part = _to_micrometre(max(0.75 * shortest, 0.52 * longest))
         #: Radii of cylinder, rod and ball.
-        self.cylinder = _to_micrometre(0.05 * self.part)
-        self.rod = _to_micrometre(0.03 * self.part)
-        self.ball = _to_micrometre(0.04 * self.part)
+        self.cylinder = _to_micrometre(0.06 * self.part)
+        self.rod = _to_micrometre(0.038 * self.part)
+        self.ball = _to_micrometre(0.065 * self.part)
         #: Thickness of the base plate, height of the clevises above it.
         self.plate = _to_micrometre(0.05 * radius)
         self.clevis = _to_micrometre(0.12 * self.part)

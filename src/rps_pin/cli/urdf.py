@@ -1,0 +1,34 @@
+"""``rps-pin urdf``: the URDF of a 3-RPS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rps_pin.cli.console import RobotOption, load_robot
+from rps_pin.files import whole_file
+
+
+def urdf_command(
+    robot: RobotOption = "sokolov",
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="File to write; without it, standard output."),
+    ] = None,
+) -> None:
+    """Write the URDF of a 3-RPS: a preset's, or a parameter file's.
+
+    URDF knows no loops: the file holds the open legs, the free platform, and for each leg the two
+    frames that the spherical joint holds together, *platform_ball_i* and *leg_i_ball*.
+
+    Example: `rps-pin urdf --robot micro -o micro.urdf`
+    """
+    text = load_robot(robot).urdf
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    with whole_file(output) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+    typer.echo(f"wrote {output}")

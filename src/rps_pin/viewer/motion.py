@@ -1,0 +1,132 @@
+"""A motion as the viewer needs it: the configuration at any time, and at an even frame rate."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rps_pin.errors import InputError
+
+FRAME_RATE = 30.0
+"""Pictures per second, unless told otherwise."""
+_UNIT_TOLERANCE = 1e-3
+"""How far a quaternion's length may be from one; a picture shows nothing finer."""
+
+
+class Motion:
+    """Configurations at increasing times, joined on the robot's configuration manifold.
+
+    Parameters
+    ----------
+    model
+        The robot.
+    times : array_like, shape (n,)
+        Times in seconds, strictly increasing; n may be one.
+    configurations : array_like, shape (n, nq)
+        The configuration at each time.
+
+    Raises
+    ------
+    InputError
+        If the shapes do not fit, a value is not finite, the times do not increase, or a
+        configuration holds a quaternion that is not of unit length.
+    """
+
+    def __init__(self, model: pin.Model, times: ArrayLike, configurations: ArrayLike) -> None:
+        self._model = model
+        self.times: NDArray[np.float64] = np.asarray(times, dtype=np.float64)
+        self.configurations = checked_configurations(model, configurations)
+        if self.times.shape != (len(self.configurations),):
+            raise InputError(
+                f"times has shape {self.times.shape}; with configurations of shape "
+                f"{self.configurations.shape} it must be ({len(self.configurations)},)"
+            )
+        if not np.all(np.isfinite(self.times)) or np.any(np.diff(self.times) <= 0.0):
+            raise InputError("times must be finite and strictly increasing")
+
+    @property
+    def duration(self) -> float:
+        """Time from the first configuration to the last, in seconds."""
+        return float(self.times[-1] - self.times[0])
+
+    def at(self, elapsed: float) -> NDArray[np.float64]:
+        """Return the configuration, shape (nq,), `elapsed` seconds after the first one.
+
+        Before the start and after the end it is the first and the last configuration.
+        """
+        time = self.times[0] + elapsed
+        after = int(np.searchsorted(self.times, time, side="right"))
+        if after == 0 or after == len(self.times):
+            end_of_motion: NDArray[np.float64] = self.configurations[0 if after == 0 else -1]
+            return end_of_motion
+        start, end = self.times[after - 1], self.times[after]
+        fraction = float((time - start) / (end - start))
+        between: NDArray[np.float64] = pin.interpolate(
+            self._model, self.configurations[after - 1], self.configurations[after], fraction
+        )
+        return between
+
+    def sampled(self, frame_rate: float = FRAME_RATE) -> tuple[NDArray[np.float64], ...]:
+        """Return evenly spaced samples, from the first configuration to the last.
+
+        Parameters
+        ----------
+        frame_rate
+            Samples per second; the spacing is adjusted so that the last one falls on the end.
+
+        Returns
+        -------
+        elapsed : ndarray, shape (m,)
+            Seconds since the first configuration; m is one for a motion of no duration.
+        configurations : ndarray, shape (m, nq)
+            The configurations then.
+
+        Raises
+        ------
+        InputError
+            If the frame rate is not a positive number.
+        """
+        check_frame_rate(frame_rate)
+        steps = max(1, round(self.duration * frame_rate)) if self.duration > 0.0 else 0
+        elapsed = np.linspace(0.0, self.duration, steps + 1)
+        return elapsed, np.array([self.at(float(time)) for time in elapsed])
+
+
+def check_frame_rate(frame_rate: float) -> None:
+    """Raise `InputError` unless `frame_rate` is positive and finite."""
+    if not np.isfinite(frame_rate) or frame_rate <= 0.0:
+        raise InputError(f"frame_rate = {frame_rate!r}: it must be positive and finite")
+
+
+def checked_configurations(model: pin.Model, configurations: ArrayLike) -> NDArray[np.float64]:
+    """Return configurations as an array of shape (n, nq), n at least one.
+
+    Parameters
+    ----------
+    model
+        The robot.
+    configurations : array_like, shape (nq,) or (n, nq)
+        One or more configurations.
+
+    Raises
+    ------
+    InputError
+        If the shape does not fit, a value is not finite, or a quaternion is not of unit length.
+    """
+    q = np.asarray(configurations, dtype=np.float64)
+    if q.ndim not in (1, 2) or q.shape[-1] != model.nq or q.size == 0:
+        raise InputError(
+            f"a configuration of this robot has nq = {model.nq} numbers: the shape must be "
+            f"({model.nq},) or (n, {model.nq}), not {q.shape}"
+        )
+    q = q.reshape(-1, model.nq)
+    if not np.all(np.isfinite(q)):
+        raise InputError("a configuration holds a number that is not finite")
+    for index, row in enumerate(q):
+        if not pin.isNormalized(model, row, _UNIT_TOLERANCE):
+            raise InputError(
+                f"configuration {index} holds a quaternion (or a cosine and sine) that is not of "
+                f"unit length to within {_UNIT_TOLERANCE}"
+            )
+    return q

@@ -1,0 +1,187 @@
+"""The commands as a person types them: in a process of their own."""
+
+from __future__ import annotations
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from rps_pin import RPSParameters, RPSRobot, __version__, helix
+
+FIGURES = [
+    f"figure_{name}.{suffix}"
+    for name in ("7_path", "8_lengths", "9_forces")
+    for suffix in ("png", "svg")
+]
+
+
+def rps_pin(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from rps_pin.cli import main; main()", *arguments]
+    return subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Return the folder and the standard output of a helix run with defaults but its rate."""
+    folder = tmp_path_factory.mktemp("helix")
+    run = rps_pin("helix", "--rate", "100", folder=folder)
+    assert run.returncode == 0, run.stderr
+    assert run.stderr == ""
+    return folder, run.stdout
+
+
+def test_helix_writes_table_figures_and_page(finished: tuple[Path, str]) -> None:
+    folder, output = finished
+    files = {"helix.csv", "viewer.html", *FIGURES}
+    assert {path.name for path in (folder / "helix").iterdir()} == files
+    for name in files:
+        assert f"helix/{name}" in output
+
+
+def test_helix_prints_what_was_asked_for_each_actuator_and_for_the_run(
+    finished: tuple[Path, str],
+) -> None:
+    _, output = finished
+    for words in (
+        *("actuator 1", "actuator 2", "actuator 3"),
+        *("force, minimum", "force, maximum", "force, RMS"),
+        *("length, shortest", "length, longest", "speed, peak", "power, peak", "power, mean"),
+        *("duration", "largest loop gap", "largest KKT residual", "smallest distance"),
+    ):
+        assert words in output
+
+
+def test_helix_table_holds_the_paper_s_motion(finished: tuple[Path, str]) -> None:
+    folder, _ = finished
+    with (folder / "helix" / "helix.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    robot = RPSRobot.from_preset("sokolov")
+    path = helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4)
+    times = np.array([float(row["time_s"]) for row in rows])
+    assert times[-1] == path.duration
+    expected = robot.inverse_kinematics(path.sample(times).pose).length
+    written = np.array([[float(row[f"length_{i}_m"]) for i in (1, 2, 3)] for row in rows])
+    assert_allclose(written, expected, rtol=1e-15)
+
+
+def test_json_is_all_that_is_printed_and_complete(tmp_path: Path) -> None:
+    run = rps_pin("helix", "--rate", "50", "--json", "-o", str(tmp_path / "out"))
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)
+    assert summary["robot"] == "sokolov"
+    assert_allclose(summary["duration"], 0.5 + np.sqrt(1 + 9 * np.pi**2) / 2)
+    assert summary["loop_gap_max"] <= 1e-12
+    assert summary["residual_max"] <= 1e-10
+    assert 0 < summary["singularity_distance_min"] < 1
+    assert [one["actuator"] for one in summary["actuators"]] == [1, 2, 3]
+    assert all(Path(file).is_file() for file in summary["files"])
+
+
+def test_helix_takes_a_parameter_file_and_other_numbers(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    RPSParameters.from_preset("micro").replace(name="mine").to_yaml(file)
+    run = rps_pin(
+        *("helix", "--robot", str(file), "--radius", "0.001", "--pitch", "0.002"),
+        *("--height", "0.225", "--branch", "-", "--rate", "20", "--json", "-o", str(tmp_path)),
+    )
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)
+    assert summary["robot"] == "mine"
+    assert summary["helix"]["radius"] == 0.001
+    assert summary["helix"]["branch"] == "-"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["helix", "--robot", "nope"], "the presets are: micro, sokolov"),
+        (["helix", "--robot", "micro"], "leg 1: length would be"),
+        (["helix", "--radius", "nan"], "radius = nan"),
+        (["helix", "--radius", "75e-3", "--pitch", "50e-3"], "crosses a singularity"),
+        (["helix", "--radius", "0", "--pitch", "0", "--height", "0"], "meets a singularity"),
+        (["helix", "--rate", "0"], "must be a positive number of Hz"),
+        (["helix", "--duration", "-1"], "positive number of seconds"),
+        (["urdf", "--robot", "mine.yaml"], "base_radius"),
+        (["urdf", "--output", "no/such/folder/x.urdf"], "No such file or directory"),
+        (["view", "--port", "99999999"], "port = 99999999"),
+        (["view", "--pose", "nan", "0", "0"], "not finite"),
+        (["view", "--robot", "micro", "--pose", "0.4", "0", "0"], "out of reach"),
+    ],
+)
+def test_an_error_is_one_clear_line(arguments: list[str], words: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("base_radius: -1\n")
+    run = rps_pin(*arguments, folder=tmp_path)
+    assert run.returncode == 1
+    assert run.stdout == ""
+    (line,) = run.stderr.strip().splitlines()
+    assert line.startswith("error: ")
+    assert words in line
+
+
+def test_wrong_usage_ends_with_status_two() -> None:
+    run = rps_pin("helix", "--no-such-option")
+    assert run.returncode == 2
+    assert "Traceback" not in run.stderr
+
+
+def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("a file")
+    run = rps_pin("helix", "--rate", "5", "-o", str(tmp_path / "taken"))
+    assert run.returncode == 1
+    (line,) = run.stderr.strip().splitlines()
+    assert str(tmp_path / "taken") in line
+    assert (tmp_path / "taken").read_text() == "a file"
+
+
+def test_help_teaches() -> None:
+    text = rps_pin("helix", "--help").stdout
+    flat = " ".join(text.split())
+    assert "the one reading of it that stays clear of the flat, singular pose" in flat
+    assert "rps-pin helix --robot micro" in flat
+    for option in ("--robot", "--radius", "--pitch", "--height", "--rate", "--output", "--json"):
+        assert option in text
+    assert __version__ in rps_pin("--version").stdout
+    assert {"helix", "view", "urdf"} <= set(rps_pin("--help").stdout.split())
+
+
+def test_urdf_is_written_to_standard_output_or_a_file(tmp_path: Path) -> None:
+    expected = RPSRobot.from_preset("micro").urdf
+    assert rps_pin("urdf", "--robot", "micro").stdout == expected
+    file = tmp_path / "micro.urdf"
+    run = rps_pin("urdf", "--robot", "micro", "-o", str(file))
+    assert run.returncode == 0
+    assert file.read_text() == expected
+
+
+@pytest.mark.parametrize("arguments", [[], ["--pose", "0.4", "0.1", "0"]])
+def test_view_serves_this_machine_until_ctrl_c(arguments: list[str]) -> None:
+    command = [sys.executable, "-u", "-c", "from rps_pin.cli import main; main()", "view"]
+    process = subprocess.Popen(
+        [*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        address = line.split()[1]
+        assert address.startswith("http://127.0.0.1:")
+        with urllib.request.urlopen(address, timeout=10) as page:
+            assert "MeshCat" in page.read().decode()
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=15)
+    finally:
+        process.kill()
+    assert process.returncode == 0
+    assert "ended" in output
+    assert errors == ""

@@ -1,0 +1,35 @@
+"""The README's Python runs, and prints what the README shows."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text("utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+
+
+def test_the_python_blocks_run_in_order_and_print_what_is_shown(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    names: dict[str, object] = {}
+    exec(BLOCKS[0], names)
+    printed = capsys.readouterr().out
+    assert "N" in printed
+    for line in printed.splitlines():
+        assert f"    {line}\n" in README
+    exec(BLOCKS[1], names)
+    assert names["result"].residual < 1e-12  # type: ignore[attr-defined]
+
+
+def test_the_first_block_is_ten_lines() -> None:
+    assert len(BLOCKS[0].strip().splitlines()) == 10
+
+
+def test_the_files_it_names_exist() -> None:
+    for target in re.findall(r"\]\(([^)#:]+)\)", README):
+        assert (ROOT / target).is_file(), target
