@@ -6,12 +6,34 @@ attributes too, so that a program need not read the sentence.
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+_LONGEST = 400
+_REPR = reprlib.Repr()
+_REPR.maxlevel, _REPR.maxlist, _REPR.maxstring, _REPR.maxother = 3, 9, _LONGEST, _LONGEST
+
+
+def shown(value: object) -> str:
+    """Return a value as it was given, or the beginning of it if it is large or deeply nested."""
+    text = _REPR.repr(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 class RPSPinError(Exception):
     """Base class of every error that rps_pin raises on purpose."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let errors travel between processes, whatever their constructors take."""
+        return _rebuilt, (type(self), self.args, self.__dict__)
+
+
+def _rebuilt(kind: type[RPSPinError], args: tuple[Any, ...], state: dict[str, Any]) -> RPSPinError:
+    error = kind.__new__(kind)
+    error.args = args
+    error.__dict__.update(state)
+    return error
 
 
 class InputError(RPSPinError, ValueError):
@@ -35,7 +57,7 @@ class ParameterError(InputError):
         self.field = field
         self.value = value
         self.rule = rule
-        super().__init__(f"{field} = {value!r}: {rule}")
+        super().__init__(f"{field} = {shown(value)}: {rule}")
 
 
 class MechanismError(InputError):

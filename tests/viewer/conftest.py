@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import shutil
 import time
 from collections.abc import Iterator
@@ -34,9 +35,11 @@ def sample() -> Sample:
 # Not for the session: Playwright keeps an event loop running, and other tests need their own.
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """A headless Chromium with WebGL."""
-    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
+    """A headless Chromium with WebGL: RPS_PIN_CHROMIUM (empty: none), or the first found."""
+    found = os.environ.get("RPS_PIN_CHROMIUM")
     if found is None:
+        found = next((path for name in BROWSERS if (path := shutil.which(name))), "")
+    if not found:
         pytest.skip(
             f"no browser found ({', '.join(BROWSERS)}); "
             "on Debian and Ubuntu: apt-get install chromium"

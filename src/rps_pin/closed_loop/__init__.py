@@ -2,6 +2,7 @@
 
 from rps_pin.closed_loop.closure import LoopClosure
 from rps_pin.closed_loop.inverse_dynamics import InverseDynamics
-from rps_pin.closed_loop.model import ClosedLoopModel, LoopErrors
+from rps_pin.closed_loop.loops import LoopErrors
+from rps_pin.closed_loop.model import ClosedLoopModel
 
 __all__ = ["ClosedLoopModel", "InverseDynamics", "LoopClosure", "LoopErrors"]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +18,9 @@ from rps_pin.closed_loop.inverse_dynamics import (
     condition_number,
     solve_by_allowed_motions,
 )
+from rps_pin.closed_loop.loops import LoopErrors, Loops, refuse_twice
+from rps_pin.closed_loop.reading import model_from_urdf
+from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import ClosureError, InputError, MechanismError, SingularityError
 
 Array = NDArray[np.float64]
@@ -32,17 +33,6 @@ MAX_CONDITION = 1e8
 _CLOSED = 1e-12
 #: What `velocity` and `acceleration` accept of their arguments, relative to the rates given.
 _CONSISTENT = 1e-8
-
-
-class LoopErrors(NamedTuple):
-    """How far the loops are from being closed; the rows are those of the closures in order."""
-
-    position: Array
-    """Gaps, shape (nc,), m; for angular rows the rotation vector between the frames, rad."""
-    velocity: Array
-    """Their rates, shape (nc,), m/s and rad/s."""
-    acceleration: Array
-    """Their second derivatives, shape (nc,), m/s^2 and rad/s^2."""
 
 
 class ClosedLoopModel:
@@ -85,41 +75,22 @@ class ClosedLoopModel:
         self.closures = tuple(closures)
         self.actuated = tuple(actuated)
         self.max_condition = max_condition
-        self._check_names()
-
-        self._data = model.createData()
-        self._frames = [closure.frame_ids(model) for closure in self.closures]
-        self._constraints = pin.StdVec_RigidConstraintModel()
-        self._constraint_data = pin.StdVec_RigidConstraintData()
-        for closure in self.closures:
-            constraint = closure.constraint_model(model)
-            self._constraints.append(constraint)
-            self._constraint_data.append(constraint.createData())
-        # Iterating a StdVec makes new Python objects each time; kept pairs cost a tenth.
-        calls = self._calls = [
-            (constraint.calc, data)
-            for constraint, data in zip(self._constraints, self._constraint_data, strict=True)
-        ]
-
+        refuse_twice("actuated joint", self.actuated)
+        self._loops = loops = Loops(model, closures, characteristic_length)
         self._actuated = self._velocity_indices(self.actuated)
         self._passive = np.setdiff1d(np.arange(model.nv), self._actuated)
-        self.characteristic_length = self._length(characteristic_length)
-        self._column_scale = np.where(self._is_angular(), 1 / self.characteristic_length, 1.0)
-        self._row_scale = np.concatenate(
-            [[], *(([1.0] * 3 + [self.characteristic_length] * 3)[: c.size] for c in self.closures)]
-        )
-        self._passive_scale = self._column_scale[self._passive]
-        self._square = self.constraint_size == self._passive.size > 0
-        self._rows = self._row_scale[:, None]
+        self._rows = loops.row_scale[:, None]
+        self._passive_scale = loops.column_scale[self._passive]
+        self._square = loops.size == self._passive.size > 0
         self._right = _right_hand_sides(self._passive.size)
         self._harmless_growth = self._largest_harmless_growth()
         #: What a call of `inverse_dynamics` needs, in one look-up.
         self._hot = (
             model,
-            self._data,
-            calls,
-            self._constraints,
-            self._constraint_data,
+            loops.data,
+            loops.calls,
+            loops.constraints,
+            loops.constraint_data,
             self._actuated,
             self._passive,
         )
@@ -154,8 +125,8 @@ class ClosedLoopModel:
         MechanismError
             If it is no URDF, or as for the class.
         """
-        model = _model_from_urdf(path_or_xml)
-        model.gravity.linear = np.asarray(gravity, dtype=np.float64)
+        model = model_from_urdf(path_or_xml)
+        model.gravity.linear = checked_vector(gravity, 3, "gravity")
         return cls(
             model,
             closures,
@@ -169,7 +140,12 @@ class ClosedLoopModel:
     @property
     def constraint_size(self) -> int:
         """Number of closure rows, nc."""
-        return sum(closure.size for closure in self.closures)
+        return self._loops.size
+
+    @property
+    def characteristic_length(self) -> float:
+        """Length that makes angles and lengths comparable, m."""
+        return self._loops.length
 
     @property
     def actuated_indices(self) -> NDArray[np.intp]:
@@ -177,14 +153,14 @@ class ClosedLoopModel:
         return self._actuated.copy()
 
     def rows(self, closure: str) -> slice:
-        """Return the rows of a closure, by its name, in `constraint_forces` and `LoopErrors`."""
-        start = 0
-        for candidate in self.closures:
-            if candidate.name == closure:
-                return slice(start, start + candidate.size)
-            start += candidate.size
-        names = ", ".join(candidate.name for candidate in self.closures)
-        raise MechanismError(f"no closure {closure!r}; there are: {names}")
+        """Return the rows of a closure, by its name, in `constraint_forces` and `LoopErrors`.
+
+        Raises
+        ------
+        MechanismError
+            If there is no closure of that name; lists those there are.
+        """
+        return self._loops.rows(closure)
 
     # Position, velocity, acceleration -------------------------------------------------------------
 
@@ -199,17 +175,17 @@ class ClosedLoopModel:
             Configuration (nq,), velocity (nv,) and acceleration (nv,) as Pinocchio has them; v and
             a are zero if left out.
         """
-        q_ = self._vector(q, self.model.nq, "q")
-        v_ = self._vector(np.zeros(self.model.nv) if v is None else v, self.model.nv, "v")
-        a_ = self._vector(np.zeros(self.model.nv) if a is None else a, self.model.nv, "a")
-        return self._loop_errors(q_, v_, a_)
+        still = np.zeros(self.model.nv)
+        return self._loops.errors(
+            *self._checked_state(q, still if v is None else v, still if a is None else a)
+        )
 
     def loop_gap(self, q: ArrayLike) -> float:
         """Return the largest gap between two closed frames, m.
 
         An angle between rigidly closed frames counts with the characteristic length as its lever.
         """
-        return self._worst_gap(self._gaps(self._vector(q, self.model.nq, "q")))[0]
+        return self._loops.worst(self._loops.gaps(checked_vector(q, self.model.nq, "q")))[0]
 
     def close(self, q_guess: ArrayLike) -> Array:
         """Return a configuration near a guess in which every loop is closed.
@@ -232,17 +208,17 @@ class ClosedLoopModel:
         ClosureError
             If the loops do not close from there; says by how much, and which.
         """
-        guess = pin.normalize(self.model, self._vector(q_guess, self.model.nq, "q_guess"))
+        guess = pin.normalize(self.model, checked_vector(q_guess, self.model.nq, "q_guess"))
         q = close_gaps(
             guess,
-            gaps=lambda q: self._row_scale * self._gaps(q),
-            jacobian=lambda q: self._rows * self._jacobian(q) * self._column_scale,
-            integrate=lambda q, step: pin.integrate(self.model, q, self._column_scale * step),
+            gaps=lambda q: self._loops.row_scale * self._loops.gaps(q),
+            jacobian=lambda q: self._rows * self._loops.jacobian(q) * self._loops.column_scale,
+            integrate=lambda q, step: pin.integrate(self.model, q, self._loops.column_scale * step),
             tolerance=_CLOSED * self.characteristic_length,
         )
-        gap, closure = self._worst_gap(self._gaps(q))
+        gap, closure = self._loops.worst(self._loops.gaps(q))
         if not gap <= _CLOSED * max(self.characteristic_length, 1.0):
-            before, _ = self._worst_gap(self._gaps(guess))
+            before, _ = self._loops.worst(self._loops.gaps(guess))
             raise ClosureError(
                 f"the loops do not close from this guess: closure {closure!r} stays open by "
                 f"{gap:.6g} m (largest gap of the guess: {before:.6g} m)",
@@ -274,9 +250,9 @@ class ClosedLoopModel:
         ClosureError
             If no motion of the mechanism has these actuator velocities (redundant actuation).
         """
-        q_ = self._vector(q, self.model.nq, "q")
-        rates = self._vector(v_actuated, self._actuated.size, "v_actuated")
-        return self._complete(self._jacobian(q_), rates, np.zeros(self.constraint_size))
+        q_ = checked_vector(q, self.model.nq, "q")
+        rates = checked_vector(v_actuated, self._actuated.size, "v_actuated")
+        return self._complete(self._loops.jacobian(q_), rates, np.zeros(self.constraint_size))
 
     def acceleration(self, q: ArrayLike, v: ArrayLike, a_actuated: ArrayLike) -> Array:
         """Return the acceleration that keeps the loops closed while the actuators accelerate so.
@@ -295,18 +271,18 @@ class ClosedLoopModel:
         SingularityError, ClosureError
             As `velocity`; also if v itself opens the loops.
         """
-        q_ = self._vector(q, self.model.nq, "q")
-        v_ = self._vector(v, self.model.nv, "v")
-        accelerations = self._vector(a_actuated, self._actuated.size, "a_actuated")
-        errors = self._loop_errors(q_, v_, np.zeros(self.model.nv))
-        opening = float(np.abs(self._row_scale * errors.velocity).max(initial=0.0))
-        speed = float(np.abs(v_ / self._column_scale).max(initial=0.0))
+        q_ = checked_vector(q, self.model.nq, "q")
+        v_ = checked_vector(v, self.model.nv, "v")
+        accelerations = checked_vector(a_actuated, self._actuated.size, "a_actuated")
+        errors = self._loops.errors(q_, v_, np.zeros(self.model.nv))
+        opening = float(np.abs(self._loops.row_scale * errors.velocity).max(initial=0.0))
+        speed = float(np.abs(v_ / self._loops.column_scale).max(initial=0.0))
         if opening > _CONSISTENT * max(speed, 1.0):
             raise ClosureError(
                 f"v opens the loops at {opening:.3g} m/s; complete it with velocity() first",
                 opening,
             )
-        return self._complete(self._jacobian(q_), accelerations, errors.acceleration)
+        return self._complete(self._loops.jacobian(q_), accelerations, errors.acceleration)
 
     def condition(self, q: ArrayLike) -> float:
         """Return the condition number of J_p: how near a configuration is to a singularity.
@@ -317,7 +293,7 @@ class ClosedLoopModel:
         constraint singularity). Its inverse is the relative distance to the nearest singular
         matrix, a number between 0 and 1.
         """
-        jacobian = self._jacobian(self._vector(q, self.model.nq, "q"))
+        jacobian = self._loops.jacobian(checked_vector(q, self.model.nq, "q"))
         return self._condition(jacobian)
 
     # Dynamics -------------------------------------------------------------------------------------
@@ -351,7 +327,10 @@ class ClosedLoopModel:
             force = pin.rnea(model, data, q, v, a)
             pin.computeJointJacobians(model, data, q)
         except (TypeError, ValueError):  # a list, an array of integers, or a wrong shape
-            return self._inverse_dynamics_of_any(q, v, a)
+            given, checked = (q, v, a), self._checked_state(q, v, a)
+            if all(array is one for array, one in zip(checked, given, strict=True)):
+                raise  # a complaint of Pinocchio's own
+            return self.inverse_dynamics(*checked)
         for calc, scratch in calls:  # getConstraintsJacobian reads what they refresh
             calc(model, data, scratch)
         jacobian = pin.getConstraintsJacobian(model, data, constraints, constraint_data)
@@ -366,13 +345,13 @@ class ClosedLoopModel:
         multipliers = solution[:, 0]
         growth = dnrm2(solution[:, 1]) * dnrm2(passive_jacobian.ravel())
         if singular or not growth < self._harmless_growth:
-            self._refuse_bad_input(q, v, a)
+            self._checked_state(q, v, a)
             self._refuse_singular(jacobian)
         # rnea - J' lambda: the actuated rows are tau, the passive ones the residual.
         rest = dgemv(-1.0, jacobian.T, multipliers, 1.0, force)
         residual = dnrm2(rest.take(passive))
         if not residual < np.inf:
-            self._refuse_bad_input(q, v, a)
+            self._checked_state(q, v, a)
         return InverseDynamics(
             rest.take(actuated),
             multipliers,
@@ -380,20 +359,14 @@ class ClosedLoopModel:
             (self._rows, passive_jacobian, self._passive_scale),
         )
 
-    def _inverse_dynamics_of_any(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> InverseDynamics:
-        """Convert what is not yet an array of floats, or say what is wrong with it."""
-        q_ = self._vector(q, self.model.nq, "q")
-        v_ = self._vector(v, self.model.nv, "v")
-        return self.inverse_dynamics(q_, v_, self._vector(a, self.model.nv, "a"))
-
     def _inverse_dynamics_by_motions(self, jacobian: Array, force: Array) -> InverseDynamics:
         if not np.isfinite(force).all():
             raise InputError("q, v and a must be finite")
         self._refuse_singular(jacobian)
         tau, multipliers = solve_by_allowed_motions(
-            self._rows * jacobian, self._actuated, force, self._column_scale
+            self._rows * jacobian, self._actuated, force, self._loops.column_scale
         )
-        multipliers = self._row_scale * multipliers
+        multipliers = self._loops.row_scale * multipliers
         rest = force - jacobian.T @ multipliers
         return InverseDynamics(
             tau,
@@ -404,58 +377,10 @@ class ClosedLoopModel:
 
     # Inner workings -------------------------------------------------------------------------------
 
-    def _jacobian(self, q: Array) -> Array:
-        """Return J, shape (nc, nv), rows as `LoopClosure` has them."""
-        model, data = self.model, self._data
-        pin.computeJointJacobians(model, data, q)
-        for calc, constraint_data in self._calls:
-            calc(model, data, constraint_data)
-        jacobian: Array = pin.getConstraintsJacobian(
-            model, data, self._constraints, self._constraint_data
-        )
-        return jacobian
-
-    def _gaps(self, q: Array) -> Array:
-        pin.framesForwardKinematics(self.model, self._data, q)
-        return np.concatenate(
-            [np.zeros(0)]
-            + [
-                _gap(closure, self._data.oMf[a], self._data.oMf[b])
-                for closure, (a, b) in zip(self.closures, self._frames, strict=True)
-            ]
-        )
-
-    def _loop_errors(self, q: Array, v: Array, a: Array) -> LoopErrors:
-        model, data = self.model, self._data
-        gaps = self._gaps(q)
-        pin.forwardKinematics(model, data, q, v, a)
-        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        rates, accelerations = [np.zeros(0)], [np.zeros(0)]
-        for closure, (frame_a, frame_b) in zip(self.closures, self._frames, strict=True):
-            rate = pin.getFrameVelocity(model, data, frame_a, axes) - pin.getFrameVelocity(
-                model, data, frame_b, axes
-            )
-            acceleration = pin.getFrameClassicalAcceleration(
-                model, data, frame_a, axes
-            ) - pin.getFrameClassicalAcceleration(model, data, frame_b, axes)
-            rates.append(rate.vector[: closure.size])
-            accelerations.append(acceleration.vector[: closure.size])
-        return LoopErrors(gaps, np.concatenate(rates), np.concatenate(accelerations))
-
-    def _worst_gap(self, gaps: Array) -> tuple[float, str]:
-        """Return the largest gap (m) and the name of its closure."""
-        worst, name = 0.0, ""
-        for closure in self.closures:
-            scaled = (self._row_scale * gaps)[self.rows(closure.name)]
-            gap = float(max(np.linalg.norm(scaled[:3]), np.linalg.norm(scaled[3:])))
-            if not gap <= worst:
-                worst, name = gap, closure.name
-        return worst, name
-
     def _complete(self, jacobian: Array, actuated: Array, drift: Array) -> Array:
         """Return x with x_a given and J x + drift = 0: J_p x_p = -J_a x_a - drift."""
         self._refuse_singular(jacobian)
-        rows = self._row_scale
+        rows = self._loops.row_scale
         right = -rows * (jacobian[:, self._actuated] @ actuated + drift)
         left = rows[:, None] * jacobian[:, self._passive] * self._passive_scale
         scaled, *_ = np.linalg.lstsq(left, right, rcond=None)
@@ -485,10 +410,15 @@ class ClosedLoopModel:
                 self.max_condition,
             )
 
-    def _refuse_bad_input(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> None:
-        self._vector(q, self.model.nq, "q")
-        self._vector(v, self.model.nv, "v")
-        self._vector(a, self.model.nv, "a")
+    def _checked_state(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike
+    ) -> tuple[Array, Array, Array]:
+        """Return q, v and a as finite arrays of the right shapes."""
+        return (
+            checked_vector(q, self.model.nq, "q"),
+            checked_vector(v, self.model.nv, "v"),
+            checked_vector(a, self.model.nv, "a"),
+        )
 
     def _largest_harmless_growth(self) -> float:
         """Return what |J_p| |J_p^-1 probe| may be without a closer look at the condition number.
@@ -497,27 +427,8 @@ class ClosedLoopModel:
         thousand cases (Dixon 1983), and scaling changes the condition number by at most the ratios
         of the scales.
         """
-        spread = np.ptp(np.log(self._passive_scale)) + np.ptp(np.log(self._row_scale))
+        spread = np.ptp(np.log(self._passive_scale)) + np.ptp(np.log(self._loops.row_scale))
         return float(self.max_condition / 1e4 / np.exp(spread)) if self._square else 0.0
-
-    def _vector(self, value: ArrayLike, size: int, name: str) -> Array:
-        try:
-            array = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"{name} must be {size} numbers") from None
-        if array.shape != (size,):
-            raise InputError(f"{name} has shape {array.shape}; it must be ({size},)")
-        if not np.isfinite(array).all():
-            where = int(np.argmin(np.isfinite(array)))
-            raise InputError(f"{name} is not finite: entry {where} is {array[where]}")
-        return array
-
-    def _check_names(self) -> None:
-        names = [closure.name for closure in self.closures]
-        for what, given in (("closure", names), ("actuated joint", self.actuated)):
-            twice = {name for name in given if list(given).count(name) > 1}
-            if twice:
-                raise MechanismError(f"{what} {min(twice)!r} is named twice")
 
     def _velocity_indices(self, joints: Sequence[str]) -> NDArray[np.intp]:
         indices: list[int] = []
@@ -529,42 +440,6 @@ class ClosedLoopModel:
             indices.extend(range(joint.idx_v, joint.idx_v + joint.nv))
         return np.array(indices, dtype=np.intp)
 
-    def _is_angular(self) -> NDArray[np.bool_]:
-        """Return which velocity components are angular: they move joint frames by turning them."""
-        neutral = pin.neutral(self.model)
-        pin.computeJointJacobians(self.model, self._data, neutral)
-        angular = np.zeros(self.model.nv, dtype=bool)
-        for index, joint in enumerate(self.model.joints):
-            if index == 0:
-                continue
-            columns = slice(joint.idx_v, joint.idx_v + joint.nv)
-            local = pin.getJointJacobian(self.model, self._data, index, pin.ReferenceFrame.LOCAL)[
-                :, columns
-            ]
-            angular[columns] = np.abs(local[3:]).max(axis=0) > 1e-12
-        return angular
-
-    def _length(self, given: float | None) -> float:
-        if given is not None:
-            if not (np.isfinite(given) and given > 0):
-                raise InputError(f"characteristic_length = {given}: it must be positive")
-            return float(given)
-        levers = [
-            float(np.linalg.norm(self.model.frames[frame].placement.translation))
-            for pair in self._frames
-            for frame in pair
-            if self.model.frames[frame].parentJoint != 0  # the world is no lever
-        ]
-        return max(levers, default=0.0) or 1.0
-
-
-def _gap(closure: LoopClosure, a: pin.SE3, b: pin.SE3) -> Array:
-    """Return a closure's position error: p_a - p_b, and log(R_a R_b') if it is rigid."""
-    gap: Array = a.translation - b.translation
-    if closure.kind == "rigid":
-        gap = np.concatenate([gap, pin.log3(a.rotation @ b.rotation.T)])
-    return gap
-
 
 def _right_hand_sides(size: int) -> Array:
     """Return a buffer with a column for rnea_p and, beside it, a random unit vector: the probe."""
@@ -572,19 +447,3 @@ def _right_hand_sides(size: int) -> Array:
     direction = np.random.default_rng(seed=3).standard_normal(size)
     columns[:, 1] = direction / max(float(np.linalg.norm(direction)), 1e-300)
     return columns
-
-
-def _model_from_urdf(path_or_xml: str | os.PathLike[str]) -> pin.Model:
-    text = os.fspath(path_or_xml)
-    origin = "the URDF text"
-    if not text.lstrip().startswith("<"):
-        origin = text
-        try:
-            text = Path(text).read_text("utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = getattr(error, "strerror", None) or "not a UTF-8 text"
-            raise InputError(f"cannot read the URDF {origin}: {reason}") from None
-    try:
-        return pin.buildModelFromXML(text)
-    except (ValueError, RuntimeError) as error:
-        raise MechanismError(f"{origin} is not a valid URDF: {error}") from None

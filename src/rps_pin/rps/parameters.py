@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -18,6 +18,7 @@ from pydantic import (
     Field,
     PlainSerializer,
     ValidationError,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
@@ -35,20 +36,35 @@ INERTIA_ROUNDING = 0.01
 
 def _array(*shape: int) -> BeforeValidator:
     """Return a validator that makes a finite, read-only float array of the given shape."""
+    wanted = f"must be {' x '.join(map(str, shape))} numbers, shape {shape}"
 
     def convert(value: object) -> NDArray[np.float64]:
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise ValueError(f"must be {' x '.join(map(str, shape))} numbers") from None
-        if array.shape != shape:
-            raise ValueError(f"must have shape {shape}, not {array.shape}")
+        # Looked at before it is converted: a file's nest of aliases can be huge.
+        if not _has_shape(value, shape):
+            raise ValueError(wanted)
+        given = np.asarray(value)
+        if given.dtype.kind not in "iuf" or given.shape != shape:
+            raise ValueError(wanted)
+        array = given.astype(np.float64)
         if not np.isfinite(array).all():
             raise ValueError("must be finite")
         array.setflags(write=False)
         return array
 
     return BeforeValidator(convert)
+
+
+def _has_shape(value: object, shape: tuple[int, ...]) -> bool:
+    """Return whether nested sequences have the lengths of a shape; deeper nests are not entered."""
+    if isinstance(value, np.ndarray):
+        return bool(value.shape == shape)
+    if not shape:
+        return not isinstance(value, (Sequence, bool))
+    return (
+        isinstance(value, Sequence)
+        and len(value) == shape[0]
+        and all(_has_shape(part, shape[1:]) for part in value)
+    )
 
 
 _ToList = PlainSerializer(lambda array: array.tolist(), return_type=list)
@@ -140,9 +156,13 @@ class RPSParameters(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
-    def _no_booleans(cls, value: object) -> object:
-        if isinstance(value, bool):
-            raise ValueError("must be a number, not a truth value")
+    def _numbers_are_numbers(cls, value: object, info: ValidationInfo) -> object:
+        """Refuse what pydantic would turn into a number: truth values, and numbers in quotes."""
+        if cls.model_fields[str(info.field_name)].annotation in (float, tuple[float, float]):
+            for part in value if isinstance(value, (list, tuple)) else [value]:
+                if isinstance(part, (bool, str, bytes)):
+                    kind = "truth value" if isinstance(part, bool) else "text"
+                    raise ValueError(f"must be a number, not a {kind}")
         return value
 
     @field_validator("platform_inertia")
@@ -222,6 +242,9 @@ class RPSParameters(BaseModel):
 
     def __hash__(self) -> int:
         return hash(self.model_dump_json())
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise ParameterError(name, value, "parameters are frozen; replace() makes a changed copy")
 
     # Files ----------------------------------------------------------------------------------------
 
