@@ -7,6 +7,7 @@ Run it from the checkout, in an environment with the development dependencies an
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -52,7 +53,8 @@ def photograph(page: Path, picture: Path) -> None:
     """Take a picture of the robot in an animation's page, a second into its motion."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=BROWSER_OPTIONS
+            executable_path=os.environ.get("RPS_PIN_CHROMIUM") or shutil.which("chromium"),
+            args=BROWSER_OPTIONS,
         )
         tab = browser.new_page(viewport={"width": 1000, "height": 620})
         tab.goto(page.as_uri())

@@ -27,9 +27,12 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         A path in the same folder, with the same suffix, to write to.
     """
     target = Path(path)
-    handle, name = tempfile.mkstemp(
-        dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix
-    )
+    try:
+        handle, name = tempfile.mkstemp(
+            dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix
+        )
+    except OSError as error:  # say the name that was asked for
+        raise type(error)(error.errno, error.strerror, str(target)) from None
     os.close(handle)
     scratch = Path(name)
     try:

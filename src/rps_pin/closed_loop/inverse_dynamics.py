@@ -47,7 +47,7 @@ class InverseDynamics:
         tau: Array,
         constraint_forces: Array,
         residual: float,
-        scaled_jacobian: tuple[Array, Array, Array],
+        scaled_jacobian: tuple[tuple[Array, Array], Array],
     ) -> None:
         self.tau = tau
         self.constraint_forces = constraint_forces
@@ -60,8 +60,7 @@ class InverseDynamics:
 
         Computed when asked for.
         """
-        rows, jacobian, columns = self._scaled_jacobian
-        return condition_number(rows * jacobian * columns)
+        return condition_number(self._passive_jacobian())
 
     @property
     def orientation(self) -> int:
@@ -69,10 +68,15 @@ class InverseDynamics:
 
         0 where J_p is not square, or its determinant vanishes. Computed when asked for.
         """
-        rows, jacobian, columns = self._scaled_jacobian
+        jacobian = self._passive_jacobian()
         if jacobian.shape[0] != jacobian.shape[1]:
             return 0
-        return int(np.linalg.slogdet(rows * jacobian * columns)[0])
+        return int(np.linalg.slogdet(jacobian)[0])
+
+    def _passive_jacobian(self) -> Array:
+        """Return J_p with all entries in one unit, shape (nc, np)."""
+        (rows, columns), jacobian = self._scaled_jacobian
+        return rows * jacobian * columns
 
     def __repr__(self) -> str:
         return (
@@ -136,6 +140,13 @@ def solve_by_allowed_motions(
             f"{len(actuated)} actuated joints for a mobility of {mobility} at this configuration: "
             f"with {kind} actuators than mobility their forces are not determined",
             np.inf,
+            1 / RANK_TOLERANCE,
+        )
+    condition = condition_number(actuator_motions)
+    if not condition * RANK_TOLERANCE < 1:
+        raise SingularityError(
+            f"the actuated joints do not move all of the mechanism here: condition {condition:.3g}",
+            condition,
             1 / RANK_TOLERANCE,
         )
     tau = np.asarray(np.linalg.solve(actuator_motions.T, motions.T @ generalised_force), np.float64)

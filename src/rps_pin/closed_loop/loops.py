@@ -27,7 +27,8 @@ class LoopErrors(NamedTuple):
     velocity: Array
     """Their rates, shape (nc,), m/s and rad/s."""
     acceleration: Array
-    """Their second derivatives, shape (nc,), m/s^2 and rad/s^2."""
+    """Their second derivatives, shape (nc,), m/s^2 and rad/s^2; for angular rows the difference of
+    the frames' angular accelerations, which is that where their angular velocities agree."""
 
 
 class Loops:
@@ -110,7 +111,7 @@ class Loops:
         jacobian: Array = pin.getConstraintsJacobian(
             model, data, self.constraints, self.constraint_data
         )
-        return jacobian
+        return jacobian.reshape(self.size, model.nv)  # a single row or column comes flat
 
     def gaps(self, q: Array) -> Array:
         """Return e(q), shape (nc,), m and rad."""
@@ -176,10 +177,9 @@ class Loops:
             if index == 0:
                 continue
             columns = slice(joint.idx_v, joint.idx_v + joint.nv)
-            local = pin.getJointJacobian(self.model, self.data, index, pin.ReferenceFrame.LOCAL)[
-                :, columns
-            ]
-            angular[columns] = np.abs(local[3:]).max(axis=0) > 1e-12
+            local = pin.getJointJacobian(self.model, self.data, index, pin.ReferenceFrame.LOCAL)
+            own = local.reshape(6, self.model.nv)[:, columns]
+            angular[columns] = np.abs(own[3:]).max(axis=0) > 1e-12
         return angular
 
 

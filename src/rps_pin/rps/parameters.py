@@ -45,7 +45,7 @@ def _array(*shape: int) -> BeforeValidator:
         given = np.asarray(value)
         if given.dtype.kind not in "iuf" or given.shape != shape:
             raise ValueError(wanted)
-        array = given.astype(np.float64)
+        array = given.astype(np.float64) + 0.0  # no negative zeros: equal arrays, equal hashes
         if not np.isfinite(array).all():
             raise ValueError("must be finite")
         array.setflags(write=False)
@@ -232,8 +232,10 @@ class RPSParameters(BaseModel):
 
     def replace(self, **changes: Any) -> RPSParameters:
         """Return a copy with some fields changed, validated anew."""
-        values = {field: getattr(self, field) for field in type(self).model_fields}
-        return RPSParameters(**(values | changes))
+        return RPSParameters(**(self._values() | changes))
+
+    def _values(self) -> dict[str, Any]:
+        return {field: getattr(self, field) for field in type(self).model_fields}
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RPSParameters):
@@ -241,7 +243,17 @@ class RPSParameters(BaseModel):
         return self.model_dump() == other.model_dump()
 
     def __hash__(self) -> int:
-        return hash(self.model_dump_json())
+        values = self._values().values()
+        return hash(tuple(x.tobytes() if isinstance(x, np.ndarray) else x for x in values))
+
+    def __copy__(self) -> RPSParameters:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> RPSParameters:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._values(),)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise ParameterError(name, value, "parameters are frozen; replace() makes a changed copy")
@@ -283,7 +295,7 @@ class RPSParameters(BaseModel):
         """
         try:
             text = Path(path).read_text("utf-8")
-        except (OSError, UnicodeDecodeError) as error:
+        except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or "not a UTF-8 text"
             raise InputError(f"cannot read the parameter file {path}: {reason}") from None
         return cls._from_text(text, str(path))
@@ -308,6 +320,11 @@ class RPSParameters(BaseModel):
         yaml.default_flow_style = None
         with whole_file(path) as scratch:
             yaml.dump(document, scratch)
+
+
+def _restored(values: dict[str, Any]) -> RPSParameters:
+    """Unpickle: through the constructor, so that the arrays are read-only again."""
+    return RPSParameters(**values)
 
 
 def _refuse(field: str, value: object, rule: str) -> None:

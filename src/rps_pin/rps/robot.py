@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -75,6 +75,10 @@ class RPSRobot:
     def from_preset(cls, name: str) -> RPSRobot:
         """Return a preset robot: ``"sokolov"`` (the paper's Table 1) or ``"micro"``."""
         return cls(RPSParameters.from_preset(name))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Give copies, and other processes, scratch memory of their own."""
+        return type(self), (self.parameters,)
 
     def __repr__(self) -> str:
         p = self.parameters

@@ -17,6 +17,7 @@ second at its highest. Other proportions keep the same phi(t).
 from __future__ import annotations
 
 import math
+from numbers import Real
 from typing import Literal, Protocol
 
 import numpy as np
@@ -25,7 +26,7 @@ from numpy.typing import ArrayLike
 from rps_pin.errors import InputError
 from rps_pin.trajectories.path import Array, PathSample, checked_times
 
-#: Eq. 29: t_a and t_t of Table 1, the latter unrounded (5.2387 s).
+#: Eq. 29: t_a and t_t of Table 1, the latter unrounded (5.2388 s).
 PAPER_RAMP = 0.5
 PAPER_DURATION = 0.5 + math.sqrt(1 + 9 * math.pi**2) / 2
 
@@ -143,7 +144,7 @@ def helix(
         ``"+"`` for the paper's (alpha, beta), which starts at alpha = pi/2; ``"-"`` for
         (alpha, -beta), the opposite tilt with the same centre.
     duration
-        In s; Eq. 29's 5.2387 s if left out. The shape of phi(t) stays.
+        In s; Eq. 29's 5.2388 s if left out. The shape of phi(t) stays.
 
     Raises
     ------
@@ -167,15 +168,17 @@ def _check(
     branch: str,
     duration: float,
 ) -> None:
-    for name, value in (("pitch", pitch), ("height", height)):
-        if not math.isfinite(value):
-            raise InputError(f"{name} = {value}: it must be a finite number of metres")
+    lengths = {"radius": radius, "pitch": pitch, "height": height}
+    for name, value in (lengths | {"duration": duration}).items():
+        if not isinstance(value, Real) or not math.isfinite(value):
+            unit = "metres" if name in lengths else "seconds"
+            raise InputError(f"{name} = {value!r}: it must be a finite number of {unit}")
     if not 0 <= radius <= platform_radius:
         raise InputError(
             f"radius = {radius} m: the centre of a platform of radius h = {platform_radius} m "
             f"reaches 0 to {platform_radius} m sideways"
         )
-    if not (math.isfinite(duration) and duration > 0):
+    if not duration > 0:
         raise InputError(f"duration = {duration}: it must be a positive number of seconds")
     if branch not in ("+", "-"):
         raise InputError(f"branch = {branch!r}; it must be '+' or '-'")

@@ -42,9 +42,12 @@ def checked_times(t: ArrayLike, duration: float) -> Array:
     Raises
     ------
     InputError
-        If a time is not finite, or outside [0, duration] by more than rounding.
+        If a time is no finite number, or outside [0, duration] by more than rounding.
     """
-    times = np.asarray(t, dtype=np.float64)
+    try:
+        times = np.asarray(t, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError("times must be numbers, in seconds") from None
     slack = 1e-12 * max(duration, 1.0)
     outside = ~((times >= -slack) & (times <= duration + slack))
     if outside.any():

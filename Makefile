@@ -1,0 +1,53 @@
+# Everything here works from a fresh checkout: what a target needs is installed into ./.venv first,
+# and reused as long as pyproject.toml stays the same. `make` alone lists the targets.
+#
+# Settings (all optional), e.g. `make test JOBS=4 PYTEST_ARGS="-k helix"`:
+#   PYTHON       the interpreter .venv is made with (default: the first python3 that is 3.11 or newer)
+#   JOBS         parallel test processes (default 2)
+#   PYTEST_ARGS  more arguments for pytest
+#   NO_APT       set to 1 to never install Debian packages, not even when that needs no password
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help demo test bench lint format setup setup-dev clean distclean
+
+# A sourced ROS or openrobots environment must not put its own pinocchio before ours.
+unexport PYTHONPATH
+unexport PYTHONHOME
+
+JOBS ?= 2
+PYTEST_ARGS ?=
+export JOBS PYTEST_ARGS PYTHON NO_APT
+
+help: ## list the targets
+	@echo "usage: make TARGET"
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1\t\2/p' Makefile | expand -t 14
+
+demo: setup ## follow a helix with the 3-RPS robot; results go to demo/
+	.venv/bin/rps-pin helix --output demo
+
+test: setup-dev ## lint, format check, types and all tests; installs or finds Chromium
+	@sh tools/check lint format types tests
+
+bench: setup-dev ## measure the speed of the solvers
+	.venv/bin/python -m pytest benchmarks --benchmark-only $(PYTEST_ARGS)
+
+lint: setup-dev ## lint, format check and types only
+	@sh tools/check lint format types
+
+format: setup-dev ## format the code and apply the linter's safe fixes
+	.venv/bin/ruff check --fix
+	.venv/bin/ruff format
+
+setup: ## only make .venv, with what the program needs
+	@sh tools/setup run
+
+setup-dev: ## only make .venv, with what the tests need too
+	@sh tools/setup dev
+
+clean: ## remove what the targets wrote, except .venv
+	rm -rf demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
+	find src tests benchmarks tools -type d -name __pycache__ -exec rm -rf {} +
+
+distclean: clean ## the same, and .venv
+	rm -rf .venv

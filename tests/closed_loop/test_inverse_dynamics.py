@@ -1,0 +1,142 @@
+"""The algebra of constrained inverse dynamics: ranks, null spaces, the two ways to solve."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+from rps_pin import ClosedLoopModel, RPSRobot, SingularityError
+from rps_pin.closed_loop.inverse_dynamics import (
+    allowed_motions,
+    condition_number,
+    solve_by_allowed_motions,
+)
+from tests import strategies
+from tests.closed_loop import mechanisms
+from tests.closed_loop.mechanisms import loop_jacobian
+
+Array = NDArray[np.float64]
+
+
+def matrix(rank: int, rows: int, columns: int, seed: int = 0) -> Array:
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, columns))
+
+
+@pytest.mark.parametrize(("rank", "rows", "columns"), [(3, 3, 5), (2, 6, 5), (5, 6, 5), (1, 1, 1)])
+def test_allowed_motions_are_an_orthonormal_basis_of_the_null_space(
+    rank: int, rows: int, columns: int
+) -> None:
+    jacobian = matrix(rank, rows, columns)
+    motions = allowed_motions(jacobian)
+    assert motions.shape == (columns, columns - rank)
+    np.testing.assert_allclose(jacobian @ motions, 0, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(motions.T @ motions, np.eye(columns - rank), rtol=0, atol=1e-14)
+
+
+def test_without_closures_every_motion_is_allowed() -> None:
+    assert allowed_motions(np.zeros((0, 4))).shape == (4, 4)
+
+
+def test_condition_number_is_the_ratio_of_singular_values() -> None:
+    rotation = np.linalg.qr(matrix(3, 3, 3))[0]
+    assert condition_number(rotation @ np.diag([4.0, 2.0, 0.5])) == pytest.approx(8, rel=1e-14)
+    assert condition_number(rotation) == pytest.approx(1, rel=1e-14)
+    assert condition_number(matrix(2, 6, 2)) == pytest.approx(np.linalg.cond(matrix(2, 6, 2)))
+
+
+def test_condition_number_without_an_answer_is_infinite() -> None:
+    assert condition_number(np.ones((2, 3))) == np.inf
+    assert condition_number(np.zeros((3, 3))) == np.inf
+    assert condition_number(np.diag([1.0, 0.0])) == np.inf
+    assert condition_number(matrix(2, 3, 3)) > 1e14
+
+
+def test_condition_number_without_passive_joints_is_1() -> None:
+    assert condition_number(np.zeros((0, 0))) == condition_number(np.zeros((6, 0))) == 1
+
+
+@pytest.mark.parametrize("rank", [3, 2])
+def test_answer_satisfies_the_kkt_equations(rank: int) -> None:
+    """With more rows than rank, too."""
+    jacobian, force = matrix(rank, 4, 5), np.arange(1.0, 6)
+    actuated = np.arange(5 - rank)
+    scale = np.array([1, 2, 0.5, 1, 3.0])
+    tau, multipliers = solve_by_allowed_motions(jacobian, actuated, force, scale)
+    total = jacobian.T @ multipliers
+    total[actuated] += tau
+    np.testing.assert_allclose(total, force, rtol=0, atol=1e-12)
+    # Of least norm: no part of lambda that the rows do not feel.
+    np.testing.assert_allclose(allowed_motions(jacobian.T).T @ multipliers, 0, rtol=0, atol=1e-12)
+
+
+def test_answer_does_not_depend_on_the_scale() -> None:
+    jacobian, force = matrix(3, 4, 5), np.arange(1.0, 6)
+    answers = [
+        solve_by_allowed_motions(jacobian, np.arange(2), force, scale)[0]
+        for scale in (np.ones(5), np.array([1, 1e3, 1e-2, 1, 5.0]))
+    ]
+    np.testing.assert_allclose(*answers, rtol=1e-11)
+
+
+@pytest.mark.parametrize(("actuators", "word"), [(1, "fewer"), (3, "more")])
+def test_other_than_mobility_many_actuators_are_refused(actuators: int, word: str) -> None:
+    with pytest.raises(SingularityError, match=rf"{actuators} actuated .* mobility of 2.*{word}"):
+        solve_by_allowed_motions(matrix(3, 3, 5), np.arange(actuators), np.ones(5), np.ones(5))
+
+
+def test_actuators_that_cannot_move_the_mechanism_are_refused() -> None:
+    """One coordinate, held by the closure, is driven; the free one is not."""
+    with pytest.raises(SingularityError):
+        solve_by_allowed_motions(np.array([[1.0, 0.0]]), np.array([0]), np.ones(2), np.ones(2))
+
+
+# The two ways agree -------------------------------------------------------------------------------
+
+
+def three_rps() -> tuple[ClosedLoopModel, list[tuple[Array, Array, Array]]]:
+    rng = np.random.default_rng(3)
+    parameters = strategies.random_parameters(rng, tilted_gravity=True)
+    robot = RPSRobot(parameters)
+    motions = robot.state(*strategies.random_motions(rng, parameters, 50))
+    return robot.mechanism, list(zip(*motions, strict=True))
+
+
+def spatial() -> tuple[ClosedLoopModel, list[tuple[Array, Array, Array]]]:
+    mechanism = mechanisms.spatial_four_bar()
+    states, q = [], mechanisms.guess(mechanism)
+    for _ in range(10):
+        q = mechanism.close(q + 0.03)
+        v = mechanism.velocity(q, [2.0])
+        states.append((q, v, mechanism.acceleration(q, v, [-3.0])))
+    return mechanism, states
+
+
+@pytest.mark.parametrize("make", [three_rps, spatial])
+def test_square_way_equals_the_way_by_allowed_motions(make) -> None:
+    mechanism, states = make()
+    model = mechanism.model
+    data = model.createData()
+    passive = np.setdiff1d(np.arange(model.nv), mechanism.actuated_indices)
+    assert mechanism.constraint_size == passive.size
+    for q, v, a in states:
+        if mechanism.condition(q) > 1e4:
+            continue
+        found = mechanism.inverse_dynamics(q, v, a)
+        tau, multipliers = solve_by_allowed_motions(
+            loop_jacobian(mechanism, q),
+            mechanism.actuated_indices,
+            pin.rnea(model, data, q, v, a),
+            np.ones(model.nv),
+        )
+        size = np.abs(multipliers).max()
+        np.testing.assert_allclose(found.tau, tau, rtol=0, atol=1e-10 * size)
+        np.testing.assert_allclose(found.constraint_forces, multipliers, rtol=0, atol=1e-10 * size)
+
+
+def test_answers_print_their_numbers() -> None:
+    mechanism, states = spatial()
+    found = mechanism.inverse_dynamics(*states[0])
+    assert repr(found).startswith(f"InverseDynamics(tau={found.tau}, constraint_forces=")

@@ -1,0 +1,74 @@
+"""Files appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from rps_pin.files import whole_file
+
+
+def test_finished_file_stands_at_its_path_and_nothing_else_remains(tmp_path: Path) -> None:
+    with whole_file(tmp_path / "a.txt") as scratch:
+        scratch.write_text("text")
+    assert (tmp_path / "a.txt").read_text() == "text"
+    assert os.listdir(tmp_path) == ["a.txt"]  # noqa: PTH208
+
+
+def test_nothing_stands_at_the_path_before_the_end(tmp_path: Path) -> None:
+    with whole_file(tmp_path / "a.txt") as scratch:
+        scratch.write_text("half")
+        assert not (tmp_path / "a.txt").exists()
+
+
+def test_scratch_lies_beside_the_target_with_its_suffix(tmp_path: Path) -> None:
+    """The same folder, so that the move is one step; the same suffix, for who goes by it."""
+    with whole_file(tmp_path / "film.mp4") as scratch:
+        assert scratch.parent == tmp_path
+        assert scratch.suffix == ".mp4"
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_interrupted_file_leaves_what_stood_there(tmp_path: Path, error: type) -> None:
+    (tmp_path / "a.txt").write_text("old")
+    with pytest.raises(error), whole_file(tmp_path / "a.txt") as scratch:
+        scratch.write_text("half")
+        raise error
+    assert (tmp_path / "a.txt").read_text() == "old"
+    assert list(tmp_path.iterdir()) == [tmp_path / "a.txt"]
+
+
+def test_existing_file_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("old, and longer")
+    with whole_file(str(tmp_path / "a.txt")) as scratch:
+        scratch.write_text("new")
+    assert (tmp_path / "a.txt").read_text() == "new"
+
+
+@pytest.mark.parametrize("mask", [0o022, 0o077])
+def test_permissions_are_those_of_an_ordinary_new_file(tmp_path: Path, mask: int) -> None:
+    before = os.umask(mask)
+    try:
+        with whole_file(tmp_path / "a.txt"):
+            pass
+        (tmp_path / "b.txt").touch()
+    finally:
+        os.umask(before)
+    modes = [(tmp_path / name).stat().st_mode for name in ("a.txt", "b.txt")]
+    assert modes[0] == modes[1]
+
+
+def test_umask_stays_as_it_was(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        with whole_file(tmp_path / "a.txt"):
+            pass
+    finally:
+        assert os.umask(before) == 0o027
+
+
+def test_missing_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError), whole_file(tmp_path / "no" / "a.txt"):
+        pass

@@ -1,0 +1,37 @@
+"""Times of a trajectory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rps_pin import InputError
+from rps_pin.trajectories.path import checked_times
+
+
+def test_times_within_the_trajectory_pass_unchanged() -> None:
+    times = np.linspace(0, 2, 7).reshape(7, 1)
+    np.testing.assert_array_equal(checked_times(times, 2.0), times)
+
+
+def test_integers_and_single_numbers_are_times() -> None:
+    assert checked_times(1, 2.0) == 1.0
+    assert checked_times(1, 2.0).dtype == np.float64
+
+
+def test_rounding_beyond_the_ends_is_forgiven() -> None:
+    """Such as np.arange's last time; the answer still lies within."""
+    found = checked_times([-1e-15, 2 + 4e-16], 2.0)
+    np.testing.assert_array_equal(found, [0.0, 2.0])
+
+
+@pytest.mark.parametrize("bad", [-1e-6, 2 + 1e-6, np.nan, np.inf, -np.inf])
+def test_other_times_are_refused_with_the_range(bad: float) -> None:
+    with pytest.raises(InputError, match=f"time {bad:.9g} s is outside .* 0 to 2 s"):
+        checked_times([[1.0, bad]], 2.0)
+
+
+@pytest.mark.parametrize("bad", ["soon", [[1, 2], [3]]])
+def test_things_that_are_no_times_are_refused(bad: object) -> None:
+    with pytest.raises(InputError, match="time"):
+        checked_times(bad, 2.0)
