@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import pickle
+from copy import deepcopy
 
 import numpy as np
 import pinocchio as pin
@@ -645,7 +645,7 @@ def test_description_is_kept() -> None:
 def test_copies_work_on_their_own() -> None:
     mechanism = three_rps()
     q = closed_guess(mechanism)
-    for twin in (pickle.loads(pickle.dumps(mechanism)), copy.deepcopy(mechanism)):
+    for twin in (pickle.loads(pickle.dumps(mechanism)), deepcopy(mechanism)):
         assert twin.actuated == mechanism.actuated
         assert twin.characteristic_length == mechanism.characteristic_length
         v = mechanism.velocity(q, [0.1, 0.2, -0.1])
