@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,14 +17,14 @@ def test_the_python_blocks_run_in_order_and_print_what_is_shown(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(ROOT)
-    names: dict[str, object] = {}
+    names: dict[str, Any] = {}
     exec(BLOCKS[0], names)
     printed = capsys.readouterr().out
     assert "N" in printed
     for line in printed.splitlines():
         assert f"    {line}\n" in README
     exec(BLOCKS[1], names)
-    assert names["result"].residual < 1e-12  # type: ignore[attr-defined]
+    assert names["result"].residual < 1e-12
 
 
 def test_the_first_block_is_ten_lines() -> None:

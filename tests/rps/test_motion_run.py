@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pytest
@@ -145,13 +146,13 @@ def test_samples_are_even_and_end_with_the_motion(duration: float, rate: float) 
 def test_progress_sees_every_sample(robot: RPSRobot) -> None:
     seen: list[int] = []
 
-    def progress(samples: object) -> object:
-        for sample in samples:  # type: ignore[attr-defined]
+    def progress(samples: Iterable[int]) -> Iterator[int]:
+        for sample in samples:
             seen.append(sample)
             yield sample
 
     path = helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4)
-    run = run_motion(robot, path, 10.0, progress=progress)  # type: ignore[arg-type]
+    run = run_motion(robot, path, 10.0, progress=progress)
     assert seen == list(range(len(run.time)))
 
 
