@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rps_pin import RPSParameters
 
@@ -75,6 +76,23 @@ def random_motions(
     return pose, rng.normal(scale=3.0, size=(count, 3)), rng.normal(scale=20.0, size=(count, 3))
 
 
+def random_poses(count: int, seed: int = 0, largest_tilt: float = 3.1) -> Array:
+    """Poses with tilts of every size, tiny ones among them."""
+    rng = np.random.default_rng(seed)
+    size = largest_tilt * rng.uniform(size=count) ** rng.choice([1, 1, 8, 40], size=count)
+    way = rng.uniform(-np.pi, np.pi, size=count)
+    height = rng.uniform(0.2, 2, count)
+    poses: Array = np.stack([height, size * np.cos(way), size * np.sin(way)], axis=-1)
+    return poses
+
+
+def matrices(pose: Array) -> Array:
+    """Rotations by SciPy."""
+    turn = Rotation.from_rotvec(np.append(pose[..., 1:], 0 * pose[..., :1], axis=-1))
+    found: Array = turn.as_matrix()
+    return found
+
+
 # With Hypothesis ----------------------------------------------------------------------------------
 
 
@@ -130,6 +148,7 @@ def parameters(draw: st.DrawFn) -> RPSParameters:
         "leg_length_limits": limits(0.0, 0.3, 5.0),
         "leg_angle_limits": limits(-math.pi, 0.0, math.pi),
         "spherical_cone_limit": floats(1e-3, math.pi),
+        "spherical_rest_angle": floats(-math.pi, math.pi),
         "actuator_force_limit": floats(1e-3, 1e5),
         "actuator_speed_limit": floats(1e-3, 1e3),
         "gravity": vectors(20.0),

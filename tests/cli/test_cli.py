@@ -185,3 +185,20 @@ def test_view_serves_this_machine_until_ctrl_c(arguments: list[str]) -> None:
     assert process.returncode == 0
     assert "ended" in output
     assert errors == ""
+
+
+def test_ik_prints_lengths_and_refuses_what_is_out_of_reach() -> None:
+    pose = ("--pose", "0.22", "0.1", "-0.05")
+    answer = json.loads(rps_pin("ik", "--robot", "micro", *pose, "--json").stdout)
+    expected = RPSRobot.from_preset("micro").inverse_kinematics([0.22, 0.1, -0.05])
+    assert_allclose(answer["length"], expected.length, rtol=1e-15)
+    assert answer["reachable"] is True
+    assert "spherical joint" in rps_pin("ik", "--robot", "micro", *pose).stdout
+
+    far = rps_pin("ik", "--robot", "micro", "--pose", "0.3", "0", "0")
+    assert far.returncode == 1
+    assert "leg 1: length would be 0.3 m; its limits are 0.2 to 0.25 m" in far.stderr
+    out = rps_pin("ik", "--robot", "micro", "--pose", "0.3", "0", "0", "--json")
+    assert out.returncode == 1
+    violations = json.loads(out.stdout)["violations"]
+    assert [one["leg"] for one in violations] == [1, 2, 3]

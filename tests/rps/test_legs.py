@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rps_pin import RPSParameters, UnreachableError
 from rps_pin.rps import legs
@@ -98,6 +99,66 @@ def test_cone_angle_turns_with_the_platform() -> None:
     pose = np.stack([0 * way, 0.7 * np.cos(way), 0.7 * np.sin(way)], axis=-1)
     found = legs.cone_angles(np.full((20, 3), np.pi / 2), rotation(pose))
     np.testing.assert_allclose(found, 0.7, rtol=1e-14)
+
+
+@pytest.mark.parametrize("phi", [-1.5, 0.0, 0.5, np.pi / 2, 2.0])
+def test_leg_is_at_rest_where_its_joint_is_made_for_it(phi: float) -> None:
+    """Level platform, legs at phi: the rest angle pi/2 - phi leaves no angle; it leans as they do.
+
+    A leg with phi < pi/2 leans inwards, and its rest angle is positive.
+    """
+    rest = np.pi / 2 - phi
+    np.testing.assert_allclose(legs.cone_angles(np.full(3, phi), np.eye(3), rest), 0, atol=5e-16)
+    outwards = np.sum(legs.rest_axes(rest) * legs.RADIAL, axis=-1)
+    np.testing.assert_array_equal(np.sign(np.round(outwards, 12)), -np.sign(round(rest, 12)))
+
+
+def test_rest_axes_stand_at_the_rest_angle_in_the_plane_of_normal_and_leg() -> None:
+    for rest in (-1.2, -0.1, 0.0, 0.3, 1.5):
+        axes = legs.rest_axes(rest)
+        np.testing.assert_allclose(np.linalg.norm(axes, axis=-1), 1, rtol=1e-15)
+        np.testing.assert_allclose(axes[:, 2], np.cos(rest), rtol=1e-15)
+        across = np.cross(legs.RADIAL, [0, 0, 1])
+        np.testing.assert_allclose(np.sum(axes * across, axis=-1), 0, rtol=0, atol=1e-16)
+
+
+def test_cone_angle_is_the_angle_between_two_directions_of_the_platform() -> None:
+    """In platform axes, by SciPy: leg from revolute joint to tip against the turned normal."""
+    rng = np.random.default_rng(2)
+    pose = np.stack([rng.uniform(0.3, 0.9, 50), *rng.uniform(-1, 1, (2, 50))], axis=-1)
+    tips = legs.tips(position(pose, 0.23), rotation(pose), 0.23)
+    _, angle = legs.leg_angles_and_lengths(tips, 0.46)
+    rest = 0.4
+    found = legs.cone_angles(angle, rotation(pose), rest)
+    turn = Rotation.from_rotvec(np.concatenate([pose[:, 1:], np.zeros((50, 1))], axis=-1))
+    for leg, direction in enumerate(LEG_ANGLES):
+        revolute = 0.46 * np.array([np.cos(direction), np.sin(direction), 0.0])
+        seen = turn.inv().apply(tips[:, leg] - revolute)
+        # The normal leans inwards: it turns about the horizontal -(z x e) of its leg.
+        axis = -np.array([-np.sin(direction), np.cos(direction), 0.0])
+        rest_axis = Rotation.from_rotvec(rest * axis).apply([0, 0, 1])
+        expected = np.arccos(seen @ rest_axis / np.linalg.norm(seen, axis=-1))
+        np.testing.assert_allclose(found[:, leg], expected, rtol=0, atol=1e-13)
+
+
+def test_spherical_joint_s_limit_is_about_its_rest_axis() -> None:
+    """Legs at 60 degrees, level: 30 degrees from the normal, none from a joint made for them."""
+    plain = BOUNDED.replace(spherical_cone_limit=0.5)
+    made_for_it = plain.replace(spherical_rest_angle=np.pi / 6)
+    angle = np.full(3, np.pi / 3)
+    rest = np.full(3, 0.3), angle
+    for robot, fits, value in ((plain, False, np.pi / 6), (made_for_it, True, 0.0)):
+        cone = legs.cone_angles(angle, np.eye(3), robot.spherical_rest_angle)
+        np.testing.assert_allclose(cone, value, rtol=0, atol=1e-15)
+        assert legs.within_limits(robot, *rest, cone) == fits
+        broken = legs.violations(robot, *rest, cone)
+        expected = [] if fits else [(leg, "spherical joint", 0.0, 0.5) for leg in (1, 2, 3)]
+        assert [(v.leg, v.quantity, v.lower, v.upper) for v in broken] == expected
+    # The other way round: the limit holds about the normal and not about the rest axis.
+    cone = legs.cone_angles(np.full(3, np.pi / 2), np.eye(3), 0.6)
+    assert legs.violations(BOUNDED.replace(spherical_cone_limit=0.5), *rest, cone)[0].value == (
+        pytest.approx(0.6, abs=1e-15)
+    )
 
 
 BOUNDED = RPSParameters.from_preset("sokolov").replace(

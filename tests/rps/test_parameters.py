@@ -34,6 +34,7 @@ LEGAL = {
     "leg_length_limits": (0.2, 0.5),
     "leg_angle_limits": (0.1, 2.0),
     "spherical_cone_limit": 1.0,
+    "spherical_rest_angle": 0.3,
     "actuator_force_limit": 50.0,
     "actuator_speed_limit": 0.5,
     "gravity": [0.0, 0.0, -1.62],
@@ -297,6 +298,17 @@ def test_lengths_are_not_negative() -> None:
 @pytest.mark.parametrize("bad", [(-3.2, 0.0), (0.0, 3.2), (0.0, math.inf)])
 def test_angles_are_within_a_turn(bad: tuple[float, float]) -> None:
     refused("leg_angle_limits", bad, "between -pi and pi")
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_rest_axis_is_within_half_a_turn_of_the_normal(sign: int) -> None:
+    assert legal(spherical_rest_angle=sign * math.pi).spherical_rest_angle == sign * math.pi
+    refused("spherical_rest_angle", sign * np.nextafter(math.pi, 4), "or equal to -?3.14")
+
+
+def test_rest_axis_is_the_platform_s_normal_unless_told() -> None:
+    for name in RPSParameters.presets():
+        assert RPSParameters.from_preset(name).spherical_rest_angle == 0
 
 
 @pytest.mark.parametrize("bad", ["", "3rps", "a b", "a/b", "a\n", "<robot>", 7, None, "ä"])

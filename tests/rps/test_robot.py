@@ -485,3 +485,15 @@ def test_condition_grows_as_the_robot_flattens() -> None:
     assert (np.diff(conditions) > 0).all()
     # ... like 1 / height, by which the vertical parts of the legs shrink.
     assert conditions[-1] * heights[-1] == pytest.approx(conditions[-4] * heights[-4], rel=1e-3)
+
+
+def test_the_cone_is_measured_from_the_joint_s_own_rest_axis() -> None:
+    """A leg that leans by 30 degrees needs a socket that leans too, if its cone is narrow."""
+    parameters = RPSParameters.from_preset("sokolov").replace(spherical_cone_limit=0.4)
+    pose = [np.sqrt(3) * (parameters.base_radius - parameters.platform_radius), 0.0, 0.0]
+    with pytest.raises(UnreachableError) as caught:
+        RPSRobot(parameters).inverse_kinematics(pose)
+    assert [v.quantity for v in caught.value.violations] == ["spherical joint"] * 3
+    np.testing.assert_allclose([v.value for v in caught.value.violations], np.pi / 6)
+    leaning = RPSRobot(parameters.replace(spherical_rest_angle=np.pi / 6))
+    assert leaning.inverse_kinematics(pose).reachable

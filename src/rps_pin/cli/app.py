@@ -11,6 +11,7 @@ import typer
 from rps_pin import __version__
 from rps_pin.cli.console import complain
 from rps_pin.cli.helix import helix_command
+from rps_pin.cli.ik import ik_command
 from rps_pin.cli.urdf import urdf_command
 from rps_pin.cli.view import view_command
 from rps_pin.errors import RPSPinError
@@ -24,6 +25,7 @@ app = typer.Typer(
 )
 app.command("helix")(helix_command)
 app.command("view")(view_command)
+app.command("ik")(ik_command)
 app.command("urdf")(urdf_command)
 
 

@@ -27,6 +27,7 @@ _ROUNDING = 1e-12
 #: e_i, shape (3 legs, 3): the radial directions in the base plane, and in the platform.
 RADIAL = np.array([[math.cos(angle), math.sin(angle), 0.0] for angle in LEG_DIRECTIONS])
 RADIAL.setflags(write=False)
+_UP = np.array([0.0, 0.0, 1.0])
 
 
 class Legs(NamedTuple):
@@ -123,13 +124,37 @@ def leg_motion(motion: PlatformMotion, platform_radius: float, base_radius: floa
     )
 
 
-def cone_angles(angle: Array, rotation: Array) -> Array:
-    """Return the angle between each leg and the platform's normal, shape (..., 3), rad."""
-    upwards = np.array([0.0, 0.0, 1.0])
-    leg = -np.cos(angle)[..., None] * RADIAL + np.sin(angle)[..., None] * upwards
-    normal = rotation[..., :, 2]
-    along = np.einsum("...ij,...j->...i", leg, normal)
-    across = np.linalg.norm(np.cross(leg, normal[..., None, :]), axis=-1)
+def rest_axes(rest_angle: float) -> Array:
+    """Return the rest axes of the spherical joints in platform axes, shape (3 legs, 3).
+
+    A leg that stands at phi under the level platform runs along -cos(phi) e_i + sin(phi) z (Eq. 7).
+    With the rest angle r = pi/2 - phi, that is cos(r) z - sin(r) e_i: the joint's middle setting.
+
+    Parameters
+    ----------
+    rest_angle
+        r, rad: 0 for the platform's normal, positive for legs that lean inwards (phi < pi/2).
+    """
+    axes: Array = math.cos(rest_angle) * _UP - math.sin(rest_angle) * RADIAL
+    return axes
+
+
+def cone_angles(angle: Array, rotation: Array, rest_angle: float = 0.0) -> Array:
+    """Return the angle between each leg and its spherical joint's rest axis, shape (..., 3), rad.
+
+    Parameters
+    ----------
+    angle
+        The paper's phi, shape (..., 3), rad.
+    rotation
+        From platform to base axes, shape (..., 3, 3).
+    rest_angle
+        ``RPSParameters.spherical_rest_angle``, rad; at 0 the rest axis is the platform's normal.
+    """
+    leg = -np.cos(angle)[..., None] * RADIAL + np.sin(angle)[..., None] * _UP
+    rest = _turned(rotation, rest_axes(rest_angle))
+    along = np.einsum("...ij,...ij->...i", leg, rest)
+    across = np.linalg.norm(np.cross(leg, rest), axis=-1)
     angles: Array = np.arctan2(across, along)
     return angles
 

@@ -74,6 +74,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Bound = Annotated[float, Field(gt=0)]  # infinity means: no bound
+Angle = Annotated[float, Field(ge=-math.pi, le=math.pi, allow_inf_nan=False)]
 
 
 class RPSParameters(BaseModel):
@@ -82,6 +83,13 @@ class RPSParameters(BaseModel):
     Immutable; compare with ``==``, derive a changed copy with :meth:`replace`. Each symbol of the
     paper has its field, and so has what the paper leaves out (the moving rods, the limits, the
     direction of gravity). Fields that the paper leaves out default to "none".
+
+    The middle of a spherical joint's cone is its *rest axis*, fixed in the platform: in the plane
+    of the platform's normal n and the joint's radial direction e_i, it is
+    cos(r) n - sin(r) e_i with r = ``spherical_rest_angle``. At r = 0 it is the normal. A positive r
+    suits legs that lean inwards (phi < pi/2): a leg that stands at phi_0 under the level platform
+    is at rest in its joint for r = pi/2 - phi_0 (less a full turn if that exceeds pi). Legs that
+    lean outwards have a negative r.
 
     Raises
     ------
@@ -136,7 +144,12 @@ class RPSParameters(BaseModel):
         (-math.pi, math.pi), description="least and greatest leg angle (the paper's phi), rad"
     )
     spherical_cone_limit: Bound = Field(
-        math.pi, description="greatest angle between a leg and the platform's normal, rad"
+        math.pi, description="greatest angle between a leg and its ball's rest axis, rad"
+    )
+    spherical_rest_angle: Angle = Field(
+        0.0,
+        description="angle of a ball's rest axis from the platform's normal, rad; "
+        "pi/2 - phi for a leg at rest at phi under the level platform",
     )
     actuator_force_limit: Bound = Field(
         math.inf, description="greatest force of an actuator, push or pull, N"

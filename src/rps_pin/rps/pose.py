@@ -108,26 +108,6 @@ def checked_motion(
     return x, rate_, acceleration_
 
 
-def pose_from_angles(z: ArrayLike, alpha: ArrayLike, beta: ArrayLike) -> Array:
-    """Return the pose (..., 3) of the paper's height (m), alpha and beta (rad; Z-Y-Z, Eq. 5).
-
-    Raises
-    ------
-    InputError
-        If they are not finite numbers of shapes that go together.
-    """
-    try:
-        z_, alpha_, beta_ = np.broadcast_arrays(
-            *(np.asarray(x, dtype=np.float64) for x in (z, alpha, beta))
-        )
-    except (TypeError, ValueError):
-        raise InputError("z, alpha and beta must be numbers of shapes that go together") from None
-    finite = np.isfinite(z_) & np.isfinite(alpha_) & np.isfinite(beta_)
-    if not finite.all():
-        raise InputError("z, alpha and beta must be finite")
-    return np.stack([z_, -beta_ * np.sin(alpha_), beta_ * np.cos(alpha_)], axis=-1)
-
-
 def rotation(pose: Array) -> Array:
     """Return the rotation from platform to base axes, shape (..., 3, 3), of poses (..., 3)."""
     wx, wy = pose[..., 1], pose[..., 2]

@@ -238,7 +238,7 @@ class RPSRobot:
         self, pose: Array, length: Array, angle: Array, turn: Array, *, refuse: bool
     ) -> NDArray[np.bool_]:
         """Return whether each pose keeps its limits, or refuse the first that does not."""
-        cone = leg_kinematics.cone_angles(angle, turn)
+        cone = leg_kinematics.cone_angles(angle, turn, self.parameters.spherical_rest_angle)
         reachable = leg_kinematics.within_limits(self.parameters, length, angle, cone)
         if refuse and not reachable.all():
             first = tuple(int(i) for i in np.argwhere(~reachable)[0])
