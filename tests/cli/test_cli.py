@@ -202,3 +202,46 @@ def test_ik_prints_lengths_and_refuses_what_is_out_of_reach() -> None:
     assert out.returncode == 1
     violations = json.loads(out.stdout)["violations"]
     assert [one["leg"] for one in violations] == [1, 2, 3]
+
+
+def test_fk_lists_the_eight_solutions_of_equal_legs() -> None:
+    lengths = ("--lengths", "0.46", "0.46", "0.46")
+    assert "8 real solutions" in rps_pin("fk", *lengths).stdout
+    modes = json.loads(rps_pin("fk", *lengths, "--json").stdout)["modes"]
+    assert [mode["above"] for mode in modes] == [True] * 4 + [False] * 4
+    robot = RPSRobot.from_preset("sokolov")
+    for k, mode in enumerate(modes):
+        assert_allclose(robot.inverse_kinematics(mode["pose"]).length, 0.46, rtol=1e-12)
+        partner = modes[mode["mirror"]]
+        assert partner["mirror"] == k
+        assert_allclose(partner["position"], np.multiply(mode["position"], [1, 1, -1]), atol=1e-12)
+
+
+def test_fk_near_a_pose_follows_it_and_refuses_what_it_cannot() -> None:
+    near = ("--near", "0.4", "0", "0", "--json")
+    answer = json.loads(rps_pin("fk", "--lengths", "0.45", "0.47", "0.46", *near).stdout)
+    robot = RPSRobot.from_preset("sokolov")
+    assert_allclose(robot.inverse_kinematics(answer["pose"]).length, [0.45, 0.47, 0.46], rtol=1e-12)
+    far = rps_pin("fk", "--lengths", "0.05", "0.07", "0.96", *near)
+    assert far.returncode == 1
+    (line,) = far.stderr.strip().splitlines()
+    assert line.startswith("error: ")
+    assert rps_pin("fk", "--lengths", "0.05", "0.07", "0.96").returncode == 1
+
+
+@pytest.mark.parametrize(("branch", "crossings"), [("+", 2), ("-", 0)])
+def test_check_finds_the_crossings_of_the_large_helix(branch: str, crossings: int) -> None:
+    size = ("--radius", "0.075", "--pitch", "0.05")
+    run = rps_pin("check", *size, "--branch", branch, "--json")
+    assert run.returncode == (1 if crossings else 0)
+    found = json.loads(run.stdout)
+    assert found["ok"] is (crossings == 0)
+    assert [event["kind"] for event in found["singularities"]] == ["crosses"] * crossings
+    assert all(event["width"] <= 1e-9 for event in found["singularities"])
+
+
+def test_check_says_when_a_limit_is_left() -> None:
+    run = rps_pin("check", "--robot", "micro", "--height", "0.218")
+    assert run.returncode == 1
+    assert "leaves its lower limit of length, 0.2 m" in run.stdout
+    assert rps_pin("check", "--robot", "micro", "--height", "0.225").returncode == 0

@@ -9,7 +9,9 @@ from typing import Annotated
 import typer
 
 from rps_pin import __version__
+from rps_pin.cli.check import check_command
 from rps_pin.cli.console import complain
+from rps_pin.cli.fk import fk_command
 from rps_pin.cli.helix import helix_command
 from rps_pin.cli.ik import ik_command
 from rps_pin.cli.urdf import urdf_command
@@ -26,6 +28,8 @@ app = typer.Typer(
 app.command("helix")(helix_command)
 app.command("view")(view_command)
 app.command("ik")(ik_command)
+app.command("fk")(fk_command)
+app.command("check")(check_command)
 app.command("urdf")(urdf_command)
 
 

@@ -1,5 +1,6 @@
 """The 3-RPS parallel robot: parameters, URDF, closed-form kinematics, a motion's dynamics."""
 
+from rps_pin.rps.assembly import AssemblyModes
 from rps_pin.rps.conversions import (
     angles_from_pose,
     parasitic_motion,
@@ -7,27 +8,53 @@ from rps_pin.rps.conversions import (
     pose_from_position,
     position_from_pose,
 )
+from rps_pin.rps.forward import EncoderTracker, ForwardKinematics
 from rps_pin.rps.legs import LegMotion, Legs
 from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.path_check import check_path
+from rps_pin.rps.path_events import LimitEvent, PathCheck, SingularityEvent
 from rps_pin.rps.placement import constraint_residuals, pose_from_placement
 from rps_pin.rps.pose import PlatformMotion
+from rps_pin.rps.rates import (
+    leg_jacobian_rates,
+    leg_jacobians,
+    platform_twist,
+    pose_acceleration,
+    pose_rate,
+)
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.singularity import SingularityMeasures, singular_surface, singularity_measures
 from rps_pin.rps.three_quantities import poses_from
 from rps_pin.rps.urdf import build_urdf
 
 __all__ = [
+    "AssemblyModes",
+    "EncoderTracker",
+    "ForwardKinematics",
     "LegMotion",
     "Legs",
+    "LimitEvent",
+    "PathCheck",
     "PlatformMotion",
     "RPSParameters",
     "RPSRobot",
+    "SingularityEvent",
+    "SingularityMeasures",
     "angles_from_pose",
     "build_urdf",
+    "check_path",
     "constraint_residuals",
+    "leg_jacobian_rates",
+    "leg_jacobians",
     "parasitic_motion",
+    "platform_twist",
+    "pose_acceleration",
     "pose_from_angles",
     "pose_from_placement",
     "pose_from_position",
+    "pose_rate",
     "poses_from",
     "position_from_pose",
+    "singular_surface",
+    "singularity_measures",
 ]

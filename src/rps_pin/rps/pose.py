@@ -111,7 +111,7 @@ def checked_motion(
 def rotation(pose: Array) -> Array:
     """Return the rotation from platform to base axes, shape (..., 3, 3), of poses (..., 3)."""
     wx, wy = pose[..., 1], pose[..., 2]
-    a, b, _ = _coefficients(wx**2 + wy**2)
+    a, b, _ = exp_coefficients(wx**2 + wy**2)
     c = 1 - (wx**2 + wy**2) * b
     rows = [
         [c + b * wx**2, b * wx * wy, a * wy],
@@ -125,7 +125,7 @@ def quaternion(pose: Array) -> Array:
     """Return the unit quaternion (x, y, z, w) of the rotation, shape (..., 4)."""
     wx, wy = pose[..., 1], pose[..., 2]
     half_squared = (wx**2 + wy**2) / 4
-    a, _, _ = _coefficients(half_squared)  # sin(beta/2) / (beta/2)
+    a, _, _ = exp_coefficients(half_squared)  # sin(beta/2) / (beta/2)
     return np.stack(
         [wx * a / 2, wy * a / 2, np.zeros_like(wx), np.cos(np.sqrt(half_squared))], axis=-1
     )
@@ -134,7 +134,7 @@ def quaternion(pose: Array) -> Array:
 def position(pose: Array, platform_radius: float) -> Array:
     """Return the platform's centre in base axes, shape (..., 3), m: Eq. 4."""
     z, wx, wy = pose[..., 0], pose[..., 1], pose[..., 2]
-    _, b, _ = _coefficients(wx**2 + wy**2)
+    _, b, _ = exp_coefficients(wx**2 + wy**2)
     h = platform_radius
     return np.stack([h / 2 * b * (wx**2 - wy**2), -h * b * wx * wy, z], axis=-1)
 
@@ -158,8 +158,8 @@ def platform_motion(
     ds = 2 * (wx * dwx + wy * dwy)
     dds = 2 * (dwx**2 + dwy**2 + wx * ddwx + wy * ddwy)
 
-    _, b, d = _coefficients(s)
-    b_s, b_ss, d_s = _slopes(s)
+    _, b, d = exp_coefficients(s)
+    b_s, b_ss, d_s = exp_slopes(s)
     db, ddb, dd = b_s * ds, b_ss * ds**2 + b_s * dds, d_s * ds
 
     # Centre: p_x = h/2 B f, p_y = -h B k, with f = w_x^2 - w_y^2 and k = w_x w_y.
@@ -196,7 +196,7 @@ def platform_motion(
     )
 
 
-def _coefficients(s: Array) -> tuple[Array, Array, Array]:
+def exp_coefficients(s: Array) -> tuple[Array, Array, Array]:
     """Return A, B and D of the squared tilt s: the coefficients of the exponential map."""
     far = np.maximum(s, _SERIES_BELOW)
     beta = np.sqrt(far)
@@ -211,10 +211,10 @@ def _coefficients(s: Array) -> tuple[Array, Array, Array]:
     )
 
 
-def _slopes(s: Array) -> tuple[Array, Array, Array]:
+def exp_slopes(s: Array) -> tuple[Array, Array, Array]:
     """Return dB/ds, d2B/ds2 and dD/ds of the squared tilt s."""
     far = np.maximum(s, _SERIES_BELOW)
-    a, b, d = _coefficients(far)
+    a, b, d = exp_coefficients(far)
     a_s = (np.cos(np.sqrt(far)) - a) / (2 * far)
     b_s = (a / 2 - b) / far
     b_ss = (a_s / 2 - 2 * b_s) / far

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from rps_pin.closed_loop import ClosedLoopModel, InverseDynamics, LoopClosure
 from rps_pin.errors import InputError, UnreachableError
 from rps_pin.rps import legs as leg_kinematics
+from rps_pin.rps.assembly import AssemblyModes, assembly_modes
+from rps_pin.rps.forward import forward_kinematics
 from rps_pin.rps.legs import LegMotion, Legs
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.pose import (
@@ -131,6 +133,57 @@ class RPSRobot:
         length, angle = leg_kinematics.leg_angles_and_lengths(tip, p.base_radius)
         reachable = self._reachable(x, length, angle, turn, refuse=errors == "raise")
         return Legs(length, angle, reachable)
+
+    def assembly_modes(self, length: ArrayLike) -> AssemblyModes:
+        """Return every real pose of given leg lengths: all solutions of Eq. 8.
+
+        Parameters
+        ----------
+        length
+            Leg lengths d, shape (..., 3), m.
+
+        Returns
+        -------
+        AssemblyModes
+            `angle` (k, 3), `position` (k, 3), `rotation` (k, 3, 3) and more; a batch is padded to
+            k = 16 (see `AssemblyModes.exists`). No limit of the robot is applied.
+
+        Raises
+        ------
+        InputError
+            If the lengths have the wrong shape, or are not finite and positive.
+        """
+        p = self.parameters
+        return assembly_modes(length, p.base_radius, p.platform_radius)
+
+    def forward_kinematics(self, length: ArrayLike, near: ArrayLike) -> Array:
+        """Return the pose of given leg lengths that continues a known one.
+
+        Parameters
+        ----------
+        length
+            Leg lengths d, shape (..., 3), m.
+        near
+            Known poses, of a shape that broadcasts with that of `length`. The lengths are followed
+            from theirs to those wanted, on the straight way.
+
+        Returns
+        -------
+        array
+            Poses, shape (..., 3). `rps_pin.rps.forward` has the form that masks what cannot be
+            followed, and a tracker for encoders in a loop.
+
+        Raises
+        ------
+        InputError
+            If an argument is not finite, a length not positive, or shapes do not go together.
+        SingularityError
+            If a way meets a singularity; says how far along.
+        ClosureError
+            If no pose has the lengths; says by how much they miss.
+        """
+        p = self.parameters
+        return forward_kinematics(length, near, p.base_radius, p.platform_radius).pose
 
     def motion(
         self, pose: ArrayLike, rate: ArrayLike, acceleration: ArrayLike
