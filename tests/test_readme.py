@@ -23,7 +23,9 @@ def test_the_python_blocks_run_in_order_and_print_what_is_shown(
     assert "N" in printed
     for line in printed.splitlines():
         assert f"    {line}\n" in README
-    exec(BLOCKS[1], names)
+    for block in BLOCKS[1:]:
+        exec(block, names)
+    assert len(names["modes"].pose) >= 2
     assert names["result"].residual < 1e-12
 
 

@@ -245,3 +245,25 @@ def test_check_says_when_a_limit_is_left() -> None:
     assert run.returncode == 1
     assert "leaves its lower limit of length, 0.2 m" in run.stdout
     assert rps_pin("check", "--robot", "micro", "--height", "0.225").returncode == 0
+
+
+def test_workspace_writes_figures_data_and_what_the_paper_states(tmp_path: Path) -> None:
+    run = rps_pin("workspace", "--points", "11", "--json", "-o", str(tmp_path / "out"))
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)
+    assert summary["points"] == summary["inside"] == 11**3
+    assert max(map(abs, summary["x"] + summary["y"])) <= 2.5e-3
+    (given, *others) = summary["paper"]
+    assert given["base_radius"] == 0.120
+    assert given["holds"]
+    assert not any(row["holds"] for row in others)
+    assert summary["volume"] < 1e-3 * summary["cylinder_volume"]
+    names = {Path(file).name for file in summary["files"]}
+    assert {"workspace.h5", "boundary.stl", "figure_2_assembly_modes.png"} <= names
+    assert all(Path(file).stat().st_size > 1000 for file in summary["files"])
+
+    before = (tmp_path / "out" / "workspace.h5").read_bytes()
+    again = rps_pin("workspace", "--points", "5", "-o", str(tmp_path / "out"))
+    assert again.returncode == 1
+    assert "--overwrite" in again.stderr
+    assert (tmp_path / "out" / "workspace.h5").read_bytes() == before

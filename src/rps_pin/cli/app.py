@@ -16,6 +16,7 @@ from rps_pin.cli.helix import helix_command
 from rps_pin.cli.ik import ik_command
 from rps_pin.cli.urdf import urdf_command
 from rps_pin.cli.view import view_command
+from rps_pin.cli.workspace import workspace_command
 from rps_pin.errors import RPSPinError
 
 app = typer.Typer(
@@ -30,6 +31,7 @@ app.command("view")(view_command)
 app.command("ik")(ik_command)
 app.command("fk")(fk_command)
 app.command("check")(check_command)
+app.command("workspace")(workspace_command)
 app.command("urdf")(urdf_command)
 
 

@@ -1,0 +1,47 @@
+"""The workspace of the 3-RPS: Section 3 of the paper, by leg lengths and by poses.
+
+`workspace` computes it on a `leg_grid` or a `pose_grid`; the result says of each point whether it
+is inside, or why not (`Reason`), and carries fields over the grid. `workspace_to_file` does the
+same for grids too large for memory.
+"""
+
+from rps_pin.rps.workspace.compute import workspace
+from rps_pin.rps.workspace.evaluate import Fields
+from rps_pin.rps.workspace.geometry import (
+    Volume,
+    boundary,
+    save_mesh,
+    theoretical_cylinder,
+    volume,
+)
+from rps_pin.rps.workspace.grids import Grid, leg_grid, pose_grid
+from rps_pin.rps.workspace.inscribed import TiltRange, free_tilt, largest_tilt_range
+from rps_pin.rps.workspace.paper import PaperComparison, paper_comparison
+from rps_pin.rps.workspace.reasons import Reason
+from rps_pin.rps.workspace.result import Workspace
+from rps_pin.rps.workspace.scale import WorkspaceCounts, workspace_to_file
+from rps_pin.rps.workspace.storage import load_workspace, save_workspace
+
+__all__ = [
+    "Fields",
+    "Grid",
+    "PaperComparison",
+    "Reason",
+    "TiltRange",
+    "Volume",
+    "Workspace",
+    "WorkspaceCounts",
+    "boundary",
+    "free_tilt",
+    "largest_tilt_range",
+    "leg_grid",
+    "load_workspace",
+    "paper_comparison",
+    "pose_grid",
+    "save_mesh",
+    "save_workspace",
+    "theoretical_cylinder",
+    "volume",
+    "workspace",
+    "workspace_to_file",
+]

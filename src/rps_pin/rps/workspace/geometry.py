@@ -1,0 +1,214 @@
+"""Sizes and surfaces of a workspace: volumes, its boundary as a mesh, the theoretical cylinder.
+
+The platform's centre is p_x = h/2 b (w_x^2 - w_y^2), p_y = -h b w_x w_y: opposite tilts w and -w
+put it at the same place. A set of centre positions is therefore covered up to twice, and the
+boundary of a workspace, drawn in positions, passes through itself. In poses it does not.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from rps_pin.errors import InputError
+from rps_pin.files import whole_file
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.pose import Array
+from rps_pin.rps.workspace.assembly_mode import Mask
+from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
+from rps_pin.rps.workspace.result import Workspace
+
+Space = Literal["position", "pose"]
+MESH_FORMATS = (".stl", ".ply", ".obj")
+
+
+class Volume(NamedTuple):
+    """How large a workspace is."""
+
+    pose: float
+    """Of the poses (z, tilt_x, tilt_y), m rad^2."""
+    position: float
+    """Of the centre's positions (x, y, z), each counted once, m^3."""
+    position_twice: float
+    """The same with a position counted twice where two tilts reach it, m^3: the volume that the
+    `boundary` encloses."""
+
+
+def volume(workspace: Workspace) -> Volume:
+    """Return the volumes of a workspace, by the trapezoidal rule over its inside points.
+
+    On leg lengths a volume element is dz dw_x dw_y = dd_1 dd_2 dd_3 / (h^2 |det K|). In positions
+    it is |d(x, y)/d(w_x, w_y)| = h^2/2 (1 - cos(beta)) sin(beta)/beta times that of poses, and half
+    of it where the opposite tilt is in the workspace as well.
+
+    Raises
+    ------
+    InputError
+        If the grid is a slice: one of its axes has a single value.
+    """
+    _refuse_slices(workspace)
+    inside = workspace.inside
+    weight = np.ones(())
+    for axis in workspace.grid.axes:
+        weight = weight[..., None] * _trapezoid_weights(axis)
+    element = weight[inside]
+    h = workspace.parameters.platform_radius
+    if workspace.grid.kind == "leg lengths":
+        element = element / (h**2 * np.abs(workspace.determinant[inside]))
+    pose = workspace.pose[inside]
+    beta = np.hypot(pose[:, 1], pose[:, 2])
+    # 1 - cos(beta) = 2 sin^2(beta/2), |sin|: the centre turns back beyond a half turn
+    spread = h**2 * np.sin(beta / 2) ** 2 * np.abs(np.sinc(beta / np.pi))
+    share = np.where(_opposite_inside(workspace, pose), 0.5, 1.0)
+    return Volume(
+        float(element.sum()),
+        float((element * spread * share).sum()),
+        float((element * spread).sum()),
+    )
+
+
+def boundary(workspace: Workspace, space: Space = "position") -> trimesh.Trimesh:
+    """Return the boundary of a workspace as a closed triangle mesh, normals outwards.
+
+    A cell of the grid belongs to the workspace if its eight corners are inside; the mesh is made
+    of the cells' outer faces, two triangles each, mapped through the kinematics. Where the grid's
+    own ends are the limits (leg lengths over the stroke) the vertices lie on the exact boundary;
+    elsewhere they are within a grid step inside of it.
+
+    Parameters
+    ----------
+    workspace
+        On leg lengths or poses.
+    space
+        ``"position"``: vertices are the platform's centre (x, y, z), m, and the surface passes
+        through itself where two tilts reach one position. ``"pose"``: vertices are
+        (z, tilt_x, tilt_y), m and rad.
+
+    Raises
+    ------
+    InputError
+        If the grid is a slice, no cell is inside, or there is no such space.
+    """
+    if space not in ("position", "pose"):
+        raise InputError(f"space = {space!r}; it must be 'position' or 'pose'")
+    _refuse_slices(workspace)
+    quads = _outer_faces(workspace.inside)
+    if not len(quads):
+        raise InputError("no cell of the grid is inside the workspace: it has no boundary")
+    points = (workspace.position if space == "position" else workspace.pose).reshape(-1, 3)
+    used, corners = np.unique(quads, return_inverse=True)
+    corners = corners.reshape(-1, 4)
+    faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+    mesh = trimesh.Trimesh(points[used], faces, process=False)
+    if mesh.volume < 0:  # the map from the grid turns the orientation round
+        mesh.faces = mesh.faces[:, ::-1]
+    return mesh
+
+
+def theoretical_cylinder(
+    parameters: RPSParameters, lower: float, upper: float, sections: int = 96
+) -> trimesh.Trimesh:
+    """Return the cylinder of radius h that holds every position of the centre, as a mesh in m.
+
+    |(p_x, p_y)| = h/2 (1 - cos(beta)) <= h, whatever the legs' lengths (Section 3).
+
+    Parameters
+    ----------
+    parameters
+        The robot.
+    lower, upper
+        Heights of the ends, m.
+    sections
+        Sides of the prism that stands for it.
+
+    Raises
+    ------
+    InputError
+        If the heights are not finite and in order, or there are fewer than 3 sections.
+    """
+    if not (math.isfinite(lower) and math.isfinite(upper) and lower < upper):
+        raise InputError(f"heights {lower} to {upper} m must be finite and in order")
+    if sections < 3:
+        raise InputError(f"sections = {sections}; it must be at least 3")
+    cylinder: trimesh.Trimesh = trimesh.creation.cylinder(
+        radius=parameters.platform_radius,
+        sections=sections,
+        segment=[[0.0, 0.0, lower], [0.0, 0.0, upper]],
+    )
+    return cylinder
+
+
+def save_mesh(
+    mesh: trimesh.Trimesh, path: str | os.PathLike[str], *, overwrite: bool = False
+) -> None:
+    """Write a mesh as STL, PLY or OBJ, by the file's suffix, whole or not at all; lengths in m.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another one, or the file exists and `overwrite` is false.
+    """
+    target = Path(path)
+    suffix = target.suffix.lower()
+    if suffix not in MESH_FORMATS:
+        raise InputError(f"{target.name}: a mesh is written as one of {', '.join(MESH_FORMATS)}")
+    if target.exists() and not overwrite:
+        raise InputError(f"{target} exists; overwrite=True replaces it")
+    with whole_file(target) as scratch:
+        mesh.export(scratch, file_type=suffix[1:])
+
+
+def _opposite_inside(workspace: Workspace, pose: Array) -> Mask:
+    """Return whether (z, -tilt) is in the workspace too, and within its grid, shape (n,)."""
+    opposite = pose * [1.0, -1.0, -1.0]
+    side = side_of_singularity(workspace.parameters, workspace.start)
+    fields = evaluate(
+        workspace.parameters, opposite, side, min_conditioning=workspace.min_conditioning
+    )
+    coordinates = fields.length if workspace.grid.kind == "leg lengths" else opposite
+    inside = fields.reason == 0
+    for i, axis in enumerate(workspace.grid.axes):
+        inside &= (coordinates[:, i] >= axis[0] - 1e-12) & (coordinates[:, i] <= axis[-1] + 1e-12)
+    return np.asarray(inside)
+
+
+def _trapezoid_weights(axis: Array) -> Array:
+    step = np.diff(axis)
+    return np.concatenate([[0.0], step]) / 2 + np.concatenate([step, [0.0]]) / 2
+
+
+def _outer_faces(inside: Mask) -> NDArray[np.intp]:
+    """Return the outer faces of the inside cells, shape (n, 4): flat indices of grid points.
+
+    Their order is anticlockwise seen from outside in the grid's own coordinates.
+    """
+    cell = np.ones(tuple(n - 1 for n in inside.shape), dtype=bool)
+    for corner in np.ndindex(2, 2, 2):
+        cell &= inside[tuple(slice(c, c + n) for c, n in zip(corner, cell.shape, strict=True))]
+    index = np.arange(inside.size).reshape(inside.shape)
+    quads = []
+    for axis in range(3):
+        padded = np.pad(np.moveaxis(cell, axis, 0), [(1, 1), (0, 0), (0, 0)])
+        before, after = padded[:-1], padded[1:]
+        layer = np.moveaxis(index, axis, 0)  # axes (axis, axis + 1, axis + 2), or mirrored for 1
+        square = np.stack(
+            [layer[:, :-1, :-1], layer[:, 1:, :-1], layer[:, 1:, 1:], layer[:, :-1, 1:]], axis=-1
+        )
+        upwards, downwards = square[before & ~after], square[after & ~before]
+        if axis == 1:  # moveaxis leaves (1, 0, 2), a left-handed order
+            upwards, downwards = upwards[:, ::-1], downwards[:, ::-1]
+        quads += [upwards, downwards[:, ::-1]]
+    return np.concatenate(quads)
+
+
+def _refuse_slices(workspace: Workspace) -> None:
+    if min(workspace.grid.shape) < 2:
+        raise InputError(
+            f"the grid has shape {workspace.grid.shape}: a volume needs 2 points along each axis"
+        )

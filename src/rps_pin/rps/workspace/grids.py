@@ -1,0 +1,177 @@
+"""Regular grids of leg lengths, and of poses: what a workspace is computed on."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.errors import InputError
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.pose import Array
+
+GridKind = Literal["leg lengths", "poses"]
+
+#: Slices of a grid's first and second axes; the third is whole.
+Block = tuple[slice, slice]
+WHOLE: Block = (slice(None), slice(None))
+
+_AXIS_NAMES = {
+    "leg lengths": ("length of leg 1", "length of leg 2", "length of leg 3"),
+    "poses": ("z", "tilt_x", "tilt_y"),
+}
+
+
+class Grid(NamedTuple):
+    """Every combination of three increasing axes."""
+
+    kind: GridKind
+    axes: tuple[Array, Array, Array]
+    """Leg lengths 1, 2, 3 (m), or z (m), tilt_x and tilt_y (rad); each of shape (n,)."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Points along each axis."""
+        first, second, third = self.axes
+        return len(first), len(second), len(third)
+
+    @property
+    def size(self) -> int:
+        """Points in all."""
+        return math.prod(self.shape)
+
+    def points(self, block: Block = WHOLE) -> Array:
+        """Return the points of a block of the grid, shape (n_1, n_2, n_3, 3)."""
+        first, second, third = self.axes
+        planes, rows = block
+        return np.stack(np.meshgrid(first[planes], second[rows], third, indexing="ij"), axis=-1)
+
+    def blocks(self, points: int) -> list[Block]:
+        """Cut the grid into blocks of at most `points` points (or one row), in storage order."""
+        planes, rows, columns = self.shape
+        if rows * columns <= points:
+            size = points // (rows * columns)
+            return [
+                (slice(i, min(i + size, planes)), slice(0, rows)) for i in range(0, planes, size)
+            ]
+        size = max(1, points // columns)
+        return [
+            (slice(i, i + 1), slice(j, min(j + size, rows)))
+            for i in range(planes)
+            for j in range(0, rows, size)
+        ]
+
+
+def leg_grid(
+    parameters: RPSParameters,
+    points: int | tuple[int, int, int] = 51,
+    *,
+    step: float | None = None,
+    limits: tuple[float, float] | None = None,
+) -> Grid:
+    """Return the grid of leg lengths of the paper's Section 3.
+
+    Parameters
+    ----------
+    parameters
+        The robot, for the limits of its leg lengths.
+    points
+        Points per leg, both ends of the stroke among them: 51 are the paper's 1 mm steps over
+        50 mm.
+    step
+        Step instead of `points`, m; it is shrunk, if need be, to divide the stroke into equal
+        steps.
+    limits
+        Shortest and longest leg, m; the robot's own limits if None.
+
+    Raises
+    ------
+    InputError
+        If the grid would be empty, or a limit is infinite, not positive or out of order.
+    """
+    shortest, longest = _numbers(parameters.leg_length_limits if limits is None else limits)
+    if not (0 < shortest < longest < math.inf):
+        raise InputError(
+            f"leg lengths from {shortest:.6g} to {longest:.6g} m make no grid: both ends must be "
+            "positive, finite and in order; set leg_length_limits, or give limits"
+        )
+    if step is not None:
+        (size,) = _numbers((step,))
+        if not 0 < size < math.inf:
+            raise InputError(f"step = {size:.6g} m; it must be positive and finite")
+        points = math.ceil((longest - shortest) / size - 1e-9) + 1
+    counts = (points, points, points) if isinstance(points, int) else points
+    whole = isinstance(counts, tuple) and all(isinstance(n, (int, np.integer)) for n in counts)
+    if not whole or len(counts) != 3 or min(counts) < 2:
+        raise InputError(
+            f"points = {points!r}; it must be a whole number, or three, of at least 2 per leg"
+        )
+    first, second, third = (np.linspace(shortest, longest, int(n)) for n in counts)
+    return Grid("leg lengths", (first, second, third))
+
+
+def pose_grid(z: ArrayLike, tilt_x: ArrayLike, tilt_y: ArrayLike | None = None) -> Grid:
+    """Return a grid of poses (z, tilt_x, tilt_y).
+
+    Parameters
+    ----------
+    z
+        Heights, m, shape (n,), increasing; a single number makes a slice.
+    tilt_x, tilt_y
+        Tilts, rad, shape (n,) each, increasing; a single number makes a slice. `tilt_y` is
+        `tilt_x` if None.
+
+    Raises
+    ------
+    InputError
+        If an axis is empty, not finite or not increasing.
+    """
+    first, second = _axis(z, "z"), _axis(tilt_x, "tilt_x")
+    third = second.copy() if tilt_y is None else _axis(tilt_y, "tilt_y")
+    return Grid("poses", (first, second, third))
+
+
+def checked_grid(grid: object) -> Grid:
+    """Return a grid whose axes are finite and increasing, lengths positive, or refuse it.
+
+    Raises
+    ------
+    InputError
+        If it is no grid, or one of its axes is not such.
+    """
+    if not isinstance(grid, Grid):
+        raise InputError("grid must be a Grid; leg_grid(...) and pose_grid(...) make one")
+    if grid.kind not in _AXIS_NAMES:
+        raise InputError(f"grid.kind = {grid.kind!r}; it must be 'leg lengths' or 'poses'")
+    if len(grid.axes) != 3:
+        raise InputError(f"a grid has three axes, not {len(grid.axes)}")
+    names = _AXIS_NAMES[grid.kind]
+    first, second, third = (_axis(axis, name) for axis, name in zip(grid.axes, names, strict=True))
+    if grid.kind == "leg lengths":
+        for axis, name in zip((first, second, third), names, strict=True):
+            if axis[0] <= 0:
+                raise InputError(f"{name} begins at {axis[0]:.6g} m; it must be positive")
+    return Grid(grid.kind, (first, second, third))
+
+
+def _axis(values: ArrayLike, name: str) -> Array:
+    try:
+        axis = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be numbers of shape (n,)") from None
+    if axis.ndim != 1 or not len(axis):
+        raise InputError(f"{name} has shape {axis.shape}; it must be (n,) with n at least 1")
+    if not np.isfinite(axis).all():
+        raise InputError(f"{name} must be finite")
+    if not (np.diff(axis) > 0).all():
+        raise InputError(f"{name} must increase from value to value")
+    return axis
+
+
+def _numbers(values: tuple[float, ...]) -> tuple[float, ...]:
+    try:
+        return tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        raise InputError(f"{values!r} must be numbers") from None

@@ -1,0 +1,195 @@
+"""The largest set of full tilt: a range of heights over which every tilt up to a size is free."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.errors import InputError, UnreachableError
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.pose import Array
+from rps_pin.rps.workspace.assembly_mode import Mask
+from rps_pin.rps.workspace.compute import checked_start, parameters_of
+from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, evaluate, side_of_singularity
+from rps_pin.rps.workspace.grids import pose_grid
+
+if TYPE_CHECKING:
+    from rps_pin.rps.robot import RPSRobot
+
+Shape = Literal["cylinder", "box"]
+
+#: Steps in which a ray of tilts is searched for its first way out, before bisection.
+_RAY_STEPS = 64
+_BISECTIONS = 40
+_LEVEL_SAMPLES = 2001
+
+
+class TiltRange(NamedTuple):
+    """A cylinder or a box inscribed in the workspace's poses (z, tilt_x, tilt_y)."""
+
+    shape: Shape
+    lower: float
+    """Least height, m."""
+    upper: float
+    """Greatest height, m."""
+    tilt: float
+    """Rad. Cylinder: every tilt of at most this size is free. Box: every |tilt_x| and |tilt_y|."""
+    volume: float
+    """(upper - lower) pi tilt^2, or (upper - lower) 4 tilt^2, m rad^2."""
+
+
+def free_tilt(
+    robot: RPSRobot | RPSParameters,
+    z: ArrayLike,
+    shape: Shape = "cylinder",
+    *,
+    directions: int = 96,
+    largest: float = math.pi / 2,
+    start: ArrayLike | None = None,
+    min_conditioning: float = MIN_CONDITIONING,
+) -> Array:
+    """Return for each height the tilt up to which every tilt is in the workspace, shape (n,), rad.
+
+    Rays of tilts in equally spaced directions are followed from the level pose to their first way
+    out, in 64 steps of `largest`, which is then bisected to rounding.
+
+    Parameters
+    ----------
+    robot
+        A robot, or its parameters.
+    z
+        Heights, m, shape (n,), increasing, or one number.
+    shape
+        ``"cylinder"``: tilts of a size; ``"box"``: |tilt_x| and |tilt_y|, so that its
+        corners are farther.
+    directions
+        Rays, a multiple of 24 so that the robot's planes of symmetry and the corners are among
+        them.
+    largest
+        Farthest tilt looked at along a ray, rad, up to pi.
+    start, min_conditioning
+        As for `workspace`.
+
+    Raises
+    ------
+    InputError
+        If an argument is not what it should be.
+    """
+    if shape not in ("cylinder", "box"):
+        raise InputError(f"shape = {shape!r}; it must be 'cylinder' or 'box'")
+    if directions < 24 or directions % 24:
+        raise InputError(f"directions = {directions}; it must be a multiple of 24")
+    if not 0 < largest <= math.pi:
+        raise InputError(f"largest = {largest!r} rad; it must be in (0, pi]")
+    parameters = parameters_of(robot)
+    grid = pose_grid(z, [0.0])
+    side = side_of_singularity(parameters, checked_start(parameters, grid, start))
+    heights = grid.axes[0]
+    way = 2 * np.pi * np.arange(directions) / directions
+
+    def inside(height: Array, angle: Array, size: Array) -> Mask:
+        pose = np.stack([height, size * np.cos(angle), size * np.sin(angle)], axis=-1)
+        fields = evaluate(parameters, pose, side, min_conditioning=min_conditioning)
+        return np.asarray(fields.reason == 0)
+
+    # The last step of each ray before its first way out.
+    sizes = np.linspace(0.0, largest, _RAY_STEPS + 1)
+    steps = np.meshgrid(heights, way, sizes, indexing="ij")
+    unbroken = np.logical_and.accumulate(inside(*steps), axis=-1)
+    count = unbroken.sum(axis=-1)
+    low = sizes[np.maximum(count - 1, 0)]
+    high = sizes[np.minimum(count, _RAY_STEPS)]
+    height, angle = np.meshgrid(heights, way, indexing="ij")
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        good = inside(height, angle, middle)
+        low, high = np.where(good, middle, low), np.where(good, high, middle)
+    low = np.where(count == 0, 0.0, low)  # not even the level pose
+    # The size of the box whose side the ray's end lies on.
+    gauge = np.maximum(np.abs(np.cos(way)), np.abs(np.sin(way))) if shape == "box" else 1.0
+    free: Array = (low * gauge).min(axis=-1)
+    return free
+
+
+def largest_tilt_range(
+    robot: RPSRobot | RPSParameters,
+    shape: Shape = "cylinder",
+    *,
+    points: int = 51,
+    start: ArrayLike | None = None,
+    min_conditioning: float = MIN_CONDITIONING,
+) -> TiltRange:
+    """Return the largest cylinder, or box, of full tilt that fits into the workspace's poses.
+
+    Of all ranges between `points` heights at which the level pose is in the workspace, the one
+    with the largest volume, its tilt the least `free_tilt` of its heights.
+
+    Parameters
+    ----------
+    robot
+        A robot, or its parameters; its leg lengths must have an upper limit.
+    shape
+        ``"cylinder"`` or ``"box"``.
+    points
+        Heights to choose from, at least 3.
+    start, min_conditioning
+        As for `workspace`.
+
+    Raises
+    ------
+    InputError
+        If an argument is not what it should be, or the leg lengths have no upper limit.
+    UnreachableError
+        If no level pose is in the workspace.
+    """
+    parameters = parameters_of(robot)
+    if points < 3:
+        raise InputError(f"points = {points}; it must be at least 3")
+    z = np.linspace(*_level_heights(parameters, start, min_conditioning), points)
+    tilt = free_tilt(parameters, z, shape, start=start, min_conditioning=min_conditioning)
+    area = math.pi if shape == "cylinder" else 4.0
+    best = TiltRange(shape, float(z[0]), float(z[0]), 0.0, 0.0)
+    for i in range(points):
+        least = np.minimum.accumulate(tilt[i:])
+        volumes = (z[i:] - z[i]) * area * least**2
+        j = int(np.argmax(volumes))
+        if volumes[j] > best.volume:
+            best = TiltRange(
+                shape, float(z[i]), float(z[i + j]), float(least[j]), float(volumes[j])
+            )
+    return best
+
+
+def _level_heights(
+    parameters: RPSParameters, start: ArrayLike | None, min_conditioning: float
+) -> tuple[float, float]:
+    """Return the ends of the heights, around the start's, at which the level pose is inside."""
+    longest = parameters.leg_length_limits[1]
+    if not math.isfinite(longest):
+        raise InputError("leg_length_limits has no upper end: the heights have none either")
+    first = checked_start(parameters, pose_grid([0.0], [0.0]), start)
+    side = side_of_singularity(parameters, first)
+
+    def inside(z: Array) -> Mask:
+        pose = np.stack([z, np.zeros_like(z), np.zeros_like(z)], axis=-1)
+        reason = evaluate(parameters, pose, side, min_conditioning=min_conditioning).reason
+        return np.asarray(reason == 0)
+
+    if not inside(first[:1]).all():
+        raise UnreachableError(
+            f"the level pose at the start's height, {first[0]:.6g} m, is not in the workspace; "
+            "give the start another height"
+        )
+    ends = []
+    for limit in (-longest, longest):
+        z = np.linspace(first[0], limit, _LEVEL_SAMPLES)
+        out = np.flatnonzero(~inside(z))
+        good, bad = (z[out[0] - 1], z[out[0]]) if len(out) else (z[-1], z[-1])
+        for _ in range(_BISECTIONS):
+            middle = (good + bad) / 2
+            good, bad = (middle, bad) if inside(np.array([middle])).all() else (good, middle)
+        ends.append(float(good))
+    return ends[0], ends[1]

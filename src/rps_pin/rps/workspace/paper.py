@@ -1,0 +1,105 @@
+"""What the paper's Section 3 states of the workspace beside what is computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rps_pin.errors import InputError
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.workspace.compute import parameters_of, workspace
+from rps_pin.rps.workspace.geometry import volume
+from rps_pin.rps.workspace.grids import leg_grid
+
+#: "The values for p_x and p_y do not exceed 2,5 mm, for a 50-mm variation of the leg lengths."
+STATED_REACH = 2.5e-3
+STATED_STROKE = 50e-3
+
+
+class PaperComparison(NamedTuple):
+    """The workspace of one base radius beside the paper's statement. SI units."""
+
+    base_radius: float
+    """g, which the paper does not give, m."""
+    stroke: float
+    """Variation of the leg lengths, m."""
+    x: tuple[float, float]
+    """Least and greatest p_x, m."""
+    y: tuple[float, float]
+    """Least and greatest p_y, m."""
+    z: tuple[float, float]
+    """Least and greatest p_z, m."""
+    reach: float
+    """Greatest |p_x| or |p_y|, m."""
+    stated_reach: float
+    """The paper's 2.5 mm, m."""
+    holds: bool
+    """Whether the reach is within what the paper states."""
+    tilt: float
+    """Greatest tilt, rad."""
+    volume: float
+    """Of the centre's positions, each counted once, m^3."""
+    cylinder_volume: float
+    """Of the theoretical cylinder of radius h between the same heights, m^3."""
+    unreachable: int
+    """Points of the grid whose lengths do not close in the mode above the base, or lie beyond a
+    singularity."""
+
+
+def paper_comparison(
+    parameters: RPSParameters | None = None,
+    base_radii: Sequence[float] = (0.120, 0.150, 0.180, 0.210, 0.240),
+    *,
+    points: int = 51,
+) -> tuple[PaperComparison, ...]:
+    """Return, for each base radius g, what the paper states and what is computed.
+
+    The paper limits the legs' lengths only; limits of angles and spherical joints are left out.
+
+    Parameters
+    ----------
+    parameters
+        The robot, with its stroke; the ``micro`` preset if None.
+    base_radii
+        Values of g, m.
+    points
+        Lengths per leg; 51 are the paper's 1 mm steps.
+
+    Raises
+    ------
+    InputError
+        If there is no base radius, or one is not positive.
+    UnreachableError
+        If legs at mid-stroke carry no level platform for one of them.
+    """
+    given = RPSParameters.from_preset("micro") if parameters is None else parameters_of(parameters)
+    if len(base_radii) == 0:
+        raise InputError("base_radii is empty: at least one is needed")
+    free = given.replace(leg_angle_limits=(-math.pi, math.pi), spherical_cone_limit=math.pi)
+    return tuple(_row(free.replace(base_radius=float(g)), points) for g in base_radii)
+
+
+def _row(parameters: RPSParameters, points: int) -> PaperComparison:
+    space = workspace(parameters, leg_grid(parameters, points))
+    inside = space.inside
+    position, pose = space.position[inside], space.pose[inside]
+    x, y, z = ((float(p.min()), float(p.max())) for p in position.T)
+    reach = float(np.abs(position[:, :2]).max())
+    shortest, longest = parameters.leg_length_limits
+    return PaperComparison(
+        base_radius=parameters.base_radius,
+        stroke=longest - shortest,
+        x=x,
+        y=y,
+        z=z,
+        reach=reach,
+        stated_reach=STATED_REACH,
+        holds=reach <= STATED_REACH,
+        tilt=float(np.hypot(pose[:, 1], pose[:, 2]).max()),
+        volume=volume(space).position,
+        cylinder_volume=math.pi * parameters.platform_radius**2 * (z[1] - z[0]),
+        unreachable=int(np.count_nonzero(~inside)),
+    )

@@ -1,0 +1,93 @@
+"""Why a point is out of the workspace: one bit a reason, so that a point can have several."""
+
+from __future__ import annotations
+
+from enum import IntFlag
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rps_pin.rps.legs import cone_angles
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.pose import Array, rotation
+
+Flags = NDArray[np.uint16]
+
+#: Limits are kept to rounding error, m or rad, as `RPSRobot.inverse_kinematics` keeps them.
+ROUNDING = 1e-12
+
+
+class Reason(IntFlag):
+    """Reasons why a point is out; a point with none of them is inside."""
+
+    INSIDE = 0
+    LEG_1_SHORT = 1 << 0
+    """Leg 1 would be shorter than its lower limit."""
+    LEG_2_SHORT = 1 << 1
+    LEG_3_SHORT = 1 << 2
+    LEG_1_LONG = 1 << 3
+    """Leg 1 would be longer than its upper limit."""
+    LEG_2_LONG = 1 << 4
+    LEG_3_LONG = 1 << 5
+    LEG_1_ANGLE = 1 << 6
+    """Leg 1's angle would be beyond its limits."""
+    LEG_2_ANGLE = 1 << 7
+    LEG_3_ANGLE = 1 << 8
+    LEG_1_SPHERICAL = 1 << 9
+    """Leg 1's spherical joint would leave its cone."""
+    LEG_2_SPHERICAL = 1 << 10
+    LEG_3_SPHERICAL = 1 << 11
+    SINGULAR = 1 << 12
+    """At a parallel singularity, or beyond it, seen from the start pose."""
+    UNREACHABLE = 1 << 13
+    """These leg lengths do not close in the start's assembly mode: there is no pose to judge."""
+
+    @property
+    def text(self) -> str:
+        """The reason in words, for legends and reports."""
+        if self is Reason.INSIDE:
+            return "inside"
+        words = {
+            "SHORT": "too short",
+            "LONG": "too long",
+            "ANGLE": "angle beyond its limits",
+            "SPHERICAL": "spherical joint beyond its cone",
+        }
+        parts = []
+        for reason in self:
+            name = str(reason.name)
+            if name.startswith("LEG_"):
+                parts.append(f"leg {name[4]} {words[name[6:]]}")
+            else:
+                parts.append(name.lower())
+        return ", ".join(parts)
+
+
+def broken_limits(parameters: RPSParameters, pose: Array, length: Array, angle: Array) -> Flags:
+    """Return the limits of the legs and joints that each pose breaks, shape (...).
+
+    Parameters
+    ----------
+    parameters
+        The robot; `RPSParameters.leg_length_limits` and its like are the limits.
+    pose
+        Shape (..., 3), m and rad.
+    length, angle
+        Of the legs in that pose, shape (..., 3) each, m and rad.
+    """
+    p = parameters
+    shortest, longest = p.leg_length_limits
+    least, greatest = p.leg_angle_limits
+    checks = [
+        (Reason.LEG_1_SHORT, length < shortest - ROUNDING),
+        (Reason.LEG_1_LONG, length > longest + ROUNDING),
+        (Reason.LEG_1_ANGLE, (angle < least - ROUNDING) | (angle > greatest + ROUNDING)),
+    ]
+    if p.spherical_cone_limit < np.pi:
+        cone = cone_angles(angle, rotation(pose), p.spherical_rest_angle)
+        checks.append((Reason.LEG_1_SPHERICAL, cone > p.spherical_cone_limit + ROUNDING))
+    flags = np.zeros(length.shape[:-1], dtype=np.uint16)
+    for leg_1, broken in checks:
+        for leg in range(3):  # the bits of legs 2 and 3 follow that of leg 1
+            flags |= np.uint16(leg_1 << leg) * broken[..., leg]
+    return flags

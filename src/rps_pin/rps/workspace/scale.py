@@ -1,0 +1,148 @@
+"""Workspaces too large for memory: block by block, on every core, straight into a file."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.errors import InputError
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.workspace.compute import BLOCK, GridJob, Progress
+from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, Fields
+from rps_pin.rps.workspace.grids import Block, Grid
+from rps_pin.rps.workspace.reasons import Reason
+from rps_pin.rps.workspace.storage import (
+    DType,
+    bytes_per_point,
+    checked_fields,
+    new_workspace_file,
+)
+
+if TYPE_CHECKING:
+    from rps_pin.rps.robot import RPSRobot
+
+#: Blocks under way for each worker: enough to keep it busy while another is written.
+_AHEAD = 3
+STORED = ("reason", "pose", "conditioning", "transmission")
+
+
+class WorkspaceCounts(NamedTuple):
+    """What a workspace that was written to a file amounts to."""
+
+    points: int
+    inside: int
+    counts: dict[Reason, int]
+    """Points that each single reason puts out; `Reason.INSIDE`: those inside."""
+    bytes_per_point: int
+    """In the file."""
+
+
+def workspace_to_file(
+    robot: RPSRobot | RPSParameters,
+    path: str | os.PathLike[str],
+    grid: Grid | None = None,
+    *,
+    start: ArrayLike | None = None,
+    min_conditioning: float = MIN_CONDITIONING,
+    fields: Sequence[str] = STORED,
+    dtype: DType = "float32",
+    workers: int | None = None,
+    overwrite: bool = False,
+    progress: Progress = iter,
+) -> WorkspaceCounts:
+    """Compute a workspace block by block on several cores and write it to an HDF5 file.
+
+    Memory does not depend on the grid's size: a few blocks for each worker. Any interruption,
+    Ctrl-C included, leaves no file, and what stood at `path` before untouched.
+
+    Parameters
+    ----------
+    robot, grid, start, min_conditioning
+        As for `workspace`.
+    path
+        The file to write; `load_workspace` reads it, or blocks of it.
+    fields
+        Which fields to write; the others follow from the pose when the file is read.
+    dtype
+        ``"float32"`` keeps seven digits, 15 nm of 250 mm; ``"float64"`` is exact.
+    workers
+        Threads; by default one for each core this process may use.
+    overwrite
+        Whether a file that exists is replaced.
+    progress
+        Wraps the loop over the blocks, for a progress bar.
+
+    Raises
+    ------
+    InputError, UnreachableError, SingularityError
+        As `workspace`; also if the file exists, its folder does not, or a field is unknown.
+    OSError
+        If the disk has no room (asked before the start), or a write fails.
+    """
+    job = GridJob(robot, grid, start=start, min_conditioning=min_conditioning)
+    count = checked_workers(workers)
+    names = checked_fields(fields)
+    size = bytes_per_point(names, dtype)
+    with new_workspace_file(
+        path,
+        job.parameters,
+        job.grid,
+        job.start,
+        job.min_conditioning,
+        fields=names,
+        dtype=dtype,
+        overwrite=overwrite,
+    ) as file:
+        _refuse_full_disk(Path(path), size * job.grid.size)
+        tally = np.zeros(1 << len(Reason), dtype=np.int64)
+        blocks = job.grid.blocks(BLOCK)
+        for block, values in _computed(job.compute, blocks, count, progress):
+            file.write(block, values)
+            tally += np.bincount(values.reason.ravel(), minlength=len(tally))
+    codes = np.arange(len(tally))
+    counts = {reason: int(tally[(codes & int(reason)) != 0].sum()) for reason in Reason}
+    inside = int(tally[0])
+    return WorkspaceCounts(job.grid.size, inside, {Reason.INSIDE: inside} | counts, size)
+
+
+def checked_workers(workers: int | None) -> int:
+    """Return the number of threads to use: as given, or the cores this process may run on."""
+    if workers is None:
+        affinity = getattr(os, "sched_getaffinity", None)  # Linux only
+        return len(affinity(0)) if affinity else os.cpu_count() or 1
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise InputError(f"workers = {workers!r}; it must be a whole number, at least 1")
+    return workers
+
+
+def _computed(
+    compute: Callable[[Block], Fields], blocks: list[Block], workers: int, progress: Progress
+) -> Iterable[tuple[Block, Fields]]:
+    """Compute blocks in threads, NumPy leaving Python's lock, and give them back in order."""
+    pool = ThreadPoolExecutor(workers)
+    pending: deque[Future[Fields]] = deque()
+    try:
+        ahead = iter(blocks)
+        for i in progress(range(len(blocks))):
+            while len(pending) < _AHEAD * workers and (block := next(ahead, None)) is not None:
+                pending.append(pool.submit(compute, block))
+            yield blocks[i], pending.popleft().result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _refuse_full_disk(path: Path, size: int) -> None:
+    free = shutil.disk_usage(path.parent).free
+    if size > free:
+        raise OSError(
+            errno.ENOSPC, f"{size / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB are free"
+        )

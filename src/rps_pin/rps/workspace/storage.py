@@ -1,0 +1,269 @@
+"""Workspaces in HDF5 files: written whole or not at all, self-describing, opened by any reader.
+
+Layout of a file:
+
+- attributes: ``format``, ``parameters`` (JSON of `RPSParameters`), ``grid`` (``"leg lengths"`` or
+  ``"poses"``), ``start`` (m, rad), ``min_conditioning``, ``reason_bits`` (JSON: name to bit), and,
+  last of all, ``complete``;
+- ``axis_1``, ``axis_2``, ``axis_3``: the grid's axes, float64, with ``unit`` and ``meaning``;
+- ``reason`` and the other fields over the grid, each with ``unit`` and ``meaning``.
+
+``reason`` and ``pose`` are always there; the other fields follow from the pose in closed form, and
+`load_workspace` computes those that a file leaves out.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal
+
+import h5py
+import numpy as np
+
+from rps_pin.errors import InputError
+from rps_pin.files import whole_file
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.pose import Array
+from rps_pin.rps.workspace.evaluate import Fields, evaluate
+from rps_pin.rps.workspace.grids import Block, Grid, checked_grid
+from rps_pin.rps.workspace.reasons import Reason
+from rps_pin.rps.workspace.result import Workspace
+
+FORMAT = "rps_pin workspace 1"
+DType = Literal["float32", "float64"]
+
+#: Unit and meaning of each field.
+_FIELDS = {
+    "reason": ("1", "bits why a point is out, see reason_bits; 0 inside"),
+    "pose": ("m, rad, rad", "z, tilt_x, tilt_y; zeros where unreachable"),
+    "position": ("m", "x, y, z of the platform's centre in base axes"),
+    "length": ("m", "lengths of legs 1, 2, 3"),
+    "angle": ("rad", "angles of legs 1, 2, 3"),
+    "determinant": ("1", "of K = d(length)/d(z, h tilt_x, h tilt_y)"),
+    "conditioning": ("1", "1/cond(K)"),
+    "transmission": ("1", "load carried per unit of actuator force"),
+}
+ALL_FIELDS = tuple(_FIELDS)
+_VECTORS = ("pose", "position", "length", "angle")
+_AXES = {
+    "leg lengths": (("m", "length of leg 1"), ("m", "length of leg 2"), ("m", "length of leg 3")),
+    "poses": (("m", "z"), ("rad", "tilt_x"), ("rad", "tilt_y")),
+}
+
+
+class WorkspaceFile:
+    """A file being written; see `new_workspace_file`."""
+
+    def __init__(self, file: h5py.File, fields: Sequence[str]) -> None:
+        self._file = file
+        self._fields = tuple(fields)
+
+    def write(self, block: Block, values: Fields) -> None:
+        """Write the fields of one block of the grid."""
+        for name in self._fields:
+            self._file[name][block] = getattr(values, name)
+
+
+@contextmanager
+def new_workspace_file(
+    path: str | os.PathLike[str],
+    parameters: RPSParameters,
+    grid: Grid,
+    start: Array,
+    min_conditioning: float,
+    *,
+    fields: Sequence[str] = ALL_FIELDS,
+    dtype: DType = "float64",
+    overwrite: bool = False,
+) -> Iterator[WorkspaceFile]:
+    """Give a file to write a workspace's blocks to; it appears at `path` when the block ends well.
+
+    Any exception, Ctrl-C included, leaves no file, and what stood at `path` before untouched.
+
+    Raises
+    ------
+    InputError
+        If the file exists and `overwrite` is false, its folder does not, or a field or type is
+        unknown.
+    OSError
+        If the disk has no room for it, or a write fails; says so, and how large it would be.
+    """
+    target = Path(path)
+    names = checked_fields(fields)
+    if dtype not in ("float32", "float64"):
+        raise InputError(f"dtype = {dtype!r}; it must be 'float32' or 'float64'")
+    if not target.parent.is_dir():
+        raise InputError(f"{target.parent} is not a folder: {target.name} cannot be written there")
+    if target.exists() and not overwrite:
+        raise InputError(f"{target} exists; overwrite=True replaces it")
+    size = grid.size * bytes_per_point(names, dtype)
+    with (
+        _clear_failures(target, size),
+        whole_file(target) as scratch,
+        h5py.File(scratch, "w") as file,
+    ):
+        _describe(file, parameters, grid, start, min_conditioning)
+        for name in names:
+            shape = (*grid.shape, 3) if name in _VECTORS else grid.shape
+            data = file.create_dataset(name, shape, "uint16" if name == "reason" else dtype)
+            data.attrs["unit"], data.attrs["meaning"] = _FIELDS[name]
+        yield WorkspaceFile(file, names)
+        file.attrs["complete"] = True
+
+
+def save_workspace(
+    workspace: Workspace,
+    path: str | os.PathLike[str],
+    *,
+    fields: Sequence[str] = ALL_FIELDS,
+    dtype: DType = "float64",
+    overwrite: bool = False,
+) -> None:
+    """Write a workspace to an HDF5 file, whole or not at all.
+
+    Parameters
+    ----------
+    workspace
+        What to write.
+    path
+        Where; conventionally ``.h5``.
+    fields
+        Which fields; ``reason`` and ``pose`` are written in any case.
+    dtype
+        ``"float64"``, exact, or ``"float32"``, half the size and 6e-8 of each value off.
+    overwrite
+        Whether a file that exists is replaced.
+
+    Raises
+    ------
+    InputError, OSError
+        As `new_workspace_file`.
+    """
+    w = workspace
+    with new_workspace_file(
+        path,
+        w.parameters,
+        w.grid,
+        w.start,
+        w.min_conditioning,
+        fields=fields,
+        dtype=dtype,
+        overwrite=overwrite,
+    ) as file:
+        file.write((slice(None), slice(None)), w.fields)
+
+
+def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> Workspace:
+    """Read a workspace, or a block of its grid, from an HDF5 file.
+
+    Parameters
+    ----------
+    path
+        A file that `save_workspace` or `workspace_to_file` wrote.
+    block
+        Slices of the grid's first and second axes, so that a large file need not fit in memory.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it does not hold a complete workspace.
+    """
+    planes, rows = block or (slice(None), slice(None))
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs.get("format") != FORMAT or not file.attrs.get("complete", False):
+                raise InputError(f"{path} does not hold a complete '{FORMAT}'")
+            kind = str(file.attrs["grid"])
+            first, second, third = (file[f"axis_{i}"][...] for i in (1, 2, 3))
+            grid = checked_grid(Grid(kind, (first[planes], second[rows], third)))  # type: ignore[arg-type]
+            parameters = RPSParameters(**json.loads(file.attrs["parameters"]))
+            start = np.asarray(file.attrs["start"], dtype=np.float64)
+            least = float(file.attrs["min_conditioning"])
+            stored: dict[str, Any] = {
+                name: file[name][planes, rows] for name in ALL_FIELDS if name in file
+            }
+            missing = {"reason", "pose"} - set(stored)
+            if missing:
+                raise InputError(f"{path} has no dataset {', '.join(sorted(missing))}")
+    except (OSError, KeyError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"cannot read the workspace {path}: {error}") from None
+    reason = stored.pop("reason")
+    floats = {name: np.asarray(values, dtype=np.float64) for name, values in stored.items()}
+    fields = (
+        Fields(reason=reason, **floats)
+        if len(floats) == 7
+        else _completed(parameters, reason, floats)
+    )
+    return Workspace(parameters, grid, start, least, fields)
+
+
+def checked_fields(fields: Sequence[str]) -> tuple[str, ...]:
+    """Return field names in the file's order, ``reason`` and ``pose`` among them."""
+    given = [fields] if isinstance(fields, str) else list(fields)
+    unknown = [name for name in given if name not in _FIELDS]
+    if unknown:
+        raise InputError(f"no field {unknown[0]!r}; there are: {', '.join(_FIELDS)}")
+    return tuple(name for name in _FIELDS if name in given or name in ("reason", "pose"))
+
+
+def bytes_per_point(fields: Sequence[str], dtype: DType) -> int:
+    """Return how many bytes of a file one point of the grid takes."""
+    numbers = sum(3 if name in _VECTORS else 1 for name in fields if name != "reason")
+    return 2 + numbers * np.dtype(dtype).itemsize
+
+
+def _describe(
+    file: h5py.File, parameters: RPSParameters, grid: Grid, start: Array, min_conditioning: float
+) -> None:
+    attributes = file.attrs
+    attributes["format"] = FORMAT
+    attributes["parameters"] = json.dumps(parameters.model_dump())
+    attributes["grid"] = grid.kind
+    attributes["start"] = start
+    attributes["min_conditioning"] = min_conditioning
+    attributes["reason_bits"] = json.dumps({str(reason.name): int(reason) for reason in Reason})
+    for i, axis in enumerate(grid.axes):
+        data = file.create_dataset(f"axis_{i + 1}", data=axis)
+        data.attrs["unit"], data.attrs["meaning"] = _AXES[grid.kind][i]
+
+
+def _completed(parameters: RPSParameters, reason: Any, stored: dict[str, Array]) -> Fields:
+    """Return all fields: those stored, and the others from the pose."""
+    found = np.asarray((reason & np.uint16(Reason.UNREACHABLE)) == 0)
+    computed = evaluate(parameters, stored["pose"], 1.0, found=found)
+    return computed._replace(reason=reason, **stored)
+
+
+@contextmanager
+def _clear_failures(target: Path, size: int) -> Iterator[None]:
+    """Say of a failing write which file it was, and how large; HDF5's own words stay as cause."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        code = _system_error(error)
+        if code is None:
+            raise
+        raise OSError(
+            code,
+            f"the workspace ({size / 1e9:.3g} GB) could not be written, and no part of it was "
+            f"kept: {os.strerror(code)}",
+            str(target),
+        ) from error
+
+
+def _system_error(error: BaseException) -> int | None:
+    """Return the system's error number, which HDF5, closing the file, puts into a RuntimeError."""
+    if isinstance(error, OSError) and error.errno:
+        return error.errno
+    number = re.search(r"errno = (\d+)", str(error))
+    if number:
+        return int(number[1])
+    return errno.EIO if isinstance(error, OSError) else None

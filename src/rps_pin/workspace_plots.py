@@ -1,0 +1,356 @@
+"""The paper's figures of the workspace, 2 to 6, and a map of a slice: axes with units.
+
+Each function makes a figure, or draws on one of your own. Nothing here opens a window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+from numpy.typing import NDArray
+
+from rps_pin.errors import InputError
+from rps_pin.plots import LEG_COLOURS
+from rps_pin.rps.legs import RADIAL
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.workspace.geometry import boundary
+from rps_pin.rps.workspace.paper import PaperComparison
+from rps_pin.rps.workspace.reasons import Reason
+from rps_pin.rps.workspace.result import Workspace
+
+Array = NDArray[np.float64]
+
+#: Okabe and Ito's colours: the workspace, the theoretical cylinder, the platform.
+_INSIDE, _CYLINDER, _PLATFORM = "#0072B2", "#999999", "#E69F00"
+#: A pale one for each family of reasons, in the order of `_FAMILIES`.
+_REASON_COLOURS = ("#F0E442", "#E69F00", "#CC79A7", "#D55E00", "#000000", "#999999")
+_FAMILIES = (
+    ("a leg too short", Reason.LEG_1_SHORT | Reason.LEG_2_SHORT | Reason.LEG_3_SHORT),
+    ("a leg too long", Reason.LEG_1_LONG | Reason.LEG_2_LONG | Reason.LEG_3_LONG),
+    ("a leg's angle", Reason.LEG_1_ANGLE | Reason.LEG_2_ANGLE | Reason.LEG_3_ANGLE),
+    (
+        "a spherical joint",
+        Reason.LEG_1_SPHERICAL | Reason.LEG_2_SPHERICAL | Reason.LEG_3_SPHERICAL,
+    ),
+    ("singular", Reason.SINGULAR),
+    ("unreachable", Reason.UNREACHABLE),
+)
+_VIEWS = (("XY", 0, 1), ("XZ", 0, 2), ("YZ", 1, 2))
+_STYLE: Any = {
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "figure.dpi": 150,
+    "svg.hashsalt": "rps_pin",
+}
+
+
+class Modes(Protocol):
+    """Assembly modes, as `RPSRobot.assembly_modes` returns them."""
+
+    @property
+    def angle(self) -> Array:
+        """Leg angles, shape (k, 3), rad."""
+
+    @property
+    def position(self) -> Array:
+        """Of the platform's centre, shape (k, 3), m."""
+
+    @property
+    def rotation(self) -> Array:
+        """From platform to base axes, shape (k, 3, 3)."""
+
+
+def plot_assembly_modes(
+    parameters: RPSParameters, modes: Modes, figure: Figure | None = None
+) -> Figure:
+    """Draw each assembly mode as a robot: base, legs and platform, as the paper's Fig. 2 does.
+
+    Parameters
+    ----------
+    parameters
+        The robot.
+    modes
+        Solutions for one triple of leg lengths: `angle` (k, 3), `position` (k, 3) and `rotation`
+        (k, 3, 3).
+    figure
+        To draw on; a new one if None.
+
+    Raises
+    ------
+    InputError
+        If there is no mode to draw.
+    """
+    count = len(modes.angle)
+    if count == 0:
+        raise InputError("there is no assembly mode to draw")
+    base = 1e3 * parameters.base_radius * RADIAL
+    arms = parameters.platform_radius * RADIAL
+    tips = 1e3 * (modes.position[:, None, :] + arms @ np.swapaxes(modes.rotation, -1, -2))
+    reach = max(float(np.abs(tips[..., :2]).max()), float(np.abs(base).max()))
+    low, high = min(0.0, float(tips[..., 2].min())), max(1.0, float(tips[..., 2].max()))
+    columns = min(4, count)
+    rows = -(-count // columns)
+    with matplotlib.rc_context(_STYLE):
+        figure = figure or Figure(figsize=(3.0 * columns, 3.4 * rows), layout="constrained")
+        for k in range(count):
+            axes = _space(figure, (rows, columns, k + 1))
+            _draw_robot(axes, base, tips[k])
+            degrees = ", ".join(f"{angle:.0f}" for angle in np.rad2deg(modes.angle[k]))
+            axes.set_title(f"{k + 1}: $\\phi$ = {degrees}°", fontsize=9)
+            axes.set_xlim(-reach, reach)
+            axes.set_ylim(-reach, reach)
+            axes.set_zlim(low, high)
+            _label_space(axes, size=7)
+            axes.set_box_aspect((1, 1, (high - low) / (2 * reach)), zoom=0.8)
+    return figure
+
+
+def plot_theoretical(parameters: RPSParameters, figure: Figure | None = None) -> Figure:
+    """Draw the theoretical workspace, as the paper's Fig. 3 does.
+
+    The cylinder of radius h, with the platform level in its middle and turned by half a turn about
+    axes in the base plane, where its centre lies on the cylinder.
+    """
+    h = 1e3 * parameters.platform_radius
+    with matplotlib.rc_context(_STYLE):
+        figure = figure or Figure(figsize=(5.6, 5.2), layout="constrained")
+        axes = _space(figure, (1, 1, 1))
+        _draw_cylinder(axes, h, -h, h)
+        axes.scatter([0], [0], [0], color="black", s=20, label="level, $p_x = p_y = 0$")
+        # Tilt by pi along alpha: p = h (cos 2a', ...), on the cylinder (Eq. 4)
+        for i, way in enumerate(np.deg2rad([0.0, 60.0, 120.0])):
+            centre = h * np.array([np.cos(2 * way), -np.sin(2 * way), 0.0])
+            axes.scatter(
+                *centre[:, None],
+                color=LEG_COLOURS[0],
+                s=20,
+                label="half a turn: the limit" if i == 0 else None,
+            )
+            axes.plot(*np.stack([np.zeros(3), centre], axis=1), color=LEG_COLOURS[0], lw=0.8)
+        _label_space(axes, z_label="$p_z$, any height (mm)")
+        axes.set_title(f"Theoretical workspace, radius h = {h:.4g} mm")
+        axes.legend(loc="upper left")
+        axes.set_box_aspect((1, 1, 1), zoom=0.88)
+    return figure
+
+
+def plot_effective(workspace: Workspace, figure: Figure | None = None) -> Figure:
+    """Draw the effective workspace within the theoretical cylinder, as the paper's Fig. 4 does."""
+    mesh = boundary(workspace)
+    points = 1e3 * mesh.vertices
+    h = 1e3 * workspace.parameters.platform_radius
+    low, high = float(points[:, 2].min()), float(points[:, 2].max())
+    with matplotlib.rc_context(_STYLE):
+        figure = figure or Figure(figsize=(5.6, 5.2), layout="constrained")
+        axes = _space(figure, (1, 1, 1))
+        _draw_cylinder(axes, h, low, high)
+        axes.add_collection3d(Poly3DCollection(points[mesh.faces], color=_INSIDE))
+        reach = float(np.abs(points[:, :2]).max())
+        axes.text2D(
+            0.02,
+            0.94,
+            f"grey: theoretical, radius {h:.4g} mm\n"
+            f"blue: effective, within {reach:.3g} mm of the axis in x and y",
+            transform=axes.transAxes,
+            fontsize=8,
+        )
+        axes.set_xlim(-h, h)
+        axes.set_ylim(-h, h)
+        axes.set_zlim(low, high)
+        _label_space(axes)
+        axes.set_title("Effective and theoretical workspace")
+        axes.set_box_aspect((1, 1, 1), zoom=0.88)
+    return figure
+
+
+def plot_space(workspace: Workspace, figure: Figure | None = None) -> Figure:
+    """Draw the boundary of the workspace of the centre in space, as the paper's Fig. 5 does.
+
+    The scale of x and y is not that of z: the motion along them is parasitic, and much smaller.
+    """
+    mesh = boundary(workspace)
+    points = 1e3 * mesh.vertices
+    with matplotlib.rc_context(_STYLE):
+        figure = figure or Figure(figsize=(5.6, 5.4), layout="constrained")
+        axes = _space(figure, (1, 1, 1))
+        triangles = points[mesh.faces]
+        axes.add_collection3d(
+            Poly3DCollection(triangles, facecolors=_shaded(triangles), linewidths=0)
+        )
+        low, high = points.min(axis=0), points.max(axis=0)
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        axes.set_zlim(low[2], high[2])
+        _label_space(axes)
+        axes.set_title("Effective workspace of the platform's centre")
+        axes.set_box_aspect((1, 1, 1.2), zoom=0.85)
+    return figure
+
+
+def plot_views(workspace: Workspace, figure: Figure | None = None) -> Figure:
+    """Draw the workspace's points in the planes XY, XZ and YZ, as the paper's Fig. 6 does."""
+    points = 1e3 * workspace.position[workspace.inside]
+    if not len(points):
+        raise InputError("no point is inside the workspace: there is nothing to draw")
+    with matplotlib.rc_context(_STYLE):
+        figure = figure or Figure(figsize=(10.5, 3.8), layout="constrained")
+        for axes, (name, i, j) in zip(figure.subplots(1, 3), _VIEWS, strict=True):
+            axes.plot(points[:, i], points[:, j], ",", color=_INSIDE, alpha=0.5, rasterized=True)
+            axes.set_xlabel(f"$p_{'xyz'[i]}$ (mm)")
+            axes.set_ylabel(f"$p_{'xyz'[j]}$ (mm)")
+            axes.set_title(f"{name}", loc="left")
+            if j == 1:
+                axes.set_aspect("equal", adjustable="datalim")
+    return figure
+
+
+def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) -> Figure:
+    """Draw which tilts are inside at a height, and why the others are not.
+
+    Parameters
+    ----------
+    workspace
+        On a grid of poses.
+    height
+        Of the slice, m; the grid's nearest plane is drawn.
+    axes
+        To draw on; those of a new figure if None.
+
+    Raises
+    ------
+    InputError
+        If the grid is not one of poses, its slice has no width, or the height lies beyond it.
+    """
+    if workspace.grid.kind != "poses":
+        raise InputError("a map of tilts needs a workspace on a grid of poses, see pose_grid")
+    plane = workspace.plane(0, height)
+    if min(plane.grid.shape[1:]) < 2:
+        raise InputError("a map needs at least 2 values of tilt_x and of tilt_y")
+    colours = [to_rgba("white")] * (len(_FAMILIES) + 1)
+    colours[0] = to_rgba(_INSIDE)
+    colours[1:] = [to_rgba(colour) for colour in _REASON_COLOURS]
+    reason = plane.reason[0]
+    family = np.zeros(reason.shape, dtype=int)
+    for i, (_, bits) in reversed(list(enumerate(_FAMILIES))):  # the first family wins
+        family[(reason & np.uint16(bits)) != 0] = i + 1
+    _, x, y = (np.rad2deg(axis) for axis in plane.grid.axes)
+    with matplotlib.rc_context(_STYLE):
+        if axes is None:
+            axes = Figure(figsize=(6.4, 4.4), layout="constrained").add_subplot()
+        image = np.array(colours)[family]
+        half_x, half_y = (x[1] - x[0]) / 2, (y[1] - y[0]) / 2
+        axes.imshow(
+            np.swapaxes(image, 0, 1),
+            origin="lower",
+            extent=(x[0] - half_x, x[-1] + half_x, y[0] - half_y, y[-1] + half_y),
+            interpolation="nearest",
+        )
+        names = ["inside", *(name for name, _ in _FAMILIES)]
+        for i in np.unique(family):
+            axes.plot([], [], "s", color=colours[i], label=names[i])
+        axes.grid(visible=False)
+        axes.set_xlabel("tilt about x (°)")
+        axes.set_ylabel("tilt about y (°)")
+        axes.set_title(f"Tilts at $p_z$ = {1e3 * plane.grid.axes[0][0]:.5g} mm", loc="left")
+        axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1), frameon=False)
+        figure = axes.get_figure(root=True)
+        assert figure is not None  # axes of a figure have one
+    return figure
+
+
+def plot_comparison(rows: Sequence[PaperComparison], axes: Axes | None = None) -> Figure:
+    """Draw the reach in x and y over the base radius g beside what the paper states.
+
+    Parameters
+    ----------
+    rows
+        As `paper_comparison` returns them.
+    axes
+        To draw on; those of a new figure if None.
+    """
+    if len(rows) == 0:
+        raise InputError("there is nothing to compare: rows is empty")
+    radius = [1e3 * row.base_radius for row in rows]
+    with matplotlib.rc_context(_STYLE):
+        if axes is None:
+            axes = Figure(figsize=(6.4, 3.8), layout="constrained").add_subplot()
+        lines = (
+            ("greatest $|p_x|$", [1e3 * max(map(abs, row.x)) for row in rows], "-o"),
+            ("greatest $|p_y|$", [1e3 * max(map(abs, row.y)) for row in rows], "--s"),
+        )
+        for (label, values, style), colour in zip(lines, LEG_COLOURS, strict=False):
+            axes.plot(radius, values, style, color=colour, label=label)
+        axes.axhline(1e3 * rows[0].stated_reach, color="black", lw=1, ls=":", label="paper")
+        axes.set_xlabel("base radius g (mm)")
+        axes.set_ylabel("reach (mm)")
+        axes.set_ylim(bottom=0)
+        axes.set_title("Parasitic reach for 50 mm of leg stroke", loc="left")
+        axes.legend(loc="upper left", frameon=False)
+        figure = axes.get_figure(root=True)
+        assert figure is not None  # axes of a figure have one
+    return figure
+
+
+def _space(figure: Figure, place: tuple[int, int, int]) -> Axes3D:
+    axes = figure.add_subplot(*place, projection="3d")
+    assert isinstance(axes, Axes3D)  # what the projection "3d" makes
+    return axes
+
+
+def _label_space(axes: Axes3D, z_label: str = "$p_z$ (mm)", size: int = 9) -> None:
+    if size < 9:
+        axes.set_xlabel("x (mm)", fontsize=size)
+        axes.set_ylabel("y (mm)", fontsize=size)
+        axes.set_zlabel("z (mm)", fontsize=size)
+    else:
+        axes.set_xlabel("$p_x$ (mm)")
+        axes.set_ylabel("$p_y$ (mm)")
+        axes.set_zlabel(z_label)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(5 if size == 9 else 3))
+        axis.set_tick_params(labelsize=size)
+
+
+def _draw_robot(axes: Axes3D, base: Array, tips: Array) -> None:
+    axes.add_collection3d(Poly3DCollection([base], facecolor=(*to_rgba(_CYLINDER)[:3], 0.25)))
+    axes.add_collection3d(Poly3DCollection([tips], facecolor=(*to_rgba(_PLATFORM)[:3], 0.5)))
+    for leg, colour in enumerate(LEG_COLOURS):
+        axes.plot(*np.stack([base[leg], tips[leg]], axis=1), color=colour, lw=2)
+        axes.scatter(*tips[leg][:, None], color=colour, s=12)
+
+
+def _draw_cylinder(axes: Axes3D, radius: float, low: float, high: float) -> None:
+    turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, 73), [low, high])
+    axes.plot_surface(
+        radius * np.cos(turn), radius * np.sin(turn), height, color=_CYLINDER, alpha=0.25, lw=0
+    )
+    for end in (low, high):
+        x, y = radius * np.cos(turn[0]), radius * np.sin(turn[0])
+        axes.plot(x, y, np.full_like(x, end), color=_CYLINDER, lw=1)
+
+
+def _shaded(triangles: Array) -> Array:
+    """Return a colour for each triangle (n, 3, 3), lighter where it faces up and to the viewer.
+
+    Axes are scaled first, so that the light falls on what is drawn and not on slivers.
+    """
+    span = np.ptp(triangles.reshape(-1, 3), axis=0)
+    scaled = triangles / np.where(span > 0, span, 1.0)
+    normal = np.cross(scaled[:, 1] - scaled[:, 0], scaled[:, 2] - scaled[:, 0])
+    size = np.linalg.norm(normal, axis=1, keepdims=True)
+    light = (normal / np.where(size > 0, size, 1.0)) @ np.array([0.36, -0.48, 0.8])
+    brightness = 0.65 + 0.35 * light[:, None]
+    colour = np.array(to_rgba(_INSIDE)[:3])
+    rgb = np.clip(colour * brightness + (1 - brightness) * 0.1, 0.0, 1.0)
+    return np.concatenate([rgb, np.ones((len(rgb), 1))], axis=1)

@@ -1,0 +1,107 @@
+"""The figures of the workspace show the numbers they are given, with units on their axes."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+
+from rps_pin import RPSParameters, RPSRobot
+from rps_pin.errors import InputError
+from rps_pin.rps.workspace import Workspace, leg_grid, paper_comparison, pose_grid, workspace
+from rps_pin.workspace_plots import (
+    plot_assembly_modes,
+    plot_comparison,
+    plot_effective,
+    plot_reasons,
+    plot_space,
+    plot_theoretical,
+    plot_views,
+)
+
+
+@pytest.fixture(scope="module")
+def micro() -> RPSParameters:
+    return RPSParameters.from_preset("micro")
+
+
+@pytest.fixture(scope="module")
+def space(micro: RPSParameters) -> Workspace:
+    return workspace(micro, leg_grid(micro, 6))
+
+
+def test_views_show_every_inside_point_in_millimetres(space: Workspace) -> None:
+    figure = plot_views(space)
+    for axes, (i, j) in zip(figure.axes, [(0, 1), (0, 2), (1, 2)], strict=True):
+        x, y = axes.get_lines()[0].get_data()
+        assert np.array_equal(x, 1e3 * space.position[space.inside][:, i])
+        assert np.array_equal(y, 1e3 * space.position[space.inside][:, j])
+        assert "(mm)" in axes.get_xlabel() and "(mm)" in axes.get_ylabel()
+    empty = workspace(space.parameters, pose_grid([1.0], [0.0]))
+    with pytest.raises(InputError, match="nothing to draw"):
+        plot_views(empty)
+
+
+@pytest.mark.parametrize("plot", [plot_effective, plot_space])
+def test_surfaces_in_space_span_the_workspace(space: Workspace, plot: object) -> None:
+    figure = Figure()
+    assert plot(space, figure) is figure  # type: ignore[operator]
+    (axes,) = figure.axes
+    assert np.allclose(axes.get_zlim(), [200, 250], atol=3)
+    assert all("(mm)" in label() for label in (axes.get_xlabel, axes.get_ylabel, axes.get_zlabel))
+    figure.canvas.draw()
+
+
+def test_the_theoretical_cylinder_has_the_platforms_radius(micro: RPSParameters) -> None:
+    (axes,) = plot_theoretical(micro).axes
+    assert "120 mm" in axes.get_title()
+    ends = np.array(
+        [np.array(line.get_data_3d())[:, -1] for line in axes.get_lines() if line.get_lw() < 1]
+    )
+    assert np.allclose(np.hypot(ends[:, 0], ends[:, 1]), 120.0)
+
+
+def test_a_map_of_reasons_has_the_colour_of_each_tilt(micro: RPSParameters) -> None:
+    tilt = np.linspace(-0.3, 0.3, 13)
+    space = workspace(micro, pose_grid([0.21, 0.225], tilt))
+    (axes,) = plot_reasons(space, 0.225).axes
+    image = axes.get_images()[0].get_array()
+    blue = np.isclose(image, to_rgba("#0072B2")).all(axis=-1)
+    assert np.array_equal(blue.T, space.inside[1])
+    assert "225 mm" in axes.get_title(loc="left")
+    assert "(°)" in axes.get_xlabel()
+    with pytest.raises(InputError, match="poses"):
+        plot_reasons(workspace(micro, leg_grid(micro, 3)), 0.22)
+
+
+def test_assembly_modes_are_drawn_as_robots(micro: RPSParameters) -> None:
+    robot = RPSRobot(micro)
+    pose = np.array([[0.22, 0.1, 0.0], [0.23, 0.0, -0.1], [0.22, 0.0, 0.0]])
+    legs = robot.inverse_kinematics(pose)
+    position, rotation = robot.platform_placement(pose)
+    modes = SimpleNamespace(angle=legs.angle, position=position, rotation=rotation)
+    figure = plot_assembly_modes(micro, modes)
+    assert len(figure.axes) == 3
+    for k, axes in enumerate(figure.axes):
+        for leg, line in enumerate(axes.get_lines()):
+            base, tip = np.stack(line.get_data_3d(), axis=-1)
+            assert np.isclose(np.linalg.norm(tip - base), 1e3 * legs.length[k, leg])
+            assert np.isclose(np.linalg.norm(base), 120.0)
+    none = SimpleNamespace(angle=np.empty((0, 3)), position=position[:0], rotation=rotation[:0])
+    with pytest.raises(InputError, match="no assembly mode"):
+        plot_assembly_modes(micro, none)
+
+
+def test_the_comparison_is_drawn_beside_what_the_paper_states() -> None:
+    rows = paper_comparison(base_radii=(0.12, 0.24), points=6)
+    (axes,) = plot_comparison(rows).axes
+    along_x, along_y, stated = axes.get_lines()
+    assert np.allclose(along_x.get_xdata(), [120, 240])
+    assert np.allclose(along_x.get_ydata(), [-1e3 * row.x[0] for row in rows])
+    assert np.allclose(along_y.get_ydata(), [1e3 * row.y[1] for row in rows])
+    assert np.allclose(stated.get_ydata(), 2.5)
+    with pytest.raises(InputError):
+        plot_comparison([])
