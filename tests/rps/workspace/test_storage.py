@@ -9,6 +9,7 @@ import subprocess
 import sys
 import textwrap
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -309,7 +310,17 @@ def test_memory_does_not_grow_with_the_grid(micro: RPSParameters, tmp_path: Path
             ahead.append(computed - i)
             yield i
 
+    class Threads(ThreadPoolExecutor):
+        """In place of processes, whose calls could not be counted here."""
+
+        def __init__(self, workers: int, **_: object) -> None:
+            super().__init__(workers)
+
+        def shutdown(self, *, kill_workers: bool) -> None:
+            super().shutdown(cancel_futures=kill_workers)
+
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scale, "ProcessPoolExecutor", Threads)
         patch.setattr(scale, "BLOCK", 400)
         patch.setattr(scale.GridJob, "compute", counted)
         workspace_to_file(

@@ -88,7 +88,7 @@ def workspace(
 class GridJob:
     """A workspace to be computed block by block.
 
-    Arguments and errors are those of `workspace`. `compute` may be called by several threads.
+    Arguments and errors are those of `workspace`.
     """
 
     def __init__(

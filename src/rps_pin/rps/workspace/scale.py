@@ -5,13 +5,15 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import signal
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Future
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from loky import ProcessPoolExecutor
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
@@ -32,7 +34,18 @@ if TYPE_CHECKING:
 
 #: Blocks under way for each worker: enough to keep it busy while another is written.
 _AHEAD = 3
+#: Points from which starting processes (a second or two) pays.
+_WORTH_PROCESSES = 2_000_000
+#: The cores are shared out among processes: none of them shall take more than one.
+_ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
 STORED = ("reason", "pose", "conditioning", "transmission")
+
+
+class _Cast(NamedTuple):
+    """What of a block's fields the file keeps."""
+
+    fields: frozenset[str]
+    dtype: DType
 
 
 class WorkspaceCounts(NamedTuple):
@@ -75,7 +88,8 @@ def workspace_to_file(
     dtype
         ``"float32"`` keeps seven digits, 15 nm of 250 mm; ``"float64"`` is exact.
     workers
-        Threads; by default one for each core this process may use.
+        Processes; by default one for each core this process may use, or none of their own for
+        grids of less than two million points.
     overwrite
         Whether a file that exists is replaced.
     progress
@@ -90,6 +104,8 @@ def workspace_to_file(
     """
     job = GridJob(robot, grid, start=start, min_conditioning=min_conditioning)
     count = checked_workers(workers)
+    if workers is None and job.grid.size < _WORTH_PROCESSES:
+        count = 1
     names = checked_fields(fields)
     size = bytes_per_point(names, dtype)
     with new_workspace_file(
@@ -105,7 +121,8 @@ def workspace_to_file(
         _refuse_full_disk(Path(path), size * job.grid.size)
         tally = np.zeros(1 << len(Reason), dtype=np.int64)
         blocks = job.grid.blocks(BLOCK)
-        for block, values in _computed(job.compute, blocks, count, progress):
+        cast = _Cast(frozenset((*names, "reason")), dtype)
+        for block, values in _computed(job, blocks, cast, count, progress):
             file.write(block, values)
             tally += np.bincount(values.reason.ravel(), minlength=len(tally))
     codes = np.arange(len(tally))
@@ -115,7 +132,7 @@ def workspace_to_file(
 
 
 def checked_workers(workers: int | None) -> int:
-    """Return the number of threads to use: as given, or the cores this process may run on."""
+    """Return the number of processes to use: as given, or the cores this process may run on."""
     if workers is None:
         affinity = getattr(os, "sched_getaffinity", None)  # Linux only
         return len(affinity(0)) if affinity else os.cpu_count() or 1
@@ -125,19 +142,46 @@ def checked_workers(workers: int | None) -> int:
 
 
 def _computed(
-    compute: Callable[[Block], Fields], blocks: list[Block], workers: int, progress: Progress
+    job: GridJob,
+    blocks: list[Block],
+    cast: _Cast,
+    workers: int,
+    progress: Progress,
 ) -> Iterable[tuple[Block, Fields]]:
-    """Compute blocks in threads, NumPy leaving Python's lock, and give them back in order."""
-    pool = ThreadPoolExecutor(workers)
+    """Compute blocks, in processes if there are several workers, and give them back in order."""
+    if workers == 1:
+        for i in progress(range(len(blocks))):
+            yield blocks[i], job.compute(blocks[i])
+        return
+    pool = ProcessPoolExecutor(workers, initializer=_ignore_interrupts, env=_ONE_THREAD)
     pending: deque[Future[Fields]] = deque()
+    done = False
     try:
         ahead = iter(blocks)
         for i in progress(range(len(blocks))):
             while len(pending) < _AHEAD * workers and (block := next(ahead, None)) is not None:
-                pending.append(pool.submit(compute, block))
+                pending.append(pool.submit(_cast_block, job, block, cast))
             yield blocks[i], pending.popleft().result()
+        done = True
     finally:
-        pool.shutdown(cancel_futures=True)
+        pool.shutdown(kill_workers=not done)
+
+
+def _cast_block(job: GridJob, block: Block, cast: _Cast) -> Fields:
+    """Return a block's fields as the file will hold them: only that goes between processes."""
+    fields = job.compute(block)
+    kept = {
+        name: (value if name == "reason" else value.astype(cast.dtype))
+        if name in cast.fields
+        else value[:0]
+        for name, value in fields._asdict().items()
+    }
+    return Fields(**kept)
+
+
+def _ignore_interrupts() -> None:
+    """Leave Ctrl-C to the process that waits for the workers: it ends them."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _refuse_full_disk(path: Path, size: int) -> None:
