@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from rps_pin.cli.console import RobotOption, load_robot
-from rps_pin.cli.helix import (
+from rps_pin.cli.helix_options import (
     DEFAULT_HEIGHT,
     DEFAULT_PITCH,
     DEFAULT_RADIUS,
@@ -20,10 +20,11 @@ from rps_pin.cli.helix import (
     HeightOption,
     PitchOption,
     RadiusOption,
+    chosen_helix,
 )
 from rps_pin.rps.path_check import check_path
 from rps_pin.rps.path_events import LimitEvent, SingularityEvent
-from rps_pin.trajectories.helix import PAPER_DURATION, helix
+from rps_pin.trajectories.helix import PAPER_DURATION
 
 
 def check_command(
@@ -56,14 +57,7 @@ def check_command(
     - `rps-pin check --radius 0.075 --pitch 0.05 --branch -` crosses none
     """
     machine = load_robot(robot)
-    path = helix(
-        machine,
-        radius=radius,
-        pitch=pitch,
-        height=height,
-        branch=branch.value,
-        duration=duration,
-    )
+    path = chosen_helix(machine, radius, pitch, height, branch, duration)
     found = check_path(machine, path, threshold=threshold)
     if as_json:
         answer = found._asdict() | {

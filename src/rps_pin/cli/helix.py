@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -13,33 +12,22 @@ from rich.progress import track
 from rich.table import Table
 
 from rps_pin.cli.console import RobotOption, load_robot
+from rps_pin.cli.helix_options import (
+    DEFAULT_HEIGHT,
+    DEFAULT_PITCH,
+    DEFAULT_RADIUS,
+    Branch,
+    BranchOption,
+    DurationOption,
+    HeightOption,
+    PitchOption,
+    RadiusOption,
+    chosen_helix,
+)
 from rps_pin.rps.motion_csv import write_csv
 from rps_pin.rps.motion_run import ActuatorSummary, MotionRun, MotionSummary, run_motion, summarise
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.trajectories.helix import PAPER_DURATION, HelixPath, helix
-
-DEFAULT_RADIUS = 0.75e-3
-DEFAULT_PITCH = 0.5e-3
-DEFAULT_HEIGHT = 0.4
-
-
-class Branch(StrEnum):
-    """The two tilts that carry the centre along the same helix."""
-
-    PLUS = "+"
-    MINUS = "-"
-
-
-RadiusOption = Annotated[float, typer.Option(help="Radius r_h of the helix, m.")]
-PitchOption = Annotated[float, typer.Option(help="Pitch p_h: the climb in its one turn, m.")]
-HeightOption = Annotated[float, typer.Option(help="Height z_0 of the platform at the start, m.")]
-BranchOption = Annotated[
-    Branch,
-    typer.Option(help="Which tilt: **+** the paper's (alpha, beta), **-** its (alpha, -beta)."),
-]
-DurationOption = Annotated[
-    float, typer.Option(help="Duration, s. Eq. 29 as corrected lasts 5.2388 s.")
-]
+from rps_pin.trajectories.helix import PAPER_DURATION, HelixPath
 
 
 def helix_command(
@@ -80,14 +68,7 @@ def helix_command(
     Exit status: 0 done; 1 the robot cannot do it (why is said); 2 wrong usage.
     """
     machine = load_robot(robot)
-    path = helix(
-        machine,
-        radius=radius,
-        pitch=pitch,
-        height=height,
-        branch=branch.value,
-        duration=duration,
-    )
+    path = chosen_helix(machine, radius, pitch, height, branch, duration)
     console = Console(quiet=as_json)
     run = run_motion(
         machine,

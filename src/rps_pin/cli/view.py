@@ -9,7 +9,7 @@ import typer
 from numpy.typing import NDArray
 
 from rps_pin.cli.console import RobotOption, load_robot
-from rps_pin.cli.helix import (
+from rps_pin.cli.helix_options import (
     DEFAULT_HEIGHT,
     DEFAULT_PITCH,
     DEFAULT_RADIUS,
@@ -19,10 +19,11 @@ from rps_pin.cli.helix import (
     HeightOption,
     PitchOption,
     RadiusOption,
+    chosen_helix,
 )
 from rps_pin.rps.motion_run import sample_times
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.trajectories.helix import PAPER_DURATION, helix
+from rps_pin.trajectories.helix import PAPER_DURATION
 from rps_pin.trajectories.path import Trajectory
 
 _SAMPLE_RATE = 100.0
@@ -62,14 +63,7 @@ def view_command(
 
     machine = load_robot(robot)
     if pose is None:
-        path = helix(
-            machine,
-            radius=radius,
-            pitch=pitch,
-            height=height,
-            branch=branch.value,
-            duration=duration,
-        )
+        path = chosen_helix(machine, radius, pitch, height, branch, duration)
         times, configurations = _motion(machine, path)
     else:
         times, configurations = np.zeros(1), machine.state(pose, np.zeros(3), np.zeros(3))[0][None]
