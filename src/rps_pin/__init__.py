@@ -2,7 +2,13 @@
 
 from importlib.metadata import version
 
-from rps_pin.closed_loop import ClosedLoopModel, InverseDynamics, LoopClosure
+from rps_pin.closed_loop import (
+    ClosedLoopModel,
+    InverseDynamics,
+    JointCoupling,
+    JointEffects,
+    LoopClosure,
+)
 from rps_pin.errors import (
     ClosureError,
     InputError,
@@ -22,6 +28,8 @@ __all__ = [
     "ClosureError",
     "InputError",
     "InverseDynamics",
+    "JointCoupling",
+    "JointEffects",
     "LoopClosure",
     "MechanismError",
     "ParameterError",

@@ -5,12 +5,14 @@ The gaps e(q) are brought to zero by the Levenberg-Marquardt method on the confi
     dq = - J' (J J' + mu I)^-1 e,
 
 in coordinates scaled to one unit. Every step is the smallest that does its work; mu falls to zero
-as the loops close, so that the last steps are Newton's and the answer is closed to rounding.
+as the loops close, so that the last steps are Newton's and the answer is closed to rounding. Joints
+that a step would drive through a limit are held there, and the step is found anew without them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,16 @@ _LARGEST_DAMPING = 1e8
 _SMALLEST_STEP = 1e-15
 
 
+class Box(Protocol):
+    """Limits that the configuration stays within; see `limits.JointLimits`."""
+
+    def clip(self, q: Array) -> Array:
+        """Return q brought within the limits."""
+
+    def blocked(self, q: Array, step: Array) -> NDArray[np.bool_]:
+        """Return which entries of a step would leave the limits at once."""
+
+
 def close_gaps(
     guess: Array,
     gaps: Callable[[Array], Array],
@@ -29,13 +41,16 @@ def close_gaps(
     integrate: Callable[[Array, Array], Array],
     tolerance: float,
     iterations: int = 200,
+    *,
+    held: NDArray[np.bool_] | None = None,
+    box: Box | None = None,
 ) -> Array:
     """Return the configuration that Levenberg-Marquardt steps from a guess end in.
 
     Parameters
     ----------
     guess
-        Configuration to start from, shape (nq,).
+        Configuration to start from, shape (nq,); within the box.
     gaps
         e(q), shape (nc,), in one unit.
     jacobian
@@ -46,6 +61,10 @@ def close_gaps(
         The steps end once they no longer reduce a gap norm below this.
     iterations
         At most so many steps.
+    held
+        Velocities that stay zero, shape (nv,); none if left out.
+    box
+        Limits to stay within; none if left out.
 
     Returns
     -------
@@ -55,12 +74,12 @@ def close_gaps(
     """
     q, error, damping = guess, gaps(guess), _FIRST_DAMPING
     for _ in range(iterations):
-        left, values, right = np.linalg.svd(jacobian(q), full_matrices=False)
-        along = left.T @ error
         size = float(np.linalg.norm(error))
+        step_for = _Steps(jacobian(q), error, q, held, box)
         while True:
-            step = -right.T @ (_filter(values, damping * size) * along)
+            step = step_for(damping * size)
             candidate = integrate(q, step)
+            candidate = candidate if box is None else box.clip(candidate)
             candidate_error = gaps(candidate)
             if np.linalg.norm(candidate_error) < size:
                 break
@@ -73,6 +92,44 @@ def close_gaps(
         if not error.any():
             return q
     return q
+
+
+class _Steps:
+    """The steps from one configuration, of any damping."""
+
+    def __init__(
+        self,
+        jacobian: Array,
+        error: Array,
+        q: Array,
+        held: NDArray[np.bool_] | None,
+        box: Box | None,
+    ) -> None:
+        self._jacobian, self._error, self._q, self._box = jacobian, error, q, box
+        self._held = np.zeros(jacobian.shape[1], dtype=bool) if held is None else held.copy()
+        self._factorise()
+
+    def __call__(self, damping: float) -> Array:
+        step = self._free_step(damping)
+        while self._box is not None:
+            blocked = self._box.blocked(self._q, step) & ~self._held
+            if not blocked.any():
+                break
+            self._held |= blocked
+            self._factorise()
+            step = self._free_step(damping)
+        return step
+
+    def _factorise(self) -> None:
+        left, self._values, self._right = np.linalg.svd(
+            np.where(self._held, 0.0, self._jacobian), full_matrices=False
+        )
+        self._along = left.T @ self._error
+
+    def _free_step(self, damping: float) -> Array:
+        step: Array = -self._right.T @ (_filter(self._values, damping) * self._along)
+        step[self._held] = 0.0
+        return step
 
 
 def _filter(values: Array, damping: float) -> Array:

@@ -1,27 +1,58 @@
-"""Loop closures: what holds two frames of an open tree together.
+"""Loop closures: what holds two frames, or two joints, of an open tree together.
 
-Each closure is one Pinocchio constraint model. With frames a and b it demands
+A `LoopClosure` joins frame a and frame b by a joint that has no coordinates of its own. It takes
+away some of b's freedom to move relative to a, a row each:
 
-- ``spherical`` (3 rows): the two origins coincide, p_a - p_b = 0;
-- ``rigid`` (6 rows): the two frames coincide, in position and in orientation.
+=================  ====  ==========================================================================
+kind               rows  demands
+=================  ====  ==========================================================================
+``spherical``      3     the origins coincide
+``rigid``          6     the frames coincide
+``revolute``       5     the origins coincide, and the axes
+``prismatic``      5     b's origin lies on a's axis, and the frames are parallel
+``cylindrical``    4     b's origin lies on a's axis, and the axes are parallel
+``universal``      4     the origins coincide, and a's axis is perpendicular to b's
+``planar``         3     b's origin lies in the plane through a's, and the normals are parallel
+``point_on_line``  2     b's origin lies on a's axis
+``point_on_plane`` 1     b's origin lies in the plane through a's origin, across a's axis
+``distance``       1     the origins are a given distance apart (a rod with a ball at each end)
+=================  ====  ==========================================================================
 
-Rows are written in *world* axes at frame a's origin (linear first, then angular), so that the
-constraint forces read as the force (N), and moment (N m), that b's side exerts on a's side there.
+A `JointCoupling` (1 row) ties two joints' coordinates, as a gear or a parallelogram does.
+
+Each closure of frames is built on one Pinocchio constraint model, of a point (``spherical``) or
+of a whole frame (all others), of which it keeps some combinations of rows; see `closure_rows`.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import pinocchio as pin
 
 from rps_pin.errors import MechanismError
 
-Kind = Literal["spherical", "rigid"]
+Kind = Literal[
+    "spherical",
+    "rigid",
+    "revolute",
+    "prismatic",
+    "cylindrical",
+    "universal",
+    "planar",
+    "point_on_line",
+    "point_on_plane",
+    "distance",
+]
+Vector = tuple[float, float, float]
 
-_ROWS = {"spherical": 3, "rigid": 6}
-_CONTACT = {"spherical": pin.ContactType.CONTACT_3D, "rigid": pin.ContactType.CONTACT_6D}
+KINDS: tuple[Kind, ...] = get_args(Kind)
+_ROWS = dict(zip(KINDS, (3, 6, 5, 5, 4, 4, 3, 2, 1, 1), strict=True))
+_WITHOUT_AXIS = ("spherical", "rigid", "distance")
+_WITH_AXIS_OF_B = ("revolute", "cylindrical", "universal", "planar")
 
 
 @dataclass(frozen=True)
@@ -31,30 +62,88 @@ class LoopClosure:
     Parameters
     ----------
     frame_a, frame_b
-        Names of frames of the model (links or joints of its URDF). ``"universe"`` is the world.
+        Names of frames of the model (links or joints of its file). ``"universe"`` is the world.
     kind
-        ``"spherical"`` or ``"rigid"``; see the module's text for their rows.
+        One of the kinds in the module's table.
     name
         For messages and for `ClosedLoopModel.rows`; ``"frame_a = frame_b"`` if left out.
+    axis
+        Direction fixed in frame a, in its coordinates, of any length: axis of a revolute,
+        prismatic or cylindrical closure, first axis of a universal one, the line's direction, or
+        the plane's normal. Left out: z, or x for a universal closure.
+    axis_b
+        Direction fixed in frame b, in its coordinates, that ``revolute``, ``cylindrical`` and
+        ``planar`` hold parallel to `axis` (pointing the same way), and ``universal`` perpendicular
+        to it. Left out: as `axis`, or y for a universal closure.
+    distance
+        Length of the rod of a ``distance`` closure, m; positive.
 
     Raises
     ------
     MechanismError
-        If the kind is unknown, or a frame is joined to itself.
+        If the kind is unknown, a frame is joined to itself, an axis has no direction, or an option
+        does not belong to the kind.
     """
 
     frame_a: str
     frame_b: str
     kind: Kind = "spherical"
     name: str = ""
+    axis: Sequence[float] | None = None
+    axis_b: Sequence[float] | None = None
+    distance: float | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in _ROWS:
-            raise MechanismError(f"no closure kind {self.kind!r}; there are: {', '.join(_ROWS)}")
-        if self.frame_a == self.frame_b:
-            raise MechanismError(f"a closure cannot join frame {self.frame_a!r} to itself")
+            raise MechanismError(f"no closure kind {self.kind!r}; there are: {', '.join(KINDS)}")
         if not self.name:
             object.__setattr__(self, "name", f"{self.frame_a} = {self.frame_b}")
+        if self.frame_a == self.frame_b:
+            raise MechanismError(f"a closure cannot join frame {self.frame_a!r} to itself")
+        universal = self.kind == "universal"
+        axis = self._direction("axis", (1.0, 0.0, 0.0) if universal else (0.0, 0.0, 1.0))
+        object.__setattr__(self, "axis", None if self.kind in _WITHOUT_AXIS else axis)
+        axis_b = self._direction("axis_b", (0.0, 1.0, 0.0) if universal else axis)
+        object.__setattr__(self, "axis_b", axis_b if self.kind in _WITH_AXIS_OF_B else None)
+        self._check_distance()
+
+    def _direction(self, option: str, default: Vector) -> Vector:
+        """Return an axis as a unit vector, or say what is wrong with it."""
+        given = getattr(self, option)
+        if given is None:
+            return default
+        with_axis = tuple(kind for kind in KINDS if kind not in _WITHOUT_AXIS)
+        taken = with_axis if option == "axis" else _WITH_AXIS_OF_B
+        if self.kind not in taken:
+            raise MechanismError(
+                f"closure {self.name!r}: {option} does not belong to kind {self.kind!r}, only to "
+                f"{', '.join(taken)}"
+            )
+        try:
+            x, y, z = (float(part) for part in given)
+        except (TypeError, ValueError):
+            raise MechanismError(
+                f"closure {self.name!r}: {option} = {given!r} must be three numbers"
+            ) from None
+        length = math.hypot(x, y, z)
+        if not 0 < length < math.inf:
+            raise MechanismError(f"closure {self.name!r}: {option} = {given!r} has no direction")
+        return x / length, y / length, z / length
+
+    def _check_distance(self) -> None:
+        given = self.distance
+        if self.kind != "distance":
+            if given is not None:
+                raise MechanismError(
+                    f"closure {self.name!r}: a distance belongs to kind 'distance' only, not to "
+                    f"{self.kind!r}"
+                )
+            return
+        if not isinstance(given, (int, float)) or not 0 < given < math.inf:
+            raise MechanismError(
+                f"closure {self.name!r}: distance = {given!r}; it must be a positive length in m"
+            )
+        object.__setattr__(self, "distance", float(given))
 
     @property
     def size(self) -> int:
@@ -72,19 +161,94 @@ class LoopClosure:
         return frame_id(model, self.frame_a, self.name), frame_id(model, self.frame_b, self.name)
 
     def constraint_model(self, model: pin.Model) -> Any:
-        """Return the Pinocchio constraint model of this closure in `model`."""
+        """Return the Pinocchio constraint model of this closure in `model`.
+
+        A point in world axes (``spherical``), or a frame: in world axes at a's origin (``rigid``)
+        or in frame a (the others).
+        """
         a, b = (model.frames[i] for i in self.frame_ids(model))
+        world = self.kind in ("spherical", "rigid")
         constraint = pin.RigidConstraintModel(
-            _CONTACT[self.kind],
+            pin.ContactType.CONTACT_3D if self.kind == "spherical" else pin.ContactType.CONTACT_6D,
             model,
             a.parentJoint,
             a.placement,
             b.parentJoint,
             b.placement,
-            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED if world else pin.ReferenceFrame.LOCAL,
         )
         constraint.name = self.name
         return constraint
+
+
+@dataclass(frozen=True)
+class JointCoupling:
+    """Two joints whose coordinates stay in proportion: q_joint = ratio * q_other + offset.
+
+    Its row is q_joint - ratio q_other - offset = 0; its force is the generalised force (N or N m)
+    that the coupling exerts on `joint`.
+
+    Parameters
+    ----------
+    joint, other
+        Names of two joints of one coordinate each.
+    ratio
+        rad/rad, m/m, or m/rad where the two differ; not zero.
+    offset
+        rad or m.
+    name
+        For messages and for `ClosedLoopModel.rows`; ``"joint = other"`` if left out.
+
+    Raises
+    ------
+    MechanismError
+        If a joint is coupled to itself, the ratio is zero, or a number is not finite.
+    """
+
+    joint: str
+    other: str
+    ratio: float = 1.0
+    offset: float = 0.0
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if self.joint == self.other:
+            raise MechanismError(f"a coupling cannot tie joint {self.joint!r} to itself")
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.joint} = {self.other}")
+        for option in ("ratio", "offset"):
+            value = getattr(self, option)
+            if not isinstance(value, (int, float)) or not math.isfinite(value):
+                raise MechanismError(f"coupling {self.name!r}: {option} = {value!r} must be finite")
+        if self.ratio == 0:
+            raise MechanismError(f"coupling {self.name!r}: a ratio of 0 couples nothing")
+
+    @property
+    def size(self) -> int:
+        """Number of constraint rows."""
+        return 1
+
+    def joint_ids(self, model: pin.Model) -> tuple[int, int]:
+        """Return the indices of the two joints in a model.
+
+        Raises
+        ------
+        MechanismError
+            If a joint is unknown (lists those there are), or has not exactly one coordinate.
+        """
+        return self._joint_id(model, self.joint), self._joint_id(model, self.other)
+
+    def _joint_id(self, model: pin.Model, name: str) -> int:
+        simple = [n for n, j in zip(model.names, model.joints, strict=True) if j.nq == j.nv == 1]
+        if name not in simple:
+            raise MechanismError(
+                f"coupling {self.name!r}: no joint {name!r} of one coordinate; there are: "
+                f"{', '.join(simple)}"
+            )
+        return int(model.getJointId(name))
+
+
+Closure = LoopClosure | JointCoupling
 
 
 def frame_id(model: pin.Model, name: str, closure: str) -> int:

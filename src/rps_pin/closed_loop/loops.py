@@ -1,22 +1,28 @@
 """The loops of a tree: how far open they are, and how they change with the joints.
 
 With e(q) the gaps of all closures, one below the other, J v is their rate (in the rows that
-`closure` describes) and J a + J' v their acceleration, J' being the derivative of J.
+`closure_rows` describes) and J a + J' v their acceleration, J' being the derivative of J.
+
+Rows of spherical and rigid closures are in *world* axes at frame a's origin, those of the other
+kinds in *frame a's* axes at its origin; forces come before moments.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from rps_pin.closed_loop.closure import LoopClosure
+from rps_pin.closed_loop.closure import Closure, JointCoupling, LoopClosure
+from rps_pin.closed_loop.closure_rows import Rows, rows_of
 from rps_pin.errors import InputError, MechanismError
 
 Array = NDArray[np.float64]
+
+_WORLD_AXES = ("spherical", "rigid")
 
 
 class LoopErrors(NamedTuple):
@@ -29,6 +35,31 @@ class LoopErrors(NamedTuple):
     acceleration: Array
     """Their second derivatives, shape (nc,), m/s^2 and rad/s^2; for angular rows the difference of
     the frames' angular accelerations, which is that where their angular velocities agree."""
+
+
+class _Coupled(NamedTuple):
+    """Where a coupling's coordinates stand."""
+
+    q: tuple[int, int]
+    v: tuple[int, int]
+    ratio: float
+    offset: float
+
+
+class ClosedFrames(NamedTuple):
+    """A closure of two frames among the loops."""
+
+    closure: LoopClosure
+    rows: slice
+    """Its rows in J."""
+    frame_a: int
+    frame_b: int
+    kept: Rows
+    """Its rows in frame a's axes."""
+    in_world: bool
+    """Whether its rows in J are turned to world axes."""
+    constraint_data: Any
+    """Pinocchio's; holds ``oMc1`` and ``c1Mc2`` once J is computed."""
 
 
 class Loops:
@@ -54,11 +85,15 @@ class Loops:
         the length as their lever, angular velocities are those of a point at that lever.
     data, calls, constraints, constraint_data
         For calling Pinocchio: `getConstraintsJacobian` reads what each of the `calls` refreshes.
+    plain : bool
+        Whether what it returns is J already; `kept_rows` makes J of it otherwise.
+    closed_frames : list of ClosedFrames
+        The closures of frames; the rest are couplings.
 
     Raises
     ------
     MechanismError
-        If a frame is unknown, or two closures have one name.
+        If a frame or joint is unknown, or two closures have one name.
     InputError
         If the characteristic length is not positive.
     """
@@ -66,31 +101,71 @@ class Loops:
     def __init__(
         self,
         model: pin.Model,
-        closures: Sequence[LoopClosure],
+        closures: Sequence[Closure],
         characteristic_length: float | None = None,
     ) -> None:
         self.model = model
         self.closures = tuple(closures)
         refuse_twice("closure", [closure.name for closure in self.closures])
         self.size = sum(closure.size for closure in self.closures)
-        self.frames = [closure.frame_ids(model) for closure in self.closures]
         self.data = model.createData()
+        self._still = np.zeros(model.nv)
         self.constraints = pin.StdVec_RigidConstraintModel()
         self.constraint_data = pin.StdVec_RigidConstraintData()
-        for closure in self.closures:
-            constraint = closure.constraint_model(model)
-            self.constraints.append(constraint)
-            self.constraint_data.append(constraint.createData())
+        self.closed_frames: list[ClosedFrames] = []
+        self.couplings: list[tuple[int, _Coupled]] = []
+        self._add_couplings()
+        self._add_constraints()
         # Iterating a StdVec makes new Python objects each time; kept pairs cost a tenth.
         self.calls = [
             (constraint.calc, data)
             for constraint, data in zip(self.constraints, self.constraint_data, strict=True)
         ]
+        self._add_frames()
+        self.plain = bool(self.closed_frames) and not self.couplings
+        self.plain = self.plain and all(frames.in_world for frames in self.closed_frames)
         self.length = self._length(characteristic_length)
-        self.row_scale = np.concatenate(
-            [np.zeros(0)] + [np.repeat([1.0, self.length], 3)[: c.size] for c in self.closures]
-        )
-        self.column_scale = np.where(self._is_angular(), 1 / self.length, 1.0)
+        angular = self._is_angular()
+        self.column_scale = np.where(angular, 1 / self.length, 1.0)
+        self.angular_rows = np.zeros(self.size, dtype=bool)
+        for frames in self.closed_frames:
+            self.angular_rows[frames.rows] = frames.kept.angular
+        for row, coupled in self.couplings:
+            self.angular_rows[row] = angular[coupled.v[0]]
+        self.row_scale = np.where(self.angular_rows, self.length, 1.0)
+
+    def _add_couplings(self) -> None:
+        for closure in self.closures:
+            if isinstance(closure, JointCoupling):
+                joints = [self.model.joints[index] for index in closure.joint_ids(self.model)]
+                coupled = _Coupled(
+                    (joints[0].idx_q, joints[1].idx_q),
+                    (joints[0].idx_v, joints[1].idx_v),
+                    closure.ratio,
+                    closure.offset,
+                )
+                self.couplings.append((self.rows(closure.name).start, coupled))
+
+    def _add_constraints(self) -> None:
+        for closure in self.closures:
+            if isinstance(closure, LoopClosure):
+                constraint = closure.constraint_model(self.model)
+                self.constraints.append(constraint)
+                self.constraint_data.append(constraint.createData())
+
+    def _add_frames(self) -> None:
+        closures = [closure for closure in self.closures if isinstance(closure, LoopClosure)]
+        for closure, (_, data) in zip(closures, self.calls, strict=True):
+            self.closed_frames.append(
+                ClosedFrames(
+                    closure,
+                    self.rows(closure.name),
+                    *closure.frame_ids(self.model),
+                    rows_of(closure),
+                    closure.kind in _WORLD_AXES,
+                    data,
+                )
+            )
 
     def rows(self, closure: str) -> slice:
         """Return the rows of a closure by its name, or say which there are."""
@@ -108,51 +183,141 @@ class Loops:
         pin.computeJointJacobians(model, data, q)
         for calc, constraint_data in self.calls:
             calc(model, data, constraint_data)
-        jacobian: Array = pin.getConstraintsJacobian(
-            model, data, self.constraints, self.constraint_data
+        return self.kept_rows(
+            pin.getConstraintsJacobian(model, data, self.constraints, self.constraint_data)
         )
-        return jacobian.reshape(self.size, model.nv)  # a single row or column comes flat
+
+    def kept_rows(self, jacobian: Array) -> Array:
+        """Return J, shape (nc, nv), of what Pinocchio's `getConstraintsJacobian` returned."""
+        if self.plain:
+            return jacobian.reshape(self.size, self.model.nv)  # a single row or column comes flat
+        rows = np.zeros((self.size, self.model.nv))
+        whole = jacobian.reshape(-1, self.model.nv)
+        start = 0
+        for frames in self.closed_frames:
+            stop = start + (3 if frames.closure.kind == "spherical" else 6)
+            block = whole[start:stop]
+            rows[frames.rows] = (
+                block
+                if frames.in_world
+                else frames.kept.wrenches(frames.constraint_data.c1Mc2) @ block
+            )
+            start = stop
+        for row, coupled in self.couplings:
+            rows[row, coupled.v[0]], rows[row, coupled.v[1]] = 1.0, -coupled.ratio
+        return rows
 
     def gaps(self, q: Array) -> Array:
         """Return e(q), shape (nc,), m and rad."""
         pin.framesForwardKinematics(self.model, self.data, q)
         placements = self.data.oMf
-        return np.concatenate(
-            [np.zeros(0)]
-            + [
-                _gap(closure, placements[a], placements[b])
-                for closure, (a, b) in zip(self.closures, self.frames, strict=True)
-            ]
-        )
+        gaps = np.empty(self.size)
+        for frames in self.closed_frames:
+            a, b = placements[frames.frame_a], placements[frames.frame_b]
+            gap = frames.kept.gap(a.actInv(b))
+            if frames.in_world:
+                gap = (gap.reshape(-1, 3) @ a.rotation.T).ravel()
+            gaps[frames.rows] = gap
+        for row, (at, _, ratio, offset) in self.couplings:
+            gaps[row] = q[at[0]] - ratio * q[at[1]] - offset
+        return gaps
 
     def errors(self, q: Array, v: Array, a: Array) -> LoopErrors:
         """Return gaps, their rates and their accelerations."""
-        model, data = self.model, self.data
         gaps = self.gaps(q)
-        pin.forwardKinematics(model, data, q, v, a)
-        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        rates, accelerations = [np.zeros(0)], [np.zeros(0)]
-        for closure, (frame_a, frame_b) in zip(self.closures, self.frames, strict=True):
-            rate = pin.getFrameVelocity(model, data, frame_a, axes) - pin.getFrameVelocity(
-                model, data, frame_b, axes
+        pin.forwardKinematics(self.model, self.data, q, v, a)
+        rates, accelerations = np.empty(self.size), np.empty(self.size)
+        for frames in self.closed_frames:
+            rates[frames.rows], accelerations[frames.rows] = (
+                self._world_motion(frames) if frames.in_world else self._kept_motion(frames)
             )
-            acceleration = pin.getFrameClassicalAcceleration(
-                model, data, frame_a, axes
-            ) - pin.getFrameClassicalAcceleration(model, data, frame_b, axes)
-            rates.append(rate.vector[: closure.size])
-            accelerations.append(acceleration.vector[: closure.size])
-        return LoopErrors(gaps, np.concatenate(rates), np.concatenate(accelerations))
+        for row, (_, at, ratio, _) in self.couplings:
+            rates[row] = v[at[0]] - ratio * v[at[1]]
+            accelerations[row] = a[at[0]] - ratio * a[at[1]]
+        return LoopErrors(gaps, rates, accelerations)
+
+    def drift(self, q: Array, v: Array) -> Array:
+        """Return J' v, shape (nc,): what J a must cancel for the loops to stay closed.
+
+        This is the derivative of J itself, also where the loops are open.
+        """
+        pin.forwardKinematics(self.model, self.data, q, v, self._still)
+        drift = np.zeros(self.size)
+        for frames in self.closed_frames:
+            drift[frames.rows] = (
+                self._world_acceleration(frames)
+                if frames.closure.kind == "spherical"
+                else self._kept_motion(frames)[1]
+            )
+        return drift
 
     def worst(self, gaps: Array) -> tuple[float, str]:
         """Return the largest gap (m; angles with the length as lever) and its closure's name."""
         worst, name = 0.0, ""
         scaled = self.row_scale * gaps
         for closure in self.closures:
-            own = scaled[self.rows(closure.name)]
-            gap = float(max(np.linalg.norm(own[:3]), np.linalg.norm(own[3:])))
+            rows = self.rows(closure.name)
+            own, angular = scaled[rows], self.angular_rows[rows]
+            gap = float(max(np.linalg.norm(own[~angular]), np.linalg.norm(own[angular])))
             if not gap <= worst:
                 worst, name = gap, closure.name
         return worst, name
+
+    def _world_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
+        """Return velocity and acceleration of a less those of b, each frame's at its own origin."""
+        axes, size = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, frames.closure.size
+        a, b = (
+            pin.getFrameVelocity(self.model, self.data, frame, axes)
+            for frame in (frames.frame_a, frames.frame_b)
+        )
+        return (a - b).vector[:size], self._world_acceleration(frames)
+
+    def _world_acceleration(self, frames: ClosedFrames) -> Array:
+        axes, size = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, frames.closure.size
+        a, b = (
+            pin.getFrameClassicalAcceleration(self.model, self.data, frame, axes)
+            for frame in (frames.frame_a, frames.frame_b)
+        )
+        acceleration: Array = (a - b).vector[:size]
+        return acceleration
+
+    def _kept_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
+        """Return J v and its derivative, J made of W and the twist X of a relative to b.
+
+        They are W X and W A + W' X; turned to world axes by R, R (W X)' + R (w x W X).
+        """
+        placement, twist, acceleration, twist_a = self.relative_motion(frames)
+        wrenches = frames.kept.wrenches(placement)
+        slope = -frames.kept.slope(placement) @ twist  # W': b moves by -X relative to a
+        rate, bend = wrenches @ twist, wrenches @ acceleration + slope @ twist
+        if not frames.in_world:
+            return rate, bend
+        frame = self.model.frames[frames.frame_a]
+        turn = self.data.oMi[frame.parentJoint].rotation @ frame.placement.rotation
+        rate, bend = rate.reshape(-1, 3), bend.reshape(-1, 3)
+        bend = bend + np.cross(twist_a.angular, rate)
+        return (rate @ turn.T).ravel(), (bend @ turn.T).ravel()
+
+    def relative_motion(self, frames: ClosedFrames) -> tuple[pin.SE3, Array, Array, pin.Motion]:
+        """Return b's placement in a, a's twist X relative to b, its derivative A, and a's twist.
+
+        In a's axes at its origin, after a `forwardKinematics` with velocities and accelerations.
+        """
+        model, data = self.model, self.data
+        own = pin.ReferenceFrame.LOCAL
+        placement_a, placement_b = (
+            data.oMi[model.frames[frame].parentJoint] * model.frames[frame].placement
+            for frame in (frames.frame_a, frames.frame_b)
+        )
+        placement = placement_a.actInv(placement_b)
+        twist_a = pin.getFrameVelocity(model, data, frames.frame_a, own)
+        twist_b = placement.act(pin.getFrameVelocity(model, data, frames.frame_b, own))
+        twist = twist_a - twist_b
+        a = pin.getFrameAcceleration(model, data, frames.frame_a, own)
+        b = placement.act(pin.getFrameAcceleration(model, data, frames.frame_b, own))
+        # d/dt (Ad_M nu_b) = Ad_M nu_b' + xi x (Ad_M nu_b), xi = -X; and X x nu_b = X x nu_a.
+        acceleration = a - b + twist.cross(twist_a)
+        return placement, twist.vector, acceleration.vector, twist_a
 
     def _length(self, given: float | None) -> float:
         """Return the given length, or the longest lever of a closure, or 1 m if there is none."""
@@ -162,8 +327,8 @@ class Loops:
             return float(given)
         levers = [
             float(np.linalg.norm(self.model.frames[frame].placement.translation))
-            for pair in self.frames
-            for frame in pair
+            for frames in self.closed_frames
+            for frame in (frames.frame_a, frames.frame_b)
             if self.model.frames[frame].parentJoint != 0  # the world is no lever
         ]
         return max(levers, default=0.0) or 1.0
@@ -188,11 +353,3 @@ def refuse_twice(what: str, names: Sequence[str]) -> None:
     twice = {name for name in names if list(names).count(name) > 1}
     if twice:
         raise MechanismError(f"{what} {min(twice)!r} is named twice")
-
-
-def _gap(closure: LoopClosure, a: pin.SE3, b: pin.SE3) -> Array:
-    """Return a closure's position error: p_a - p_b, and log(R_a R_b') if it is rigid."""
-    gap: Array = a.translation - b.translation
-    if closure.kind == "rigid":
-        gap = np.concatenate([gap, pin.log3(a.rotation @ b.rotation.T)])
-    return gap

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import eigenpy
 import numpy as np
@@ -14,33 +14,28 @@ from numpy.typing import ArrayLike, NDArray
 from pinocchio import computeJointJacobians, getConstraintsJacobian, rnea
 from scipy.linalg.blas import dgemv, dnrm2
 
-from rps_pin.closed_loop.closing import close_gaps
-from rps_pin.closed_loop.closure import LoopClosure
-from rps_pin.closed_loop.inverse_dynamics import (
-    InverseDynamics,
-    condition_number,
-    solve_by_allowed_motions,
-)
-from rps_pin.closed_loop.loops import LoopErrors, Loops, refuse_twice
+from rps_pin.closed_loop.closure import Closure
+from rps_pin.closed_loop.forward_dynamics import ProximalDynamics, basis_and_drift, solve_reduced
+from rps_pin.closed_loop.inverse_dynamics import InverseDynamics, solve_by_allowed_motions
+from rps_pin.closed_loop.joint_effects import JointEffects, coordinate_indices
+from rps_pin.closed_loop.kinematics import MAX_CONDITION, ClosedLoopKinematics
 from rps_pin.closed_loop.reading import model_from_urdf
 from rps_pin.closed_loop.vectors import checked_vector
-from rps_pin.errors import ClosureError, InputError, MechanismError, SingularityError
+from rps_pin.closed_loop.wrenches import (
+    Wrenches,
+    checked_wrench,
+    closure_wrenches,
+    forces_on_joints,
+    generalised_force,
+)
+from rps_pin.errors import InputError, MechanismError
 
 Array = NDArray[np.float64]
-
-#: Past this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
-#: machine is built well enough to know its forces.
-MAX_CONDITION = 1e8
-
-#: A loop counts as closed below this gap, in units of the characteristic length.
-_CLOSED = 1e-12
-#: What `velocity` and `acceleration` accept of their arguments, relative to the rates given.
-_CONSISTENT = 1e-8
 
 _INFINITY = math.inf
 
 
-class ClosedLoopModel:
+class ClosedLoopModel(ClosedLoopKinematics):
     """Any mechanism: an open tree whose loops are closed by Pinocchio constraint models.
 
     Build once, call often: the scratch memory is allocated here. For that reason one object serves
@@ -49,11 +44,17 @@ class ClosedLoopModel:
     Parameters
     ----------
     model
-        The open tree. Its gravity is used as it stands.
+        The open tree. Its gravity, and its armature, are used as they stand.
     closures
-        What closes its loops.
+        What closes its loops: `LoopClosure` and `JointCoupling` objects.
     actuated
         Names of the actuated joints; `tau` comes in this order.
+    home
+        Configuration to start from, shape (nq,); Pinocchio's neutral one if left out.
+    effects
+        Damping, friction and springs of the joints; none if left out.
+    name
+        For tables and messages; that of the model if left out.
     characteristic_length
         Length (m) that makes angles and lengths comparable: in condition numbers, and in the norm
         that `close` makes small. Left out, it is the longest lever of a closure, that is, the
@@ -65,28 +66,37 @@ class ClosedLoopModel:
     ------
     MechanismError
         If a frame or joint is unknown or named twice, or no joint is actuated.
+    InputError
+        If a number or an array does not fit.
     """
 
     def __init__(
         self,
         model: pin.Model,
-        closures: Sequence[LoopClosure],
+        closures: Sequence[Closure],
         actuated: Sequence[str],
         *,
+        home: ArrayLike | None = None,
+        effects: JointEffects | None = None,
+        name: str = "",
         characteristic_length: float | None = None,
         max_condition: float = MAX_CONDITION,
     ) -> None:
-        self.model = model
-        self.closures = tuple(closures)
-        self.actuated = (actuated,) if isinstance(actuated, str) else tuple(actuated)
-        if not max_condition >= 1:
-            raise InputError(f"max_condition = {max_condition}: it must be at least 1")
-        self.max_condition = max_condition
-        refuse_twice("actuated joint", self.actuated)
-        self._loops = loops = Loops(model, closures, characteristic_length)
-        self._actuated = self._velocity_indices(self.actuated)
-        self._passive = np.setdiff1d(np.arange(model.nv), self._actuated)
-        self._scales = loops.row_scale[:, None], loops.column_scale[self._passive]
+        super().__init__(
+            model,
+            closures,
+            actuated,
+            home=home,
+            characteristic_length=characteristic_length,
+            max_condition=max_condition,
+        )
+        if effects is not None and effects.damping.size != model.nv:
+            raise InputError(f"effects are of {effects.damping.size} velocities, not {model.nv}")
+        self.effects = effects
+        self.name = name or model.name
+        self._q_of_v = coordinate_indices(model)
+        self._proximal: ProximalDynamics | None = None
+        loops = self._loops
         self._square = loops.size == self._passive.size > 0
         # What a call of `inverse_dynamics` needs, in two look-ups.
         self._pinocchio = (
@@ -109,12 +119,11 @@ class ClosedLoopModel:
     def from_urdf(
         cls,
         path_or_xml: str | os.PathLike[str],
-        closures: Sequence[LoopClosure],
+        closures: Sequence[Closure],
         actuated: Sequence[str],
         *,
         gravity: ArrayLike = (0.0, 0.0, -9.81),
-        characteristic_length: float | None = None,
-        max_condition: float = MAX_CONDITION,
+        **options: Any,
     ) -> ClosedLoopModel:
         """Build a mechanism from a URDF: a file's path, or the XML text itself.
 
@@ -123,10 +132,12 @@ class ClosedLoopModel:
         path_or_xml
             Path of a URDF file, or its text (recognised by its leading ``<``). A joint of type
             ``floating`` becomes a free-flyer.
-        closures, actuated, characteristic_length, max_condition
+        closures, actuated
             As for the class.
         gravity
             Acceleration of gravity in world axes, shape (3,), m/s^2.
+        **options
+            The class's other parameters.
 
         Raises
         ------
@@ -137,13 +148,7 @@ class ClosedLoopModel:
         """
         model = model_from_urdf(path_or_xml)
         model.gravity.linear = checked_vector(gravity, 3, "gravity")
-        return cls(
-            model,
-            closures,
-            actuated,
-            characteristic_length=characteristic_length,
-            max_condition=max_condition,
-        )
+        return cls(model, closures, actuated, **options)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Give copies, and other processes, scratch memory of their own."""
@@ -151,179 +156,19 @@ class ClosedLoopModel:
             type(self),
             (self.model, self.closures, self.actuated),
             {
+                "home": self._home,
+                "effects": self.effects,
+                "name": self.name,
                 "characteristic_length": self.characteristic_length,
                 "max_condition": self.max_condition,
             },
         )
 
-    # What it is made of ---------------------------------------------------------------------------
+    # Inverse dynamics -----------------------------------------------------------------------------
 
-    @property
-    def constraint_size(self) -> int:
-        """Number of closure rows, nc."""
-        return self._loops.size
-
-    @property
-    def characteristic_length(self) -> float:
-        """Length that makes angles and lengths comparable, m."""
-        return self._loops.length
-
-    @property
-    def actuated_indices(self) -> NDArray[np.intp]:
-        """Indices of the actuated joints in a velocity vector, shape (na,)."""
-        return self._actuated.copy()
-
-    def rows(self, closure: str) -> slice:
-        """Return the rows of a closure, by its name, in `constraint_forces` and `LoopErrors`.
-
-        Raises
-        ------
-        MechanismError
-            If there is no closure of that name; lists those there are.
-        """
-        return self._loops.rows(closure)
-
-    # Position, velocity, acceleration -------------------------------------------------------------
-
-    def loop_errors(
-        self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
-    ) -> LoopErrors:
-        """Return how far the loops are from closed at position, velocity and acceleration level.
-
-        Parameters
-        ----------
-        q, v, a
-            Configuration (nq,), velocity (nv,) and acceleration (nv,) as Pinocchio has them; v and
-            a are zero if left out.
-        """
-        still = np.zeros(self.model.nv)
-        return self._loops.errors(
-            *self._checked_state(q, still if v is None else v, still if a is None else a)
-        )
-
-    def loop_gap(self, q: ArrayLike) -> float:
-        """Return the largest gap between two closed frames, m.
-
-        An angle between rigidly closed frames counts with the characteristic length as its lever.
-        """
-        return self._loops.worst(self._loops.gaps(checked_vector(q, self.model.nq, "q")))[0]
-
-    def close(self, q_guess: ArrayLike) -> Array:
-        """Return a configuration near a guess in which every loop is closed.
-
-        The loops are closed by least-norm steps from the guess (see `closing`): the answer lies
-        near it, and need not be the nearest. Joint limits are not considered.
-
-        Parameters
-        ----------
-        q_guess
-            Configuration, shape (nq,); quaternions need not be of unit length.
-
-        Returns
-        -------
-        array
-            Closed configuration, shape (nq,), gaps at most 1e-12 characteristic lengths.
-
-        Raises
-        ------
-        InputError
-            If the guess has the wrong shape, is not finite, or holds a quaternion of no length.
-        ClosureError
-            If the loops do not close from there; says by how much, and which.
-        """
-        guess = pin.normalize(self.model, checked_vector(q_guess, self.model.nq, "q_guess"))
-        if not pin.isNormalized(self.model, guess, 1e-9):
-            raise InputError("q_guess holds a quaternion of no length: it is no orientation")
-        q = close_gaps(
-            guess,
-            gaps=lambda q: self._loops.row_scale * self._loops.gaps(q),
-            jacobian=lambda q: self._scales[0] * self._loops.jacobian(q) * self._loops.column_scale,
-            integrate=lambda q, step: pin.integrate(self.model, q, self._loops.column_scale * step),
-            tolerance=_CLOSED * self.characteristic_length,
-        )
-        gap, closure = self._loops.worst(self._loops.gaps(q))
-        if not gap <= _CLOSED * max(self.characteristic_length, 1.0):
-            before, _ = self._loops.worst(self._loops.gaps(guess))
-            raise ClosureError(
-                f"the loops do not close from this guess: closure {closure!r} stays open by "
-                f"{gap:.6g} m (largest gap of the guess: {before:.6g} m)",
-                gap,
-            )
-        return q
-
-    def velocity(self, q: ArrayLike, v_actuated: ArrayLike) -> Array:
-        """Return the velocity that keeps the loops closed while the actuators move as asked.
-
-        Solves J v = 0 for the passive rows: J_p v_p = -J_a v_a.
-
-        Parameters
-        ----------
-        q
-            Closed configuration, shape (nq,).
-        v_actuated
-            Velocities of the actuated joints, shape (na,).
-
-        Returns
-        -------
-        array
-            Velocity, shape (nv,).
-
-        Raises
-        ------
-        SingularityError
-            If the actuators do not determine the motion.
-        ClosureError
-            If no motion of the mechanism has these actuator velocities (redundant actuation).
-        """
-        q_ = checked_vector(q, self.model.nq, "q")
-        rates = checked_vector(v_actuated, self._actuated.size, "v_actuated")
-        return self._complete(self._loops.jacobian(q_), rates, np.zeros(self.constraint_size))
-
-    def acceleration(self, q: ArrayLike, v: ArrayLike, a_actuated: ArrayLike) -> Array:
-        """Return the acceleration that keeps the loops closed while the actuators accelerate so.
-
-        Solves J a + J' v = 0 (J' the derivative) for the passive rows.
-
-        Parameters
-        ----------
-        q, v
-            Closed configuration (nq,) and a velocity that keeps it closed (nv,).
-        a_actuated
-            Accelerations of the actuated joints, shape (na,).
-
-        Raises
-        ------
-        SingularityError, ClosureError
-            As `velocity`; also if v itself opens the loops.
-        """
-        q_ = checked_vector(q, self.model.nq, "q")
-        v_ = checked_vector(v, self.model.nv, "v")
-        accelerations = checked_vector(a_actuated, self._actuated.size, "a_actuated")
-        errors = self._loops.errors(q_, v_, np.zeros(self.model.nv))
-        opening = float(np.abs(self._loops.row_scale * errors.velocity).max(initial=0.0))
-        speed = float(np.abs(v_ / self._loops.column_scale).max(initial=0.0))
-        if opening > _CONSISTENT * max(speed, 1.0):
-            raise ClosureError(
-                f"v opens the loops at {opening:.3g} m/s; complete it with velocity() first",
-                opening,
-            )
-        return self._complete(self._loops.jacobian(q_), accelerations, errors.acceleration)
-
-    def condition(self, q: ArrayLike) -> float:
-        """Return the condition number of J_p: how near a configuration is to a singularity.
-
-        J_p is the closures' Jacobian with respect to the passive joints, angles made lengths with
-        `characteristic_length`. Its condition number is 1 at best and infinite where the actuators
-        no longer determine the motion, or where a closure's rows fail (a parallel, or type II, or a
-        constraint singularity). Its inverse is the relative distance to the nearest singular
-        matrix, a number between 0 and 1.
-        """
-        jacobian = self._loops.jacobian(checked_vector(q, self.model.nq, "q"))
-        return self._condition(jacobian)
-
-    # Dynamics -------------------------------------------------------------------------------------
-
-    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> InverseDynamics:
+    def inverse_dynamics(
+        self, q: Array, v: Array, a: Array, *, wrenches: Wrenches | None = None
+    ) -> InverseDynamics:
         """Return the forces that make the mechanism move as asked: constrained RNEA (see module).
 
         For speed the motion is taken at its word: q must be closed, and v and a keep it so (as
@@ -333,6 +178,9 @@ class ClosedLoopModel:
         ----------
         q, v, a
             Configuration (nq,), velocity (nv,) and acceleration (nv,) as Pinocchio has them.
+        wrenches
+            External wrenches by frame name: (force, moment), (6,), N and N m, that the surroundings
+            exert at the frame's origin, in world axes.
 
         Returns
         -------
@@ -355,10 +203,14 @@ class ClosedLoopModel:
             given, checked = (q, v, a), self._checked_state(q, v, a)
             if all(array is one for array, one in zip(checked, given, strict=True)):
                 raise  # a complaint of Pinocchio's own
-            return self.inverse_dynamics(*checked)
+            return self.inverse_dynamics(*checked, wrenches=wrenches)
         for calc, scratch in calls:  # getConstraintsJacobian reads what they refresh
             calc(model, data, scratch)
         jacobian = getConstraintsJacobian(model, data, constraints, constraint_data)
+        if not self._loops.plain:
+            jacobian = self._loops.kept_rows(jacobian)
+        if self.effects is not None or wrenches:
+            force = force + self._other_forces(q, v, wrenches)
         if not self._square:
             return self._inverse_dynamics_by_motions(
                 jacobian.reshape(self.constraint_size, model.nv), force
@@ -377,6 +229,185 @@ class ClosedLoopModel:
         if not residual < _INFINITY:
             self._checked_state(q, v, a)
         return InverseDynamics(rest[size:], multipliers, residual, (scales, passive_jacobian))
+
+    def generalised_force(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Array:
+        """Return what actuators and closures together must produce, S' tau + J' lambda, (nv,).
+
+        That is ``rnea(q, v, a)`` plus the joints' effects less the external wrenches (as in
+        `inverse_dynamics`).
+        """
+        q_, v_, a_ = self._checked_state(q, v, a)
+        force: Array = rnea(self.model, self._loops.data, q_, v_, a_).copy()
+        if self.effects is not None or wrenches:
+            computeJointJacobians(self.model, self._loops.data, q_)
+            force += self._other_forces(q_, v_, wrenches)
+        return force
+
+    def constraint_forces(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+    ) -> Array:
+        """Return lambda (nc,) of a motion under known actuator forces, of least norm.
+
+        Solves J' lambda = rnea(q, v, a) + effects - external forces - S' tau in the least-squares
+        sense: exact where a is what `forward_dynamics` returns.
+        """
+        rest = self.generalised_force(q, v, a, wrenches=wrenches)
+        rest[self._actuated] -= checked_vector(tau, self._actuated.size, "tau")
+        rows, columns = self._loops.row_scale, self._loops.column_scale
+        jacobian = self._scaled(self._loops.jacobian(np.asarray(q, dtype=np.float64)))
+        multipliers, *_ = np.linalg.lstsq(jacobian.T, columns * rest, rcond=1e-10)
+        scaled: Array = rows * multipliers
+        return scaled
+
+    # Forward dynamics -----------------------------------------------------------------------------
+
+    def forward_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        method: Literal["reduced", "proximal"] = "reduced",
+    ) -> Array:
+        """Return the acceleration under given actuator forces, shape (nv,).
+
+        Parameters
+        ----------
+        q, v
+            Closed configuration (nq,), and a velocity that keeps it closed (nv,).
+        tau
+            Forces of the actuated joints, shape (na,).
+        wrenches
+            External wrenches, as for `inverse_dynamics`.
+        method
+            ``"reduced"`` solves in the motions that the closures allow (see `forward_dynamics`):
+            exact, also with massless links and redundant rows. ``"proximal"`` calls Pinocchio's
+            `constraintDynamics`, for spherical and rigid closures of links that all have mass.
+
+        Raises
+        ------
+        InputError
+            If an argument has the wrong shape or is not finite.
+        SingularityError
+            If a motion that the closures allow moves no mass.
+        MechanismError
+            If ``"proximal"`` does not apply.
+        """
+        q_, v_ = checked_vector(q, self.model.nq, "q"), checked_vector(v, self.model.nv, "v")
+        tau_ = checked_vector(tau, self._actuated.size, "tau")
+        if method == "proximal":
+            return self._proximal_dynamics(q_, v_, tau_, wrenches)
+        if method != "reduced":
+            raise InputError(f"method = {method!r}; it must be 'reduced' or 'proximal'")
+        return self._reduced_dynamics(q_, v_, tau_, wrenches, self._loops.drift(q_, v_))
+
+    def mass_matrix(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
+        """Return the reduced mass matrix T' M T, shape (m, m); T of `motion_basis`.
+
+        The kinetic energy is u' (T' M T) u / 2, u the velocities of the independent joints (the
+        actuated ones if left out).
+        """
+        basis = self.motion_basis(q, independent)
+        mass: Array = basis.T @ self._tree_mass(np.asarray(q, dtype=np.float64)) @ basis
+        return mass
+
+    def bias(self, q: ArrayLike, v: ArrayLike, independent: Sequence[str] | None = None) -> Array:
+        """Return the reduced bias T' (rnea(q, v, a_0) + effects), shape (m,).
+
+        The forces at the independent joints that keep them from accelerating: a_0 is the
+        acceleration with w = 0. Includes gravity, Coriolis forces, damping, friction and springs.
+        """
+        basis = self.motion_basis(q, independent)
+        chosen = self._independent(independent)
+        a = self.acceleration(q, v, np.zeros(chosen.size), independent)
+        bias: Array = basis.T @ self.generalised_force(q, v, a)
+        return bias
+
+    def gravity_forces(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
+        """Return the forces T' g at the independent joints that carry the weight, shape (m,)."""
+        q_ = checked_vector(q, self.model.nq, "q")
+        basis = self.motion_basis(q_, independent)
+        weight = pin.computeGeneralizedGravity(self.model, self._loops.data, q_)
+        forces: Array = basis.T @ weight
+        return forces
+
+    def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
+        """Return kinetic energy, rotors included, and potential energy, springs included, J."""
+        q_, v_ = checked_vector(q, self.model.nq, "q"), checked_vector(v, self.model.nv, "v")
+        data = self._loops.data
+        kinetic = pin.computeKineticEnergy(self.model, data, q_, v_)
+        kinetic += float(self.model.armature @ v_**2) / 2
+        potential = pin.computePotentialEnergy(self.model, data, q_)
+        if self.effects is not None:
+            potential += self.effects.energy(q_, self._q_of_v)
+        return float(kinetic), float(potential)
+
+    # Wrenches -------------------------------------------------------------------------------------
+
+    def closure_wrenches(self, q: ArrayLike, constraint_forces: ArrayLike) -> dict[str, Array]:
+        """Return the wrench in each closure of frames, by name.
+
+        What frame b's side exerts on frame a's side: (force, moment), shape (6,), N and N m, at
+        frame a's origin, in world axes.
+
+        Parameters
+        ----------
+        q
+            Closed configuration, shape (nq,).
+        constraint_forces
+            lambda, shape (nc,), as `inverse_dynamics` returns it.
+        """
+        multipliers = checked_vector(constraint_forces, self.constraint_size, "constraint_forces")
+        return closure_wrenches(self._loops, checked_vector(q, self.model.nq, "q"), multipliers)
+
+    def joint_wrenches(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        constraint_forces: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        axes: Literal["world", "joint"] = "joint",
+    ) -> dict[str, Array]:
+        """Return the wrench that each joint of the tree carries, by name.
+
+        What the link before the joint exerts on the link after it: (force, moment), shape (6,), N
+        and N m, at the origin of the joint's frame (which moves with the link after it), in that
+        frame's axes or the world's. Actuator, damping, friction and spring are parts of it.
+
+        Parameters
+        ----------
+        q, v, a, constraint_forces, wrenches
+            A motion, and the answer of `inverse_dynamics` or `constraint_forces` to it.
+        axes
+            ``"joint"`` or ``"world"``.
+        """
+        if axes not in ("joint", "world"):
+            raise InputError(f"axes = {axes!r}; it must be 'joint' or 'world'")
+        q_, v_, a_ = self._checked_state(q, v, a)
+        on_closures = self.closure_wrenches(q_, constraint_forces)
+        model, data = self.model, self._loops.data
+        pin.framesForwardKinematics(model, data, q_)
+        forces = forces_on_joints(self._loops, on_closures, self._by_frame(wrenches))
+        rnea(model, data, q_, v_, a_, forces)
+        carried = {}
+        for index, name in enumerate(model.names):
+            if index:
+                turn = data.oMi[index].rotation if axes == "world" else np.eye(3)
+                carried[name] = (data.f[index].vector.reshape(2, 3) @ turn.T).ravel()
+        return carried
+
+    # Inner workings -------------------------------------------------------------------------------
 
     def _inverse_dynamics_by_motions(self, jacobian: Array, force: Array) -> InverseDynamics:
         if not np.isfinite(force).all():
@@ -397,51 +428,68 @@ class ClosedLoopModel:
             (self._scales, jacobian[:, self._passive]),
         )
 
-    # Inner workings -------------------------------------------------------------------------------
+    def _reduced_dynamics(
+        self, q: Array, v: Array, tau: Array, wrenches: Wrenches | None, drift: Array
+    ) -> Array:
+        """Return the acceleration; `drift` is what J a must cancel."""
+        basis, a_0 = self._basis_and_drift(q, drift)
+        force = -rnea(self.model, self._loops.data, q, v, a_0)
+        if self.effects is not None or wrenches:
+            force -= self._other_forces(q, v, wrenches)
+        force[self._actuated] += tau
+        mass = basis.T @ self._tree_mass(q) @ basis
+        a: Array = basis @ solve_reduced(mass, basis.T @ force) + a_0
+        return a
 
-    def _complete(self, jacobian: Array, actuated: Array, drift: Array) -> Array:
-        """Return x with x_a given and J x + drift = 0: J_p x_p = -J_a x_a - drift."""
-        self._refuse_singular(jacobian)
-        rows, columns = self._scales
-        right = -rows[:, 0] * (jacobian[:, self._actuated] @ actuated + drift)
-        left = rows * jacobian[:, self._passive] * columns
-        scaled, *_ = np.linalg.lstsq(left, right, rcond=None)
-        opening = float(np.abs(left @ scaled - right).max(initial=0.0))
-        size = float(np.abs(right).max(initial=0.0))
-        if opening > _CONSISTENT * max(size, 1e-3):
-            raise ClosureError(
-                f"no motion of the mechanism has these {self._actuated.size} actuated values: "
-                f"the loops would open at a rate of {opening:.3g} (asked for: {size:.3g})",
-                opening,
+    def _basis_and_drift(self, q: Array, drift: Array) -> tuple[Array, Array]:
+        """Return T and a_0; T_p = -J_p^-1 J_a where that is well conditioned."""
+        jacobian = self._loops.jacobian(q)
+        rows = self._loops.row_scale
+        if self._square:
+            factors, passive, size, _, harmless_rcond, _ = self._algebra
+            factors.compute(jacobian.take(passive, axis=1))
+            if factors.rcond() > harmless_rcond:
+                right = np.empty((size, self._actuated.size + 1), order="F")
+                right[:, :-1], right[:, -1] = jacobian.take(self._actuated, axis=1), drift
+                solved = factors.solve(right).reshape(right.shape)  # a single row comes flat
+                basis, a_0 = np.zeros((self.model.nv, self._actuated.size)), np.zeros(self.model.nv)
+                basis[passive], a_0[passive] = -solved[:, :-1], -solved[:, -1]
+                basis[self._actuated] = np.eye(self._actuated.size)
+                return basis, a_0
+        return basis_and_drift(rows[:, None] * jacobian, rows * drift, self._loops.column_scale)
+
+    def _proximal_dynamics(
+        self, q: Array, v: Array, tau: Array, wrenches: Wrenches | None
+    ) -> Array:
+        if not self._loops.plain:
+            raise MechanismError(
+                "method='proximal' takes spherical and rigid closures only; use method='reduced'"
             )
-        full = np.empty(self.model.nv)
-        full[self._actuated] = actuated
-        full[self._passive] = columns * scaled
-        return full
+        force = np.zeros(self.model.nv)
+        if self.effects is not None or wrenches:
+            computeJointJacobians(self.model, self._loops.data, q)
+            force -= self._other_forces(q, v, wrenches)
+        force[self._actuated] += tau
+        if self._proximal is None:
+            self._proximal = ProximalDynamics(self.model, self._loops.constraints)
+        return self._proximal(q, v, force)
 
-    def _condition(self, jacobian: Array) -> float:
-        rows, columns = self._scales
-        return condition_number(rows * jacobian[:, self._passive] * columns)
+    def _tree_mass(self, q: Array) -> Array:
+        """Return the open tree's mass matrix, armature included, shape (nv, nv)."""
+        mass: Array = pin.crba(self.model, self._loops.data, q)
+        return mass.reshape(self.model.nv, self.model.nv)
 
-    def _refuse_singular(self, jacobian: Array) -> None:
-        condition = self._condition(jacobian)
-        if not condition <= self.max_condition:
-            raise SingularityError(
-                "the actuated joints do not determine the motion here: the condition number is "
-                f"{condition:.3g}, and at most {self.max_condition:.3g} is accepted",
-                condition,
-                self.max_condition,
-            )
+    def _other_forces(self, q: Array, v: Array, wrenches: Wrenches | None) -> Array:
+        """Return effects less external forces, (nv,); the joints' Jacobians must be computed."""
+        model, data = self.model, self._loops.data
+        force = -generalised_force(model, data, self._by_frame(wrenches), model.nv)
+        if self.effects is not None:
+            force += self.effects.force(q, v, self._q_of_v)
+        return force
 
-    def _checked_state(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike
-    ) -> tuple[Array, Array, Array]:
-        """Return q, v and a as finite arrays of the right shapes."""
-        return (
-            checked_vector(q, self.model.nq, "q"),
-            checked_vector(v, self.model.nv, "v"),
-            checked_vector(a, self.model.nv, "a"),
-        )
+    def _by_frame(self, wrenches: Wrenches | None) -> Mapping[int, Array]:
+        given = wrenches or {}
+        return {self._frame(name): checked_wrench(value, name) for name, value in given.items()}
 
     def _least_harmless_rcond(self) -> float:
         """Return the reciprocal condition estimate above which no closer look is needed.
@@ -454,18 +502,6 @@ class ClosedLoopModel:
             return 0.0
         spread = sum(float(np.ptp(np.log(scale))) for scale in self._scales)
         return min(100 * self._passive.size * math.exp(spread) / self.max_condition, 1.0)
-
-    def _velocity_indices(self, joints: Sequence[str]) -> NDArray[np.intp]:
-        if not joints:
-            raise MechanismError("a mechanism needs at least one joint to actuate")
-        indices: list[int] = []
-        for name in joints:
-            if not self.model.existJointName(name) or name == "universe":
-                names = ", ".join(list(self.model.names)[1:])
-                raise MechanismError(f"no joint {name!r} to actuate; there are: {names}")
-            joint = self.model.joints[self.model.getJointId(name)]
-            indices.extend(range(joint.idx_v, joint.idx_v + joint.nv))
-        return np.array(indices, dtype=np.intp)
 
 
 def _rebuilt(

@@ -26,7 +26,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rps_pin.closed_loop.model import MAX_CONDITION
+from rps_pin.closed_loop.kinematics import MAX_CONDITION
 from rps_pin.errors import InputError, SingularityError, UnreachableError
 from rps_pin.rps.legs import RADIAL
 from rps_pin.rps.parameters import RPSParameters

@@ -1,0 +1,573 @@
+"""Positions, velocities and accelerations of a mechanism whose loops stay closed.
+
+With J the closures' Jacobian, every velocity with J v = 0 is v = T u, u the velocities of some
+joints that move independently of each other (S_i their rows): T = N (S_i N)^-1 for any basis N of
+the motions with J N = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rps_pin.closed_loop.closing import close_gaps
+from rps_pin.closed_loop.closure import Closure
+from rps_pin.closed_loop.inverse_dynamics import allowed_motions, condition_number
+from rps_pin.closed_loop.limits import JointLimits
+from rps_pin.closed_loop.loops import LoopErrors, Loops, refuse_twice
+from rps_pin.closed_loop.vectors import checked_vector
+from rps_pin.errors import ClosureError, InputError, MechanismError, SingularityError
+
+Array = NDArray[np.float64]
+
+#: Past this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
+#: machine is built well enough to know its forces.
+MAX_CONDITION = 1e8
+
+#: A loop counts as closed below this gap, in units of the characteristic length.
+_CLOSED = 1e-12
+#: What `velocity` and `acceleration` accept of their arguments, relative to the rates given.
+_CONSISTENT = 1e-8
+#: The nearest closed configuration is found when a further step would be below this (radians).
+_NEAREST = 1e-9
+
+
+class ClosedLoopKinematics:
+    """The kinematic half of `ClosedLoopModel`, which see for the parameters."""
+
+    def __init__(
+        self,
+        model: pin.Model,
+        closures: Sequence[Closure],
+        actuated: Sequence[str],
+        *,
+        home: ArrayLike | None = None,
+        characteristic_length: float | None = None,
+        max_condition: float = MAX_CONDITION,
+    ) -> None:
+        self.model = model
+        self.closures = tuple(closures)
+        self.actuated = (actuated,) if isinstance(actuated, str) else tuple(actuated)
+        if not max_condition >= 1:
+            raise InputError(f"max_condition = {max_condition}: it must be at least 1")
+        self.max_condition = max_condition
+        refuse_twice("actuated joint", self.actuated)
+        self._loops = loops = Loops(model, closures, characteristic_length)
+        if not self.actuated:
+            raise MechanismError("a mechanism needs at least one joint to actuate")
+        self._actuated = self._velocity_indices(self.actuated, "to actuate")
+        self._passive = np.setdiff1d(np.arange(model.nv), self._actuated)
+        self._scales = loops.row_scale[:, None], loops.column_scale[self._passive]
+        self._limits = JointLimits(model)
+        self._home = pin.neutral(model) if home is None else self._normal(home, "home")
+
+    # What it is made of ---------------------------------------------------------------------------
+
+    @property
+    def home(self) -> Array:
+        """Configuration to start from, shape (nq,): as given, or Pinocchio's neutral one.
+
+        A mechanism that was read from a file has its loops closed here if the file says where.
+        """
+        return self._home.copy()
+
+    @property
+    def constraint_size(self) -> int:
+        """Number of closure rows, nc."""
+        return self._loops.size
+
+    @property
+    def characteristic_length(self) -> float:
+        """Length that makes angles and lengths comparable, m."""
+        return self._loops.length
+
+    @property
+    def actuated_indices(self) -> NDArray[np.intp]:
+        """Indices of the actuated joints in a velocity vector, shape (na,)."""
+        return self._actuated.copy()
+
+    def rows(self, closure: str) -> slice:
+        """Return the rows of a closure, by its name, in `constraint_forces` and `LoopErrors`.
+
+        Raises
+        ------
+        MechanismError
+            If there is no closure of that name; lists those there are.
+        """
+        return self._loops.rows(closure)
+
+    # Position -------------------------------------------------------------------------------------
+
+    def loop_errors(
+        self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
+    ) -> LoopErrors:
+        """Return how far the loops are from closed at position, velocity and acceleration level.
+
+        Parameters
+        ----------
+        q, v, a
+            Configuration (nq,), velocity (nv,) and acceleration (nv,) as Pinocchio has them; v and
+            a are zero if left out.
+        """
+        still = np.zeros(self.model.nv)
+        return self._loops.errors(
+            *self._checked_state(q, still if v is None else v, still if a is None else a)
+        )
+
+    def loop_gap(self, q: ArrayLike) -> float:
+        """Return the largest gap between two closed frames, m.
+
+        An angle between closed frames counts with the characteristic length as its lever.
+        """
+        return self._loops.worst(self._loops.gaps(checked_vector(q, self.model.nq, "q")))[0]
+
+    def close(
+        self,
+        q_guess: ArrayLike,
+        *,
+        fixed: Sequence[str] = (),
+        within_limits: bool = True,
+        restarts: int = 20,
+    ) -> Array:
+        """Return a configuration near a guess in which every loop is closed.
+
+        The loops are closed by least-norm steps from the guess (see `closing`): the answer lies
+        near it, and need not be the nearest (`project` finds that). Where the steps end in a dead
+        end, they start again from random places farther and farther away.
+
+        Parameters
+        ----------
+        q_guess
+            Configuration, shape (nq,); quaternions need not be of unit length.
+        fixed
+            Names of joints that keep the guess's values.
+        within_limits
+            Whether the answer must lie within the model's joint limits. The guess need not.
+        restarts
+            How often to start again; always from the same places.
+
+        Returns
+        -------
+        array
+            Closed configuration, shape (nq,), gaps at most 1e-12 characteristic lengths.
+
+        Raises
+        ------
+        InputError
+            If the guess has the wrong shape, is not finite, or holds a quaternion of no length.
+        ClosureError
+            If the loops do not close; says by how much, which, and what joints stand at a limit.
+        """
+        guess = self._normal(q_guess, "q_guess")
+        held = np.zeros(self.model.nv, dtype=bool)
+        held[self._velocity_indices(fixed, "to fix")] = True
+        start = self._limits.clip(guess) if within_limits else guess
+        if held.any() and (pin.difference(self.model, guess, start)[held] != 0).any():
+            raise ClosureError("a fixed joint is outside its limits in the guess", np.inf)
+        best, best_gap, rng = start, np.inf, np.random.default_rng(0)
+        for attempt in range(1 + restarts):
+            q = self._closed_from(start, held, within_limits)
+            gap, _ = self._loops.worst(self._loops.gaps(q))
+            if gap <= _CLOSED * max(self.characteristic_length, 1.0):
+                return q
+            if gap < best_gap:
+                best, best_gap = q, gap
+            spread = np.pi * (attempt + 1) / max(restarts, 1)
+            away = spread * rng.normal(size=self.model.nv) / self._units()
+            start = pin.integrate(self.model, guess, np.where(held, 0.0, away))
+            start = self._limits.clip(start) if within_limits else start
+        raise self._open(guess, best, within_limits)
+
+    def project(self, q_guess: ArrayLike, *, within_limits: bool = True) -> Array:
+        """Return the closed configuration nearest to a guess.
+
+        Nearest in the norm that makes angles lengths by `characteristic_length`; a local minimum of
+        the distance, found by steps along the allowed motions towards the guess, the loops closed
+        after each. A joint at its limit stays there.
+
+        Raises
+        ------
+        InputError, ClosureError
+            As `close`; also if the steps do not settle.
+        """
+        guess = self._normal(q_guess, "q_guess")
+        q = self.close(guess, within_limits=within_limits)
+        units, none = self._units(), np.zeros(self.model.nv, dtype=bool)
+        towards = units * pin.difference(self.model, q, guess)
+        length = 1.0
+        for _ in range(500):
+            motions = allowed_motions(self._scaled(self._loops.jacobian(q)))
+            step = motions @ (motions.T @ towards)
+            if within_limits:
+                blocked = self._limits.blocked(q, step)
+                if blocked.any():  # only motions that leave those joints where they are
+                    motions = motions @ allowed_motions(motions[blocked])
+                    step = motions @ (motions.T @ towards)
+            if np.linalg.norm(step) <= _NEAREST * self.characteristic_length:
+                return q
+            moved = pin.integrate(self.model, q, length * step / units)
+            moved = self._limits.clip(moved) if within_limits else moved
+            moved = self._closed_from(moved, none, within_limits)
+            moved_towards = units * pin.difference(self.model, moved, guess)
+            if np.linalg.norm(moved_towards) < np.linalg.norm(towards) and self.loop_gap(
+                moved
+            ) <= _CLOSED * max(self.characteristic_length, 1.0):
+                q, towards, length = moved, moved_towards, min(1.0, 2 * length)
+            elif length < 1e-6:
+                return q  # nearer by no more than rounding
+            else:
+                length /= 2
+        raise ClosureError(
+            "the nearest closed configuration was not found in 500 steps: the last would still "
+            f"move by {float(np.linalg.norm(step)):.3g} m",
+            self.loop_gap(q),
+        )
+
+    def complete(
+        self,
+        values: Mapping[str, ArrayLike] | ArrayLike,
+        q_guess: ArrayLike | None = None,
+        *,
+        within_limits: bool = True,
+    ) -> Array:
+        """Return the closed configuration in which some joints have given values.
+
+        Parameters
+        ----------
+        values
+            By joint name, each with as many numbers as the joint has coordinates; or those of the
+            actuated joints in order, shape (na,) (if each has one coordinate).
+        q_guess
+            Where the other joints start, shape (nq,); selects the assembly mode. `home` if left
+            out.
+
+        Raises
+        ------
+        InputError, MechanismError
+            If a value has the wrong shape, or a joint is unknown.
+        ClosureError
+            If the loops do not close with these values.
+        """
+        q = self._normal(self._home if q_guess is None else q_guess, "q_guess")
+        if not isinstance(values, Mapping):
+            given = checked_vector(values, len(self.actuated), "values")
+            values = dict(zip(self.actuated, given, strict=True))
+        self._velocity_indices(list(values), "to give a value")
+        for name, value in values.items():
+            joint = self.model.joints[self.model.getJointId(name)]
+            of_joint = checked_vector(
+                np.atleast_1d(value), joint.nq, f"the value of joint {name!r}"
+            )
+            q[joint.idx_q : joint.idx_q + joint.nq] = of_joint
+        return self.close(q, fixed=list(values), within_limits=within_limits)
+
+    # Velocity and acceleration --------------------------------------------------------------------
+
+    def jacobian(self, q: ArrayLike) -> Array:
+        """Return J, shape (nc, nv): the rates of the closures' rows are J v (see `rows`)."""
+        return self._loops.jacobian(checked_vector(q, self.model.nq, "q")).copy()
+
+    def allowed_motions(self, q: ArrayLike) -> Array:
+        """Return a basis N of the velocities that keep the loops closed, shape (nv, mobility).
+
+        J N = 0; the columns are orthonormal once angles are made lengths by
+        `characteristic_length`.
+        """
+        scale = self._loops.column_scale
+        jacobian = self._scaled(self._loops.jacobian(checked_vector(q, self.model.nq, "q")))
+        return scale[:, None] * allowed_motions(jacobian)
+
+    def motion_basis(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
+        """Return T, shape (nv, m): v = T u, u the velocities of m joints moving independently.
+
+        Parameters
+        ----------
+        q
+            Closed configuration, shape (nq,).
+        independent
+            Names of the joints; the actuated ones if left out.
+
+        Raises
+        ------
+        SingularityError
+            If these joints do not determine the motion, or do not move independently, here.
+        """
+        chosen = self._independent(independent)
+        motions = self.allowed_motions(q)
+        own = motions[chosen]
+        if own.shape[0] != own.shape[1]:
+            raise SingularityError(
+                f"{own.shape[0]} independent velocities are named, for a mobility of "
+                f"{own.shape[1]} at this configuration",
+                np.inf,
+                self.max_condition,
+            )
+        condition = condition_number(own)
+        if not condition <= self.max_condition:
+            raise SingularityError(
+                "these joints do not determine the motion here: the condition number is "
+                f"{condition:.3g}, and at most {self.max_condition:.3g} is accepted",
+                condition,
+                self.max_condition,
+            )
+        return np.asarray(np.linalg.solve(own.T, motions.T).T, dtype=np.float64)
+
+    def frame_jacobian(
+        self,
+        q: ArrayLike,
+        frame: str,
+        independent: Sequence[str] | None = None,
+        *,
+        axes: Literal["world", "frame"] = "world",
+    ) -> Array:
+        """Return the closed-loop Jacobian of a frame, shape (6, m): its twist is this times u.
+
+        Parameters
+        ----------
+        q
+            Closed configuration, shape (nq,).
+        frame
+            Name of a frame of the model.
+        independent
+            The joints that u belongs to, as for `motion_basis`.
+        axes
+            Of the twist (linear, then angular, of the frame's origin): the world's or its own.
+
+        Raises
+        ------
+        MechanismError
+            If there is no such frame; lists those there are.
+        SingularityError
+            As `motion_basis`.
+        """
+        basis = self.motion_basis(q, independent)
+        reference = self._reference(axes)
+        jacobian = pin.computeFrameJacobian(
+            self.model,
+            self._loops.data,
+            checked_vector(q, self.model.nq, "q"),
+            self._frame(frame),
+            reference,
+        )
+        product: Array = jacobian @ basis
+        return product
+
+    def velocity(
+        self, q: ArrayLike, v_actuated: ArrayLike, independent: Sequence[str] | None = None
+    ) -> Array:
+        """Return the velocity that keeps the loops closed while some joints move as asked.
+
+        Solves J v = 0 for the other rows: J_p v_p = -J_a v_a.
+
+        Parameters
+        ----------
+        q
+            Closed configuration, shape (nq,).
+        v_actuated
+            Velocities of the actuated joints, shape (na,), or of those named.
+        independent
+            Names of the joints that move as asked, if not the actuated ones.
+
+        Returns
+        -------
+        array
+            Velocity, shape (nv,).
+
+        Raises
+        ------
+        SingularityError
+            If these joints do not determine the motion.
+        ClosureError
+            If no motion of the mechanism has these velocities (more joints than mobility).
+        """
+        q_ = checked_vector(q, self.model.nq, "q")
+        given = self._independent(independent)
+        rates = checked_vector(v_actuated, given.size, "v_actuated")
+        still = np.zeros(self.constraint_size)
+        return self._complete(self._loops.jacobian(q_), given, rates, still)
+
+    def acceleration(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a_actuated: ArrayLike,
+        independent: Sequence[str] | None = None,
+    ) -> Array:
+        """Return the acceleration that keeps the loops closed while some joints accelerate so.
+
+        Solves J a + J' v = 0 (J' the derivative) for the other rows.
+
+        Parameters
+        ----------
+        q, v
+            Closed configuration (nq,) and a velocity that keeps it closed (nv,).
+        a_actuated
+            Accelerations of the actuated joints, shape (na,), or of those named.
+        independent
+            Names of the joints that accelerate as asked, if not the actuated ones.
+
+        Raises
+        ------
+        SingularityError, ClosureError
+            As `velocity`; also if v itself opens the loops.
+        """
+        q_ = checked_vector(q, self.model.nq, "q")
+        v_ = checked_vector(v, self.model.nv, "v")
+        given = self._independent(independent)
+        accelerations = checked_vector(a_actuated, given.size, "a_actuated")
+        drift = self._loops.drift(q_, v_)
+        jacobian = self._loops.jacobian(q_)
+        opening = float(np.abs(self._loops.row_scale * (jacobian @ v_)).max(initial=0.0))
+        speed = float(np.abs(self._units() * v_).max(initial=0.0))
+        if opening > _CONSISTENT * max(speed, 1.0):
+            raise ClosureError(
+                f"v opens the loops at {opening:.3g} m/s; complete it with velocity() first",
+                opening,
+            )
+        return self._complete(jacobian, given, accelerations, drift)
+
+    def condition(self, q: ArrayLike) -> float:
+        """Return the condition number of J_p: how near a configuration is to a singularity.
+
+        J_p is the closures' Jacobian with respect to the passive joints, angles made lengths with
+        `characteristic_length`. Its condition number is 1 at best and infinite where the actuators
+        no longer determine the motion, or where a closure's rows fail (a parallel, or type II, or a
+        constraint singularity). Its inverse is the relative distance to the nearest singular
+        matrix, a number between 0 and 1.
+        """
+        jacobian = self._loops.jacobian(checked_vector(q, self.model.nq, "q"))
+        return self._condition(jacobian)
+
+    # Inner workings -------------------------------------------------------------------------------
+
+    def _closed_from(self, start: Array, held: NDArray[np.bool_], within_limits: bool) -> Array:
+        scale = self._loops.column_scale
+        return close_gaps(
+            start,
+            gaps=lambda q: self._loops.row_scale * self._loops.gaps(q),
+            jacobian=lambda q: self._scaled_rows(self._loops.jacobian(q)) * scale,
+            integrate=lambda q, step: pin.integrate(self.model, q, scale * step),
+            tolerance=_CLOSED * self.characteristic_length,
+            held=held,
+            box=self._limits if within_limits else None,
+        )
+
+    def _open(self, guess: Array, best: Array, within_limits: bool) -> ClosureError:
+        """Return the error that says how far the loops stay open."""
+        gap, closure = self._loops.worst(self._loops.gaps(best))
+        before, _ = self._loops.worst(self._loops.gaps(guess))
+        reached = self._limits.reached(best) if within_limits else []
+        return ClosureError(
+            f"the loops do not close from this guess: closure {closure!r} stays open by "
+            f"{gap:.6g} m (largest gap of the guess: {before:.6g} m)"
+            + (f", with {', '.join(reached)}" if reached else ""),
+            gap,
+        )
+
+    def _complete(
+        self, jacobian: Array, given: NDArray[np.intp], values: Array, drift: Array
+    ) -> Array:
+        """Return x with x_a given and J x + drift = 0: J_p x_p = -J_a x_a - drift."""
+        rest = self._passive
+        if given is not self._actuated:
+            rest = np.setdiff1d(np.arange(self.model.nv), given)
+        rows, columns = self._scales[0], self._loops.column_scale[rest]
+        left = rows * jacobian[:, rest] * columns
+        self._refuse(condition_number(left))
+        right = -rows[:, 0] * (jacobian[:, given] @ values + drift)
+        scaled, *_ = np.linalg.lstsq(left, right, rcond=None)
+        opening = float(np.abs(left @ scaled - right).max(initial=0.0))
+        size = float(np.abs(right).max(initial=0.0))
+        if opening > _CONSISTENT * max(size, 1e-3):
+            raise ClosureError(
+                f"no motion of the mechanism has these {given.size} actuated values: "
+                f"the loops would open at a rate of {opening:.3g} (asked for: {size:.3g})",
+                opening,
+            )
+        full = np.empty(self.model.nv)
+        full[given] = values
+        full[rest] = columns * scaled
+        return full
+
+    def _units(self) -> Array:
+        """Return what velocities are multiplied with to be of one unit, m/s."""
+        units: Array = 1 / self._loops.column_scale
+        return units
+
+    def _scaled_rows(self, jacobian: Array) -> Array:
+        scaled: Array = self._scales[0] * jacobian
+        return scaled
+
+    def _scaled(self, jacobian: Array) -> Array:
+        """Return J with all entries in one unit."""
+        scaled: Array = self._scales[0] * jacobian * self._loops.column_scale
+        return scaled
+
+    def _condition(self, jacobian: Array) -> float:
+        rows, columns = self._scales
+        return condition_number(rows * jacobian[:, self._passive] * columns)
+
+    def _refuse_singular(self, jacobian: Array) -> None:
+        self._refuse(self._condition(jacobian))
+
+    def _refuse(self, condition: float) -> None:
+        if not condition <= self.max_condition:
+            raise SingularityError(
+                "the actuated joints do not determine the motion here: the condition number is "
+                f"{condition:.3g}, and at most {self.max_condition:.3g} is accepted",
+                condition,
+                self.max_condition,
+            )
+
+    def _checked_state(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike
+    ) -> tuple[Array, Array, Array]:
+        """Return q, v and a as finite arrays of the right shapes."""
+        return (
+            checked_vector(q, self.model.nq, "q"),
+            checked_vector(v, self.model.nv, "v"),
+            checked_vector(a, self.model.nv, "a"),
+        )
+
+    def _normal(self, q: ArrayLike, name: str) -> Array:
+        """Return a checked configuration with quaternions of unit length."""
+        normal: Array = pin.normalize(self.model, checked_vector(q, self.model.nq, name))
+        if not pin.isNormalized(self.model, normal, 1e-9):
+            raise InputError(f"{name} holds a quaternion of no length: it is no orientation")
+        return normal
+
+    def _independent(self, joints: Sequence[str] | None) -> NDArray[np.intp]:
+        if joints is None:
+            return self._actuated
+        refuse_twice("independent joint", list(joints))
+        return self._velocity_indices(joints, "to move independently")
+
+    def _velocity_indices(self, joints: Sequence[str], purpose: str) -> NDArray[np.intp]:
+        indices: list[int] = []
+        for name in joints:
+            if not self.model.existJointName(name) or name == "universe":
+                names = ", ".join(list(self.model.names)[1:])
+                raise MechanismError(f"no joint {name!r} {purpose}; there are: {names}")
+            joint = self.model.joints[self.model.getJointId(name)]
+            indices.extend(range(joint.idx_v, joint.idx_v + joint.nv))
+        return np.array(indices, dtype=np.intp)
+
+    def _frame(self, name: str) -> int:
+        index = int(self.model.getFrameId(name))
+        if index >= self.model.nframes:
+            names = ", ".join(frame.name for frame in self.model.frames)
+            raise MechanismError(f"no frame {name!r}; there are: {names}")
+        return index
+
+    def _reference(self, axes: str) -> Any:
+        references = {
+            "world": pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+            "frame": pin.ReferenceFrame.LOCAL,
+        }
+        if axes not in references:
+            raise InputError(f"axes = {axes!r}; it must be 'world' or 'frame'")
+        return references[axes]
