@@ -97,7 +97,8 @@ class ClosedLoopModel(ClosedLoopKinematics):
         self._q_of_v = coordinate_indices(model)
         self._proximal: ProximalDynamics | None = None
         loops = self._loops
-        self._square = loops.size == self._passive.size > 0
+        # (eigenpy takes a vector of one number for a matrix: that case goes the other way.)
+        self._square = loops.size == self._passive.size > 1
         # What a call of `inverse_dynamics` needs, in two look-ups.
         self._pinocchio = (
             model,
@@ -451,7 +452,7 @@ class ClosedLoopModel(ClosedLoopKinematics):
             if factors.rcond() > harmless_rcond:
                 right = np.empty((size, self._actuated.size + 1), order="F")
                 right[:, :-1], right[:, -1] = jacobian.take(self._actuated, axis=1), drift
-                solved = factors.solve(right).reshape(right.shape)  # a single row comes flat
+                solved = factors.solve(right)
                 basis, a_0 = np.zeros((self.model.nv, self._actuated.size)), np.zeros(self.model.nv)
                 basis[passive], a_0[passive] = -solved[:, :-1], -solved[:, -1]
                 basis[self._actuated] = np.eye(self._actuated.size)
