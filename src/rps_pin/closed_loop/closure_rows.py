@@ -229,13 +229,32 @@ class Stack(Rows):
         return np.concatenate([part.slope_rate(placement, twist) for part in self.parts])
 
 
+class WholeRows(Stack):
+    """The frames coincide. Of all six rows any basis will do: W = 1, Pinocchio's own rows."""
+
+    def __init__(self) -> None:
+        super().__init__([PointRows(np.eye(3)), FrameRows()])
+
+    def wrenches(self, placement: pin.SE3) -> Array:
+        """Return 1."""
+        return np.eye(6)
+
+    def slope(self, placement: pin.SE3) -> Array:
+        """Return 0."""
+        return np.zeros((6, 6, 6))
+
+    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return 0."""
+        return np.zeros((6, 6, 6))
+
+
 def rows_of(closure: LoopClosure) -> Rows:
     """Return the rows of a closure, in frame a's axes, forces before moments."""
     point = PointRows(np.eye(3))
     if closure.kind == "spherical":
         return point
     if closure.kind == "rigid":
-        return Stack([point, FrameRows()])
+        return WholeRows()
     if closure.kind == "distance":
         assert closure.distance is not None  # its constructor saw to that
         return DistanceRows(closure.distance)

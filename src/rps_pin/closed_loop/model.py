@@ -2,40 +2,35 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Literal
 
-import eigenpy
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
-from pinocchio import computeJointJacobians, getConstraintsJacobian, rnea
-from scipy.linalg.blas import dgemv, dnrm2
 
 from rps_pin.closed_loop.closure import Closure
-from rps_pin.closed_loop.forward_dynamics import ProximalDynamics, basis_and_drift, solve_reduced
-from rps_pin.closed_loop.inverse_dynamics import InverseDynamics, solve_by_allowed_motions
-from rps_pin.closed_loop.joint_effects import JointEffects, coordinate_indices
-from rps_pin.closed_loop.kinematics import MAX_CONDITION, ClosedLoopKinematics
+from rps_pin.closed_loop.derivatives import (
+    Following,
+    ForwardDynamicsDerivatives,
+    InverseDynamicsDerivatives,
+    Linearisation,
+    dynamics_slopes,
+    forward_derivatives,
+    inverse_derivatives,
+    linearisation,
+)
+from rps_pin.closed_loop.dynamics import ClosedLoopDynamics
 from rps_pin.closed_loop.reading import model_from_urdf
 from rps_pin.closed_loop.vectors import checked_vector
-from rps_pin.closed_loop.wrenches import (
-    Wrenches,
-    checked_wrench,
-    closure_wrenches,
-    forces_on_joints,
-    generalised_force,
-)
-from rps_pin.errors import InputError, MechanismError
+from rps_pin.closed_loop.wrenches import Wrenches, closure_wrenches, forces_on_joints
+from rps_pin.errors import InputError
 
 Array = NDArray[np.float64]
 
-_INFINITY = math.inf
 
-
-class ClosedLoopModel(ClosedLoopKinematics):
+class ClosedLoopModel(ClosedLoopDynamics):
     """Any mechanism: an open tree whose loops are closed by Pinocchio constraint models.
 
     Build once, call often: the scratch memory is allocated here. For that reason one object serves
@@ -69,52 +64,6 @@ class ClosedLoopModel(ClosedLoopKinematics):
     InputError
         If a number or an array does not fit.
     """
-
-    def __init__(
-        self,
-        model: pin.Model,
-        closures: Sequence[Closure],
-        actuated: Sequence[str],
-        *,
-        home: ArrayLike | None = None,
-        effects: JointEffects | None = None,
-        name: str = "",
-        characteristic_length: float | None = None,
-        max_condition: float = MAX_CONDITION,
-    ) -> None:
-        super().__init__(
-            model,
-            closures,
-            actuated,
-            home=home,
-            characteristic_length=characteristic_length,
-            max_condition=max_condition,
-        )
-        if effects is not None and effects.damping.size != model.nv:
-            raise InputError(f"effects are of {effects.damping.size} velocities, not {model.nv}")
-        self.effects = effects
-        self.name = name or model.name
-        self._q_of_v = coordinate_indices(model)
-        self._proximal: ProximalDynamics | None = None
-        loops = self._loops
-        # (eigenpy takes a vector of one number for a matrix: that case goes the other way.)
-        self._square = loops.size == self._passive.size > 1
-        # What a call of `inverse_dynamics` needs, in two look-ups.
-        self._pinocchio = (
-            model,
-            loops.data,
-            loops.calls,
-            loops.constraints,
-            loops.constraint_data,
-        )
-        self._algebra = (
-            eigenpy.PartialPivLU(self._passive.size),
-            self._passive,
-            self._passive.size,
-            np.concatenate([self._passive, self._actuated]),
-            self._least_harmless_rcond(),
-            self._scales,
-        )
 
     @classmethod
     def from_urdf(
@@ -165,193 +114,6 @@ class ClosedLoopModel(ClosedLoopKinematics):
             },
         )
 
-    # Inverse dynamics -----------------------------------------------------------------------------
-
-    def inverse_dynamics(
-        self, q: Array, v: Array, a: Array, *, wrenches: Wrenches | None = None
-    ) -> InverseDynamics:
-        """Return the forces that make the mechanism move as asked: constrained RNEA (see module).
-
-        For speed the motion is taken at its word: q must be closed, and v and a keep it so (as
-        `close`, `velocity` and `acceleration` make them, or `loop_errors` shows).
-
-        Parameters
-        ----------
-        q, v, a
-            Configuration (nq,), velocity (nv,) and acceleration (nv,) as Pinocchio has them.
-        wrenches
-            External wrenches by frame name: (force, moment), (6,), N and N m, that the surroundings
-            exert at the frame's origin, in world axes.
-
-        Returns
-        -------
-        InverseDynamics
-            `tau` (na,), `constraint_forces` (nc,), `residual`, `condition`.
-
-        Raises
-        ------
-        InputError
-            If an argument has the wrong shape or is not finite.
-        SingularityError
-            If the configuration is singular (condition number above `max_condition`), or actuators
-            and mobility do not match.
-        """
-        model, data, calls, constraints, constraint_data = self._pinocchio
-        try:
-            force = rnea(model, data, q, v, a)
-            computeJointJacobians(model, data, q)
-        except (TypeError, ValueError):  # a list, an array of integers, or a wrong shape
-            given, checked = (q, v, a), self._checked_state(q, v, a)
-            if all(array is one for array, one in zip(checked, given, strict=True)):
-                raise  # a complaint of Pinocchio's own
-            return self.inverse_dynamics(*checked, wrenches=wrenches)
-        for calc, scratch in calls:  # getConstraintsJacobian reads what they refresh
-            calc(model, data, scratch)
-        jacobian = getConstraintsJacobian(model, data, constraints, constraint_data)
-        if not self._loops.plain:
-            jacobian = self._loops.kept_rows(jacobian)
-        if self.effects is not None or wrenches:
-            force = force + self._other_forces(q, v, wrenches)
-        if not self._square:
-            return self._inverse_dynamics_by_motions(
-                jacobian.reshape(self.constraint_size, model.nv), force
-            )
-
-        factors, passive, size, order, harmless_rcond, scales = self._algebra
-        passive_jacobian = jacobian.take(passive, axis=1)
-        factors.compute(passive_jacobian.T)
-        multipliers = factors.solve(force.take(passive))  # J_p' lambda = rnea_p
-        if not factors.rcond() > harmless_rcond:
-            self._checked_state(q, v, a)
-            self._refuse_singular(jacobian)
-        # rnea - J' lambda, the passive rows first: they are the residual, the actuated ones tau.
-        rest = dgemv(-1.0, jacobian.T, multipliers, 1.0, force).take(order)
-        residual = dnrm2(rest, size)
-        if not residual < _INFINITY:
-            self._checked_state(q, v, a)
-        return InverseDynamics(rest[size:], multipliers, residual, (scales, passive_jacobian))
-
-    def generalised_force(
-        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, wrenches: Wrenches | None = None
-    ) -> Array:
-        """Return what actuators and closures together must produce, S' tau + J' lambda, (nv,).
-
-        That is ``rnea(q, v, a)`` plus the joints' effects less the external wrenches (as in
-        `inverse_dynamics`).
-        """
-        q_, v_, a_ = self._checked_state(q, v, a)
-        force: Array = rnea(self.model, self._loops.data, q_, v_, a_).copy()
-        if self.effects is not None or wrenches:
-            computeJointJacobians(self.model, self._loops.data, q_)
-            force += self._other_forces(q_, v_, wrenches)
-        return force
-
-    def constraint_forces(
-        self,
-        q: ArrayLike,
-        v: ArrayLike,
-        a: ArrayLike,
-        tau: ArrayLike,
-        *,
-        wrenches: Wrenches | None = None,
-    ) -> Array:
-        """Return lambda (nc,) of a motion under known actuator forces, of least norm.
-
-        Solves J' lambda = rnea(q, v, a) + effects - external forces - S' tau in the least-squares
-        sense: exact where a is what `forward_dynamics` returns.
-        """
-        rest = self.generalised_force(q, v, a, wrenches=wrenches)
-        rest[self._actuated] -= checked_vector(tau, self._actuated.size, "tau")
-        rows, columns = self._loops.row_scale, self._loops.column_scale
-        jacobian = self._scaled(self._loops.jacobian(np.asarray(q, dtype=np.float64)))
-        multipliers, *_ = np.linalg.lstsq(jacobian.T, columns * rest, rcond=1e-10)
-        scaled: Array = rows * multipliers
-        return scaled
-
-    # Forward dynamics -----------------------------------------------------------------------------
-
-    def forward_dynamics(
-        self,
-        q: ArrayLike,
-        v: ArrayLike,
-        tau: ArrayLike,
-        *,
-        wrenches: Wrenches | None = None,
-        method: Literal["reduced", "proximal"] = "reduced",
-    ) -> Array:
-        """Return the acceleration under given actuator forces, shape (nv,).
-
-        Parameters
-        ----------
-        q, v
-            Closed configuration (nq,), and a velocity that keeps it closed (nv,).
-        tau
-            Forces of the actuated joints, shape (na,).
-        wrenches
-            External wrenches, as for `inverse_dynamics`.
-        method
-            ``"reduced"`` solves in the motions that the closures allow (see `forward_dynamics`):
-            exact, also with massless links and redundant rows. ``"proximal"`` calls Pinocchio's
-            `constraintDynamics`, for spherical and rigid closures of links that all have mass.
-
-        Raises
-        ------
-        InputError
-            If an argument has the wrong shape or is not finite.
-        SingularityError
-            If a motion that the closures allow moves no mass.
-        MechanismError
-            If ``"proximal"`` does not apply.
-        """
-        q_, v_ = checked_vector(q, self.model.nq, "q"), checked_vector(v, self.model.nv, "v")
-        tau_ = checked_vector(tau, self._actuated.size, "tau")
-        if method == "proximal":
-            return self._proximal_dynamics(q_, v_, tau_, wrenches)
-        if method != "reduced":
-            raise InputError(f"method = {method!r}; it must be 'reduced' or 'proximal'")
-        return self._reduced_dynamics(q_, v_, tau_, wrenches, self._loops.drift(q_, v_))
-
-    def mass_matrix(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
-        """Return the reduced mass matrix T' M T, shape (m, m); T of `motion_basis`.
-
-        The kinetic energy is u' (T' M T) u / 2, u the velocities of the independent joints (the
-        actuated ones if left out).
-        """
-        basis = self.motion_basis(q, independent)
-        mass: Array = basis.T @ self._tree_mass(np.asarray(q, dtype=np.float64)) @ basis
-        return mass
-
-    def bias(self, q: ArrayLike, v: ArrayLike, independent: Sequence[str] | None = None) -> Array:
-        """Return the reduced bias T' (rnea(q, v, a_0) + effects), shape (m,).
-
-        The forces at the independent joints that keep them from accelerating: a_0 is the
-        acceleration with w = 0. Includes gravity, Coriolis forces, damping, friction and springs.
-        """
-        basis = self.motion_basis(q, independent)
-        chosen = self._independent(independent)
-        a = self.acceleration(q, v, np.zeros(chosen.size), independent)
-        bias: Array = basis.T @ self.generalised_force(q, v, a)
-        return bias
-
-    def gravity_forces(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
-        """Return the forces T' g at the independent joints that carry the weight, shape (m,)."""
-        q_ = checked_vector(q, self.model.nq, "q")
-        basis = self.motion_basis(q_, independent)
-        weight = pin.computeGeneralizedGravity(self.model, self._loops.data, q_)
-        forces: Array = basis.T @ weight
-        return forces
-
-    def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
-        """Return kinetic energy, rotors included, and potential energy, springs included, J."""
-        q_, v_ = checked_vector(q, self.model.nq, "q"), checked_vector(v, self.model.nv, "v")
-        data = self._loops.data
-        kinetic = pin.computeKineticEnergy(self.model, data, q_, v_)
-        kinetic += float(self.model.armature @ v_**2) / 2
-        potential = pin.computePotentialEnergy(self.model, data, q_)
-        if self.effects is not None:
-            potential += self.effects.energy(q_, self._q_of_v)
-        return float(kinetic), float(potential)
-
     # Wrenches -------------------------------------------------------------------------------------
 
     def closure_wrenches(self, q: ArrayLike, constraint_forces: ArrayLike) -> dict[str, Array]:
@@ -400,7 +162,7 @@ class ClosedLoopModel(ClosedLoopKinematics):
         model, data = self.model, self._loops.data
         pin.framesForwardKinematics(model, data, q_)
         forces = forces_on_joints(self._loops, on_closures, self._by_frame(wrenches))
-        rnea(model, data, q_, v_, a_, forces)
+        pin.rnea(model, data, q_, v_, a_, forces)
         carried = {}
         for index, name in enumerate(model.names):
             if index:
@@ -408,101 +170,96 @@ class ClosedLoopModel(ClosedLoopKinematics):
                 carried[name] = (data.f[index].vector.reshape(2, 3) @ turn.T).ravel()
         return carried
 
-    # Inner workings -------------------------------------------------------------------------------
+    # Derivatives ----------------------------------------------------------------------------------
 
-    def _inverse_dynamics_by_motions(self, jacobian: Array, force: Array) -> InverseDynamics:
-        if not np.isfinite(force).all():
-            raise InputError("q, v and a must be finite")
-        self._refuse_singular(jacobian)
-        tau, multipliers = solve_by_allowed_motions(
-            self._loops.row_scale[:, None] * jacobian,
-            self._actuated,
-            force,
-            self._loops.column_scale,
-        )
-        multipliers = self._loops.row_scale * multipliers
-        rest = force - jacobian.T @ multipliers
-        return InverseDynamics(
-            tau,
-            multipliers,
-            float(np.linalg.norm(rest[self._passive])),
-            (self._scales, jacobian[:, self._passive]),
-        )
+    def inverse_dynamics_derivatives(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> InverseDynamicsDerivatives:
+        """Return the derivatives of the actuator forces, analytic; see `derivatives`.
 
-    def _reduced_dynamics(
-        self, q: Array, v: Array, tau: Array, wrenches: Wrenches | None, drift: Array
-    ) -> Array:
-        """Return the acceleration; `drift` is what J a must cancel."""
-        basis, a_0 = self._basis_and_drift(q, drift)
-        force = -rnea(self.model, self._loops.data, q, v, a_0)
-        if self.effects is not None or wrenches:
-            force -= self._other_forces(q, v, wrenches)
-        force[self._actuated] += tau
-        mass = basis.T @ self._tree_mass(q) @ basis
-        a: Array = basis @ solve_reduced(mass, basis.T @ force) + a_0
-        return a
+        Parameters
+        ----------
+        q, v, a, wrenches
+            As for `inverse_dynamics`. Configurations are varied in their tangent,
+            ``pin.integrate(model, q, dq)``.
 
-    def _basis_and_drift(self, q: Array, drift: Array) -> tuple[Array, Array]:
-        """Return T and a_0; T_p = -J_p^-1 J_a where that is well conditioned."""
-        jacobian = self._loops.jacobian(q)
-        rows = self._loops.row_scale
-        if self._square:
-            factors, passive, size, _, harmless_rcond, _ = self._algebra
-            factors.compute(jacobian.take(passive, axis=1))
-            if factors.rcond() > harmless_rcond:
-                right = np.empty((size, self._actuated.size + 1), order="F")
-                right[:, :-1], right[:, -1] = jacobian.take(self._actuated, axis=1), drift
-                solved = factors.solve(right)
-                basis, a_0 = np.zeros((self.model.nv, self._actuated.size)), np.zeros(self.model.nv)
-                basis[passive], a_0[passive] = -solved[:, :-1], -solved[:, -1]
-                basis[self._actuated] = np.eye(self._actuated.size)
-                return basis, a_0
-        return basis_and_drift(rows[:, None] * jacobian, rows * drift, self._loops.column_scale)
-
-    def _proximal_dynamics(
-        self, q: Array, v: Array, tau: Array, wrenches: Wrenches | None
-    ) -> Array:
-        if not self._loops.plain:
-            raise MechanismError(
-                "method='proximal' takes spherical and rigid closures only; use method='reduced'"
-            )
-        force = np.zeros(self.model.nv)
-        if self.effects is not None or wrenches:
-            computeJointJacobians(self.model, self._loops.data, q)
-            force -= self._other_forces(q, v, wrenches)
-        force[self._actuated] += tau
-        if self._proximal is None:
-            self._proximal = ProximalDynamics(self.model, self._loops.constraints)
-        return self._proximal(q, v, force)
-
-    def _tree_mass(self, q: Array) -> Array:
-        """Return the open tree's mass matrix, armature included, shape (nv, nv)."""
-        mass: Array = pin.crba(self.model, self._loops.data, q)
-        return mass.reshape(self.model.nv, self.model.nv)
-
-    def _other_forces(self, q: Array, v: Array, wrenches: Wrenches | None) -> Array:
-        """Return effects less external forces, (nv,); the joints' Jacobians must be computed."""
-        model, data = self.model, self._loops.data
-        force = -generalised_force(model, data, self._by_frame(wrenches), model.nv)
-        if self.effects is not None:
-            force += self.effects.force(q, v, self._q_of_v)
-        return force
-
-    def _by_frame(self, wrenches: Wrenches | None) -> Mapping[int, Array]:
-        given = wrenches or {}
-        return {self._frame(name): checked_wrench(value, name) for name, value in given.items()}
-
-    def _least_harmless_rcond(self) -> float:
-        """Return the reciprocal condition estimate above which no closer look is needed.
-
-        The estimate is in the 1-norm, without scaling, and rarely off by more than a factor of 3
-        (Higham). The norms differ by at most a factor of the size, the scaling by at most the
-        ratios of its factors; one of 100 is for the estimate.
+        Raises
+        ------
+        SingularityError
+            If the actuated joints do not determine the motion here, or are more than the mobility.
         """
-        if not self._square:
-            return 0.0
-        spread = sum(float(np.ptp(np.log(scale))) for scale in self._scales)
-        return min(100 * self._passive.size * math.exp(spread) / self.max_condition, 1.0)
+        q_, v_, a_ = self._checked_state(q, v, a)
+        basis = self.motion_basis(q_)
+        multipliers = self.inverse_dynamics(q_, v_, a_, wrenches=wrenches).constraint_forces
+        slopes, rows = dynamics_slopes(
+            self._loops, (q_, v_, a_), multipliers, self._by_frame(wrenches), self.effects
+        )
+        inverse = self._pseudo_inverse(q_)
+        return inverse_derivatives(slopes, Following(basis, self._actuated, inverse, rows))
+
+    def forward_dynamics_derivatives(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        independent: Sequence[str] | None = None,
+        *,
+        wrenches: Wrenches | None = None,
+    ) -> ForwardDynamicsDerivatives:
+        """Return the derivatives of the acceleration, analytic; see `derivatives`.
+
+        Parameters
+        ----------
+        q, v, tau, wrenches
+            As for `forward_dynamics`.
+        independent
+            Joints whose positions the mechanism follows; the actuated ones if left out.
+
+        Raises
+        ------
+        SingularityError
+            If these joints do not determine the motion here, or a motion moves no mass.
+        """
+        q_, v_ = checked_vector(q, self.model.nq, "q"), checked_vector(v, self.model.nv, "v")
+        a = self.forward_dynamics(q_, v_, tau, wrenches=wrenches)
+        multipliers = self.constraint_forces(q_, v_, a, tau, wrenches=wrenches)
+        basis, chosen = self.motion_basis(q_, independent), self._independent(independent)
+        slopes, rows = dynamics_slopes(
+            self._loops, (q_, v_, a), multipliers, self._by_frame(wrenches), self.effects
+        )
+        inverse = self._pseudo_inverse(q_)
+        following = Following(basis, chosen, inverse, rows)
+        return forward_derivatives(slopes, rows, following, inverse, (chosen, self._actuated))
+
+    def linearize(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        independent: Sequence[str] | None = None,
+        *,
+        wrenches: Wrenches | None = None,
+    ) -> Linearisation:
+        """Return A and B of the motion about an operating point, dx/dt = A dx + B dtau.
+
+        The state x stacks positions and velocities of the independent joints (the actuated ones if
+        left out), shape (2 m,): deviations from the motion through q, v under tau. Exact for joints
+        of one coordinate.
+
+        Parameters
+        ----------
+        q, v, tau, independent, wrenches
+            As for `forward_dynamics_derivatives`.
+        """
+        return linearisation(
+            self.forward_dynamics_derivatives(q, v, tau, independent, wrenches=wrenches)
+        )
+
+    def _pseudo_inverse(self, q: Array) -> Array:
+        """Return the pseudo-inverse of J, in one unit, shape (nv, nc)."""
+        inverse = np.linalg.pinv(self._scaled(self._loops.jacobian(q)), rcond=1e-10)
+        unscaled: Array = self._loops.column_scale[:, None] * inverse * self._loops.row_scale
+        return unscaled
 
 
 def _rebuilt(
