@@ -86,6 +86,16 @@ class ClosedLoopKinematics:
         return self._loops.length
 
     @property
+    def row_scale(self) -> Array:
+        """What rows are multiplied with to be of one unit (m), shape (nc,)."""
+        return self._loops.row_scale.copy()
+
+    @property
+    def velocity_scale(self) -> Array:
+        """What velocities of one unit (m/s) are multiplied with to be theirs, shape (nv,)."""
+        return self._loops.column_scale.copy()
+
+    @property
     def actuated_indices(self) -> NDArray[np.intp]:
         """Indices of the actuated joints in a velocity vector, shape (na,)."""
         return self._actuated.copy()

@@ -22,6 +22,7 @@ from rps_pin.closed_loop.derivatives import (
     linearisation,
 )
 from rps_pin.closed_loop.dynamics import ClosedLoopDynamics
+from rps_pin.closed_loop.mobility import MechanismDescription, describe
 from rps_pin.closed_loop.reading import model_from_urdf
 from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.closed_loop.wrenches import Wrenches, closure_wrenches, forces_on_joints
@@ -113,6 +114,22 @@ class ClosedLoopModel(ClosedLoopDynamics):
                 "max_condition": self.max_condition,
             },
         )
+
+    def describe(self, q: ArrayLike | None = None) -> MechanismDescription:
+        """Return joints, rows, rank, mobility, redundant rows and actuation; `print` it.
+
+        Parameters
+        ----------
+        q
+            Closed configuration to compute it at, shape (nq,). Left out: a regular one, found by
+            small steps from `home`.
+
+        Raises
+        ------
+        ClosureError
+            If the loops do not close from `home`.
+        """
+        return describe(self, None if q is None else checked_vector(q, self.model.nq, "q"))
 
     # Wrenches -------------------------------------------------------------------------------------
 
