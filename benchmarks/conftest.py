@@ -14,7 +14,9 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
         if "role" in bench.extra_info:
             groups[bench.group][bench.extra_info["role"]] = bench.stats
     for group, stats in groups.items():
-        ours = stats.pop("ours")
+        ours = stats.pop("ours", None)
+        if ours is None:  # left out by -k
+            continue
         for peer, theirs in stats.items():
             for figure in ("median", "min"):
                 mine, other = 1e6 * getattr(ours, figure), 1e6 * getattr(theirs, figure)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rps_pin import InputError, MechanismError
+from rps_pin.closed_loop.reading import model_from_urdf
 from tests.closed_loop.mechanisms import FOUR_BAR, build
 
 
@@ -114,3 +115,11 @@ def test_a_bad_number_is_told_with_its_line() -> None:
     number = next(i for i, line in enumerate(lines.splitlines(), 1) if "1,1" in line)
     with pytest.raises(MechanismError, match=rf"line {number}: mass value = '1,1'"):
         build(path_or_xml=lines)
+
+
+def test_the_root_can_float() -> None:
+    fixed, free = (model_from_urdf(FOUR_BAR.urdf(), root) for root in ("fixed", "free"))
+    assert (fixed.nv, free.nv) == (4, 10)
+    assert list(free.names) == ["universe", "root_joint", *list(fixed.names)[1:]]
+    with pytest.raises(InputError, match="root = 'loose': it must be 'fixed' or 'free'"):
+        model_from_urdf(FOUR_BAR.urdf(), "loose")

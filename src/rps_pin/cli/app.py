@@ -11,6 +11,7 @@ import typer
 from rps_pin import __version__
 from rps_pin.cli.check import check_command
 from rps_pin.cli.console import complain
+from rps_pin.cli.describe import describe_command
 from rps_pin.cli.fk import fk_command
 from rps_pin.cli.helix import helix_command
 from rps_pin.cli.ik import ik_command
@@ -33,6 +34,7 @@ app.command("fk")(fk_command)
 app.command("check")(check_command)
 app.command("workspace")(workspace_command)
 app.command("urdf")(urdf_command)
+app.command("describe")(describe_command)
 
 
 def _version(asked: bool) -> None:
@@ -47,11 +49,12 @@ def rps_pin(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Closed-loop robots on Pinocchio: the 3-RPS parallel robot.
+    """Closed-loop robots on Pinocchio: the 3-RPS parallel robot, and any other mechanism.
 
     Everything is in SI units: metres, radians, seconds, kilograms, newtons.
 
-    First steps: **rps-pin helix** computes the paper's motion, **rps-pin view** shows it live.
+    First steps: **rps-pin helix** computes the paper's motion, **rps-pin view** shows it live,
+    **rps-pin describe** tells what any other mechanism can do.
     """
 
 

@@ -1,9 +1,12 @@
 """Any mechanism: open chains and loop closures. Knows nothing of the 3-RPS."""
 
 from rps_pin.closed_loop.closure import JointCoupling, LoopClosure
+from rps_pin.closed_loop.composing import Part, body, compose
 from rps_pin.closed_loop.inverse_dynamics import InverseDynamics
 from rps_pin.closed_loop.joint_effects import JointEffects
 from rps_pin.closed_loop.loops import LoopErrors
+from rps_pin.closed_loop.merging import JointMerge, merged
+from rps_pin.closed_loop.mobility import MechanismDescription
 from rps_pin.closed_loop.model import ClosedLoopModel
 
 __all__ = [
@@ -11,6 +14,12 @@ __all__ = [
     "InverseDynamics",
     "JointCoupling",
     "JointEffects",
+    "JointMerge",
     "LoopClosure",
     "LoopErrors",
+    "MechanismDescription",
+    "Part",
+    "body",
+    "compose",
+    "merged",
 ]

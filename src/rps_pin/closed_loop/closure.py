@@ -158,7 +158,8 @@ class LoopClosure:
         MechanismError
             If a frame is unknown; the message lists the frames there are.
         """
-        return frame_id(model, self.frame_a, self.name), frame_id(model, self.frame_b, self.name)
+        asked_by = f"closure {self.name!r}"
+        return frame_id(model, self.frame_a, asked_by), frame_id(model, self.frame_b, asked_by)
 
     def constraint_model(self, model: pin.Model) -> Any:
         """Return the Pinocchio constraint model of this closure in `model`.
@@ -239,7 +240,8 @@ class JointCoupling:
         return self._joint_id(model, self.joint), self._joint_id(model, self.other)
 
     def _joint_id(self, model: pin.Model, name: str) -> int:
-        simple = [n for n, j in zip(model.names, model.joints, strict=True) if j.nq == j.nv == 1]
+        pairs = list(zip(model.names, model.joints, strict=True))[1:]  # not the world's
+        simple = [candidate for candidate, joint in pairs if joint.nq == joint.nv == 1]
         if name not in simple:
             raise MechanismError(
                 f"coupling {self.name!r}: no joint {name!r} of one coordinate; there are: "
@@ -251,10 +253,12 @@ class JointCoupling:
 Closure = LoopClosure | JointCoupling
 
 
-def frame_id(model: pin.Model, name: str, closure: str) -> int:
+def frame_id(model: pin.Model, name: str, asked_by: str = "") -> int:
     """Return the index of a frame, or say which frames there are."""
-    index = model.getFrameId(name)
-    if index >= model.nframes:
-        names = ", ".join(frame.name for frame in model.frames)
-        raise MechanismError(f"closure {closure!r}: no frame {name!r}; there are: {names}")
-    return int(index)
+    names = [frame.name for frame in model.frames]
+    prefix = f"{asked_by}: " if asked_by else ""
+    if name not in names:
+        raise MechanismError(f"{prefix}no frame {name!r}; there are: {', '.join(names)}")
+    if names.count(name) > 1:
+        raise MechanismError(f"{prefix}{names.count(name)} frames have the name {name!r}")
+    return names.index(name)

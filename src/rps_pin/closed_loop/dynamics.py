@@ -15,9 +15,14 @@ from scipy.linalg.blas import dgemv, dnrm2
 
 from rps_pin.closed_loop.closure import Closure
 from rps_pin.closed_loop.forward_dynamics import ProximalDynamics, basis_and_drift, solve_reduced
-from rps_pin.closed_loop.inverse_dynamics import InverseDynamics, solve_by_allowed_motions
+from rps_pin.closed_loop.inverse_dynamics import (
+    RANK_TOLERANCE,
+    InverseDynamics,
+    solve_by_allowed_motions,
+)
 from rps_pin.closed_loop.joint_effects import JointEffects, coordinate_indices
 from rps_pin.closed_loop.kinematics import MAX_CONDITION, ClosedLoopKinematics
+from rps_pin.closed_loop.passive_factors import PassiveFactors
 from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.closed_loop.wrenches import Wrenches, checked_wrench, generalised_force
 from rps_pin.errors import InputError, MechanismError
@@ -56,6 +61,7 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         self.name = name or model.name
         self._q_of_v = coordinate_indices(model)
         self._proximal: ProximalDynamics | None = None
+        self._ones = np.eye(self._actuated.size)
         loops = self._loops
         # (eigenpy takes a vector of one number for a matrix: that case goes the other way.)
         self._square = loops.size == self._passive.size > 1
@@ -124,7 +130,7 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         if self.effects is not None or wrenches:
             force = force + self._other_forces(q, v, wrenches)
         if not self._square:
-            return self._inverse_dynamics_by_motions(
+            return self._inverse_dynamics_otherwise(
                 jacobian.reshape(self.constraint_size, model.nv), force
             )
 
@@ -265,9 +271,27 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
 
     # Inner workings -------------------------------------------------------------------------------
 
-    def _inverse_dynamics_by_motions(self, jacobian: Array, force: Array) -> InverseDynamics:
+    def _inverse_dynamics_otherwise(self, jacobian: Array, force: Array) -> InverseDynamics:
+        """Return the answer where J_p is not square: redundant rows, more or fewer actuators."""
         if not np.isfinite(force).all():
             raise InputError("q, v and a must be finite")
+        factors = self._passive_factors(jacobian)
+        if factors is None:
+            return self._inverse_dynamics_by_motions(jacobian, force)
+        multipliers = factors.multipliers(force[self._passive])  # J_p' lambda = rnea_p
+        rest = force - jacobian.T @ multipliers
+        return self._inverse_answer(rest[self._actuated], multipliers, rest, jacobian)
+
+    def _passive_factors(self, jacobian: Array) -> PassiveFactors | None:
+        """Return the factors of J_p if it alone determines lambda, or x_p, up to redundancy."""
+        if not self.constraint_size >= self._passive.size > 0:
+            return None
+        factors = PassiveFactors(jacobian[:, self._passive], *self._scales)
+        if not 100 * factors.condition <= self.max_condition:
+            self._refuse_singular(jacobian)
+        return factors if factors.determines(jacobian[:, self._actuated]) else None
+
+    def _inverse_dynamics_by_motions(self, jacobian: Array, force: Array) -> InverseDynamics:
         self._refuse_singular(jacobian)
         tau, multipliers = solve_by_allowed_motions(
             self._loops.row_scale[:, None] * jacobian,
@@ -277,11 +301,14 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         )
         multipliers = self._loops.row_scale * multipliers
         rest = force - jacobian.T @ multipliers
+        return self._inverse_answer(tau, multipliers, rest, jacobian)
+
+    def _inverse_answer(
+        self, tau: Array, multipliers: Array, rest: Array, jacobian: Array
+    ) -> InverseDynamics:
+        residual = float(dnrm2(rest[self._passive])) if self._passive.size else 0.0
         return InverseDynamics(
-            tau,
-            multipliers,
-            float(np.linalg.norm(rest[self._passive])),
-            (self._scales, jacobian[:, self._passive]),
+            tau, multipliers, residual, (self._scales, jacobian[:, self._passive])
         )
 
     def _reduced_dynamics(
@@ -300,19 +327,33 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
     def _basis_and_drift(self, q: Array, drift: Array) -> tuple[Array, Array]:
         """Return T and a_0; T_p = -J_p^-1 J_a where that is well conditioned."""
         jacobian = self._loops.jacobian(q)
-        rows = self._loops.row_scale
+        right = np.empty((self.constraint_size, self._actuated.size + 1), order="F")
+        right[:, :-1], right[:, -1] = jacobian.take(self._actuated, axis=1), drift
+        solved = self._solved_for_passive(jacobian, right)
+        if solved is None:  # at a singularity of the actuators, too, the motion is determined
+            rows = self._loops.row_scale
+            return basis_and_drift(rows[:, None] * jacobian, rows * drift, self._loops.column_scale)
+        basis, a_0 = np.zeros((self.model.nv, self._actuated.size)), np.zeros(self.model.nv)
+        basis[self._passive], a_0[self._passive] = -solved[:, :-1], -solved[:, -1]
+        basis[self._actuated] = self._ones
+        return basis, a_0
+
+    def _solved_for_passive(self, jacobian: Array, right: Array) -> Array | None:
+        """Return J_p^-1 right, if J_p is well conditioned and determines all other motion."""
         if self._square:
-            factors, passive, size, _, harmless_rcond, _ = self._algebra
+            factors, passive, _, _, harmless_rcond, _ = self._algebra
             factors.compute(jacobian.take(passive, axis=1))
-            if factors.rcond() > harmless_rcond:
-                right = np.empty((size, self._actuated.size + 1), order="F")
-                right[:, :-1], right[:, -1] = jacobian.take(self._actuated, axis=1), drift
-                solved = factors.solve(right)
-                basis, a_0 = np.zeros((self.model.nv, self._actuated.size)), np.zeros(self.model.nv)
-                basis[passive], a_0[passive] = -solved[:, :-1], -solved[:, -1]
-                basis[self._actuated] = np.eye(self._actuated.size)
-                return basis, a_0
-        return basis_and_drift(rows[:, None] * jacobian, rows * drift, self._loops.column_scale)
+            solved: Array = factors.solve(right)
+            return solved if factors.rcond() > harmless_rcond else None
+        if not self.constraint_size >= self._passive.size > 0:
+            return None
+        qr = PassiveFactors(jacobian[:, self._passive], *self._scales)
+        if not 100 * qr.condition <= self.max_condition:
+            return None
+        solved, left = qr.passive(right[:, :-1])
+        if left > RANK_TOLERANCE:
+            return None
+        return np.hstack([solved, qr.passive(right[:, -1:])[0]])
 
     def _proximal_dynamics(
         self, q: Array, v: Array, tau: Array, wrenches: Wrenches | None

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dposv
 
 from rps_pin.closed_loop.inverse_dynamics import RANK_TOLERANCE
 from rps_pin.errors import MechanismError, SingularityError
@@ -51,14 +52,12 @@ def solve_reduced(mass: Array, force: Array) -> Array:
     SingularityError
         If the reduced mass matrix is not positive definite.
     """
-    try:
-        factor = np.linalg.cholesky(mass)
-    except np.linalg.LinAlgError:
-        pass
-    else:
-        diagonal = np.diag(factor)
-        if diagonal.size == 0 or diagonal.min() ** 2 > _NO_INERTIA * diagonal.max() ** 2:
-            return np.asarray(np.linalg.solve(mass, force), dtype=np.float64)
+    if mass.size == 0:
+        return np.zeros(0)
+    factor, solution, failed = dposv(mass, force)  # Cholesky
+    diagonal = factor.diagonal()
+    if not failed and diagonal.min() ** 2 > _NO_INERTIA * diagonal.max() ** 2:
+        return np.asarray(solution, dtype=np.float64)
     raise SingularityError(
         "a motion that the closures allow moves no mass: its acceleration is not determined "
         "(give the links on its way a mass, or its joints an armature)",

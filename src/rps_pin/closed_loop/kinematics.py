@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.closed_loop.closing import close_gaps
-from rps_pin.closed_loop.closure import Closure
+from rps_pin.closed_loop.closure import Closure, frame_id
 from rps_pin.closed_loop.inverse_dynamics import allowed_motions, condition_number
 from rps_pin.closed_loop.limits import JointLimits
 from rps_pin.closed_loop.loops import LoopErrors, Loops, refuse_twice
@@ -63,6 +63,7 @@ class ClosedLoopKinematics:
         self._passive = np.setdiff1d(np.arange(model.nv), self._actuated)
         self._scales = loops.row_scale[:, None], loops.column_scale[self._passive]
         self._limits = JointLimits(model)
+        self._frame_ids: dict[str, int] = {}
         self._home = pin.neutral(model) if home is None else self._normal(home, "home")
 
     # What it is made of ---------------------------------------------------------------------------
@@ -567,11 +568,9 @@ class ClosedLoopKinematics:
         return np.array(indices, dtype=np.intp)
 
     def _frame(self, name: str) -> int:
-        index = int(self.model.getFrameId(name))
-        if index >= self.model.nframes:
-            names = ", ".join(frame.name for frame in self.model.frames)
-            raise MechanismError(f"no frame {name!r}; there are: {names}")
-        return index
+        if name not in self._frame_ids:
+            self._frame_ids[name] = frame_id(self.model, name)
+        return self._frame_ids[name]
 
     def _reference(self, axes: str) -> Any:
         references = {

@@ -23,6 +23,7 @@ from rps_pin.errors import InputError, MechanismError
 Array = NDArray[np.float64]
 
 _WORLD_AXES = ("spherical", "rigid")
+_WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 class LoopErrors(NamedTuple):
@@ -122,6 +123,9 @@ class Loops:
             for constraint, data in zip(self.constraints, self.constraint_data, strict=True)
         ]
         self._add_frames()
+        points = [frames for frames in self.closed_frames if frames.closure.kind == "spherical"]
+        self._points = [(frames.rows, frames.frame_a, frames.frame_b) for frames in points]
+        self._wholes = [frames for frames in self.closed_frames if frames not in points]
         self.plain = bool(self.closed_frames) and not self.couplings
         self.plain = self.plain and all(frames.in_world for frames in self.closed_frames)
         self.length = self._length(characteristic_length)
@@ -241,14 +245,16 @@ class Loops:
 
         This is the derivative of J itself, also where the loops are open.
         """
-        pin.forwardKinematics(self.model, self.data, q, v, self._still)
+        model, data, acceleration = self.model, self.data, pin.getFrameClassicalAcceleration
+        pin.forwardKinematics(model, data, q, v, self._still)
         drift = np.zeros(self.size)
-        for frames in self.closed_frames:
-            drift[frames.rows] = (
-                self._world_acceleration(frames)
-                if frames.closure.kind == "spherical"
-                else self._kept_motion(frames)[1]
+        for rows, a, b in self._points:
+            drift[rows] = (
+                acceleration(model, data, a, _WORLD).linear
+                - acceleration(model, data, b, _WORLD).linear
             )
+        for frames in self._wholes:
+            drift[frames.rows] = self._kept_motion(frames)[1]
         return drift
 
     def worst(self, gaps: Array) -> tuple[float, str]:
@@ -265,21 +271,15 @@ class Loops:
 
     def _world_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
         """Return velocity and acceleration of a less those of b, each frame's at its own origin."""
-        axes, size = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, frames.closure.size
-        a, b = (
-            pin.getFrameVelocity(self.model, self.data, frame, axes)
-            for frame in (frames.frame_a, frames.frame_b)
+        size = frames.closure.size
+        rates, accelerations = (
+            [of(self.model, self.data, frame, _WORLD) for frame in (frames.frame_a, frames.frame_b)]
+            for of in (pin.getFrameVelocity, pin.getFrameClassicalAcceleration)
         )
-        return (a - b).vector[:size], self._world_acceleration(frames)
-
-    def _world_acceleration(self, frames: ClosedFrames) -> Array:
-        axes, size = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED, frames.closure.size
-        a, b = (
-            pin.getFrameClassicalAcceleration(self.model, self.data, frame, axes)
-            for frame in (frames.frame_a, frames.frame_b)
+        return (
+            (rates[0] - rates[1]).vector[:size],
+            (accelerations[0] - accelerations[1]).vector[:size],
         )
-        acceleration: Array = (a - b).vector[:size]
-        return acceleration
 
     def _kept_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
         """Return J v and its derivative, J made of W and the twist X of a relative to b.

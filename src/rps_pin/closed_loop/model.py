@@ -21,8 +21,13 @@ from rps_pin.closed_loop.derivatives import (
     inverse_derivatives,
     linearisation,
 )
+from rps_pin.closed_loop.description import parts_from_yaml
 from rps_pin.closed_loop.dynamics import ClosedLoopDynamics
+from rps_pin.closed_loop.joint_effects import FRICTION_SPEED, JointEffects
+from rps_pin.closed_loop.kinematics import MAX_CONDITION
+from rps_pin.closed_loop.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.mobility import MechanismDescription, describe
+from rps_pin.closed_loop.parts import MechanismParts
 from rps_pin.closed_loop.reading import model_from_urdf
 from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.closed_loop.wrenches import Wrenches, closure_wrenches, forces_on_joints
@@ -100,6 +105,80 @@ class ClosedLoopModel(ClosedLoopDynamics):
         model = model_from_urdf(path_or_xml)
         model.gravity.linear = checked_vector(gravity, 3, "gravity")
         return cls(model, closures, actuated, **options)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> ClosedLoopModel:
+        """Build a mechanism from its description, a YAML file; see `description`.
+
+        The file names a URDF or MJCF, the closures, the actuated joints, and where `home` is: the
+        loops are closed from there.
+
+        Raises
+        ------
+        InputError, MechanismError
+            If a file cannot be read, or what it says does not hold together; with file and line.
+        ClosureError
+            If the loops do not close from the home that the file gives; says by how much, and
+            which.
+        """
+        return cls._from_parts(parts_from_yaml(path))
+
+    @classmethod
+    def from_mjcf(
+        cls,
+        path_or_xml: str | os.PathLike[str],
+        *,
+        closures: Sequence[Closure] = (),
+        actuated: Sequence[str] | None = None,
+    ) -> ClosedLoopModel:
+        """Build a mechanism from a MuJoCo file: its path, or its text (which begins with ``<``).
+
+        Its ``equality`` elements (connect, weld, joint) are the closures, its ``actuator`` elements
+        say what is actuated. MuJoCo itself is not needed.
+
+        Parameters
+        ----------
+        path_or_xml
+            The file, or its text.
+        closures
+            Further closures, after those of the file.
+        actuated
+            Names of the actuated joints, instead of the file's.
+
+        Raises
+        ------
+        InputError, MechanismError
+            As `load`; also for elements that have no counterpart here.
+        ClosureError
+            As `load`.
+        """
+        return cls._from_parts(parts_from_mjcf(path_or_xml, closures=closures, actuated=actuated))
+
+    @classmethod
+    def _from_parts(cls, parts: MechanismParts) -> ClosedLoopModel:
+        effects = None
+        if parts.damping or parts.friction or parts.stiffness:
+            effects = JointEffects.named(
+                parts.model,
+                damping=parts.damping,
+                friction=parts.friction,
+                stiffness=parts.stiffness,
+                rest=parts.rest,
+                friction_speed=parts.friction_speed or FRICTION_SPEED,
+            )
+        mechanism = cls(
+            parts.model,
+            parts.closures,
+            parts.actuated,
+            home=parts.home,
+            effects=effects,
+            name=parts.name,
+            characteristic_length=parts.characteristic_length,
+            max_condition=parts.max_condition or MAX_CONDITION,
+        )
+        if parts.home is not None:
+            mechanism._home = mechanism.close(parts.home)
+        return mechanism
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Give copies, and other processes, scratch memory of their own."""

@@ -1,0 +1,33 @@
+"""``rps-pin describe``: what a mechanism is made of, and how it can move."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from rps_pin.cli.mechanism_options import FileArgument, load_mechanism
+
+
+def describe_command(
+    file: FileArgument,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print it as JSON, and nothing else.")
+    ] = False,
+) -> None:
+    """Describe any mechanism: joints, closures, rank, mobility, and whether its actuators suffice.
+
+    Exit status: 0; 1 if the file is no mechanism, or its loops do not close; 2 wrong usage.
+
+    Examples:
+
+    - `rps-pin describe urdf/delta.yaml`
+
+    - `rps-pin describe robot.xml --json` of a MuJoCo file
+    """
+    description = load_mechanism(file).describe()
+    if as_json:
+        typer.echo(json.dumps(description.as_dict(), indent=2, allow_nan=False))
+    else:
+        typer.echo(str(description))

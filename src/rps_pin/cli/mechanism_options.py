@@ -1,0 +1,65 @@
+"""What the commands for any mechanism share: the file's argument, and values by joint name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.errors import InputError
+
+FileArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE",
+        help="A mechanism's description (**.yaml**), or a MuJoCo file (**.xml**).",
+        show_default=False,
+    ),
+]
+
+
+def load_mechanism(file: Path) -> ClosedLoopModel:
+    """Return the mechanism of a file, told by its suffix.
+
+    Raises
+    ------
+    InputError
+        If the suffix is of neither kind; says what a URDF lacks.
+    """
+    suffix = file.suffix.lower()
+    if suffix in (".yaml", ".yml"):
+        return ClosedLoopModel.load(file)
+    if suffix == ".xml":
+        return ClosedLoopModel.from_mjcf(file)
+    if suffix == ".urdf":
+        raise InputError(
+            f"{file}: a URDF has no closures; name it in a description: urdf: {file.name}, "
+            "closures: [...], actuated: [...] in a .yaml file"
+        )
+    raise InputError(f"{file}: a mechanism's file ends in .yaml (a description) or .xml (MuJoCo)")
+
+
+def by_joint(pairs: Sequence[str], option: str) -> dict[str, float]:
+    """Return the values of options like ``--tau crank=1.5``, by joint name.
+
+    Raises
+    ------
+    InputError
+        If one is not of that form, or a joint comes twice.
+    """
+    values: dict[str, float] = {}
+    for pair in pairs:
+        name, _, number = pair.rpartition("=")
+        try:
+            value = float(number)
+        except ValueError:
+            name = ""
+        if not name:
+            raise InputError(f"{option} {pair!r}: it must be JOINT=NUMBER, such as crank=1.5")
+        if name in values:
+            raise InputError(f"{option}: joint {name!r} is named twice")
+        values[name] = value
+    return values
