@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-import eigenpy
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +15,11 @@ from scipy.linalg.blas import dgemv, dnrm2
 from rps_pin.closed_loop.closure import Closure
 from rps_pin.closed_loop.forward_dynamics import ProximalDynamics, basis_and_drift, solve_reduced
 from rps_pin.closed_loop.inverse_dynamics import (
-    RANK_TOLERANCE,
     InverseDynamics,
     solve_by_allowed_motions,
 )
 from rps_pin.closed_loop.joint_effects import JointEffects, coordinate_indices
 from rps_pin.closed_loop.kinematics import MAX_CONDITION, ClosedLoopKinematics
-from rps_pin.closed_loop.passive_factors import PassiveFactors
 from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.closed_loop.wrenches import Wrenches, checked_wrench, generalised_force
 from rps_pin.errors import InputError, MechanismError
@@ -61,10 +58,7 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         self.name = name or model.name
         self._q_of_v = coordinate_indices(model)
         self._proximal: ProximalDynamics | None = None
-        self._ones = np.eye(self._actuated.size)
-        loops = self._loops
-        # (eigenpy takes a vector of one number for a matrix: that case goes the other way.)
-        self._square = loops.size == self._passive.size > 1
+        loops, solver = self._loops, self._solver
         # What a call of `inverse_dynamics` needs, in two look-ups.
         self._pinocchio = (
             model,
@@ -74,11 +68,11 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
             loops.constraint_data,
         )
         self._algebra = (
-            eigenpy.PartialPivLU(self._passive.size),
+            solver.lu,
             self._passive,
             self._passive.size,
             np.concatenate([self._passive, self._actuated]),
-            self._least_harmless_rcond(),
+            solver.harmless_rcond,
             self._scales,
         )
 
@@ -129,7 +123,7 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
             jacobian = self._loops.kept_rows(jacobian)
         if self.effects is not None or wrenches:
             force = force + self._other_forces(q, v, wrenches)
-        if not self._square:
+        if not self._solver.square:
             return self._inverse_dynamics_otherwise(
                 jacobian.reshape(self.constraint_size, model.nv), force
             )
@@ -144,8 +138,9 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         # rnea - J' lambda, the passive rows first: they are the residual, the actuated ones tau.
         rest = dgemv(-1.0, jacobian.T, multipliers, 1.0, force).take(order)
         residual = dnrm2(rest, size)
-        if not residual < _INFINITY:
+        if not residual < _INFINITY:  # a pivot that is exactly zero escapes the estimate
             self._checked_state(q, v, a)
+            self._refuse(math.inf)
         return InverseDynamics(rest[size:], multipliers, residual, (scales, passive_jacobian))
 
     def generalised_force(
@@ -275,21 +270,12 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         """Return the answer where J_p is not square: redundant rows, more or fewer actuators."""
         if not np.isfinite(force).all():
             raise InputError("q, v and a must be finite")
-        factors = self._passive_factors(jacobian)
+        factors = self._solver.factors(jacobian)
         if factors is None:
             return self._inverse_dynamics_by_motions(jacobian, force)
         multipliers = factors.multipliers(force[self._passive])  # J_p' lambda = rnea_p
         rest = force - jacobian.T @ multipliers
         return self._inverse_answer(rest[self._actuated], multipliers, rest, jacobian)
-
-    def _passive_factors(self, jacobian: Array) -> PassiveFactors | None:
-        """Return the factors of J_p if it alone determines lambda, or x_p, up to redundancy."""
-        if not self.constraint_size >= self._passive.size > 0:
-            return None
-        factors = PassiveFactors(jacobian[:, self._passive], *self._scales)
-        if not 100 * factors.condition <= self.max_condition:
-            self._refuse_singular(jacobian)
-        return factors if factors.determines(jacobian[:, self._actuated]) else None
 
     def _inverse_dynamics_by_motions(self, jacobian: Array, force: Array) -> InverseDynamics:
         self._refuse_singular(jacobian)
@@ -329,31 +315,13 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         jacobian = self._loops.jacobian(q)
         right = np.empty((self.constraint_size, self._actuated.size + 1), order="F")
         right[:, :-1], right[:, -1] = jacobian.take(self._actuated, axis=1), drift
-        solved = self._solved_for_passive(jacobian, right)
+        solved = self._solver.solve(jacobian, right)
         if solved is None:  # at a singularity of the actuators, too, the motion is determined
             rows = self._loops.row_scale
             return basis_and_drift(rows[:, None] * jacobian, rows * drift, self._loops.column_scale)
-        basis, a_0 = np.zeros((self.model.nv, self._actuated.size)), np.zeros(self.model.nv)
-        basis[self._passive], a_0[self._passive] = -solved[:, :-1], -solved[:, -1]
-        basis[self._actuated] = self._ones
-        return basis, a_0
-
-    def _solved_for_passive(self, jacobian: Array, right: Array) -> Array | None:
-        """Return J_p^-1 right, if J_p is well conditioned and determines all other motion."""
-        if self._square:
-            factors, passive, _, _, harmless_rcond, _ = self._algebra
-            factors.compute(jacobian.take(passive, axis=1))
-            solved: Array = factors.solve(right)
-            return solved if factors.rcond() > harmless_rcond else None
-        if not self.constraint_size >= self._passive.size > 0:
-            return None
-        qr = PassiveFactors(jacobian[:, self._passive], *self._scales)
-        if not 100 * qr.condition <= self.max_condition:
-            return None
-        solved, left = qr.passive(right[:, :-1])
-        if left > RANK_TOLERANCE:
-            return None
-        return np.hstack([solved, qr.passive(right[:, -1:])[0]])
+        a_0 = np.zeros(self.model.nv)
+        a_0[self._passive] = -solved[:, -1]
+        return self._basis(solved[:, :-1]), a_0
 
     def _proximal_dynamics(
         self, q: Array, v: Array, tau: Array, wrenches: Wrenches | None
@@ -387,15 +355,3 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
     def _by_frame(self, wrenches: Wrenches | None) -> Mapping[int, Array]:
         given = wrenches or {}
         return {self._frame(name): checked_wrench(value, name) for name, value in given.items()}
-
-    def _least_harmless_rcond(self) -> float:
-        """Return the reciprocal condition estimate above which no closer look is needed.
-
-        The estimate is in the 1-norm, without scaling, and rarely off by more than a factor of 3
-        (Higham). The norms differ by at most a factor of the size, the scaling by at most the
-        ratios of its factors; one of 100 is for the estimate.
-        """
-        if not self._square:
-            return 0.0
-        spread = sum(float(np.ptp(np.log(scale))) for scale in self._scales)
-        return min(100 * self._passive.size * math.exp(spread) / self.max_condition, 1.0)

@@ -19,6 +19,7 @@ from rps_pin.closed_loop.closure import Closure, frame_id
 from rps_pin.closed_loop.inverse_dynamics import allowed_motions, condition_number
 from rps_pin.closed_loop.limits import JointLimits
 from rps_pin.closed_loop.loops import LoopErrors, Loops, refuse_twice
+from rps_pin.closed_loop.passive_factors import PassiveSolver
 from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import ClosureError, InputError, MechanismError, SingularityError
 
@@ -62,6 +63,8 @@ class ClosedLoopKinematics:
         self._actuated = self._velocity_indices(self.actuated, "to actuate")
         self._passive = np.setdiff1d(np.arange(model.nv), self._actuated)
         self._scales = loops.row_scale[:, None], loops.column_scale[self._passive]
+        self._solver = PassiveSolver(self._passive, self._actuated, *self._scales, max_condition)
+        self._ones = np.eye(self._actuated.size)
         self._limits = JointLimits(model)
         self._frame_ids: dict[str, int] = {}
         self._home = pin.neutral(model) if home is None else self._normal(home, "home")
@@ -308,6 +311,11 @@ class ClosedLoopKinematics:
             If these joints do not determine the motion, or do not move independently, here.
         """
         chosen = self._independent(independent)
+        if chosen is self._actuated:
+            jacobian = self._loops.jacobian(checked_vector(q, self.model.nq, "q"))
+            solved = self._solver.solve(jacobian, jacobian.take(chosen, axis=1))
+            if solved is not None:
+                return self._basis(solved)
         motions = self.allowed_motions(q)
         own = motions[chosen]
         if own.shape[0] != own.shape[1]:
@@ -455,6 +463,12 @@ class ClosedLoopKinematics:
 
     # Inner workings -------------------------------------------------------------------------------
 
+    def _basis(self, solved: Array) -> Array:
+        """Return T, whose passive rows are -J_p^-1 J_a = -solved."""
+        basis = np.zeros((self.model.nv, self._actuated.size))
+        basis[self._passive], basis[self._actuated] = -solved, self._ones
+        return basis
+
     def _closed_from(self, start: Array, held: NDArray[np.bool_], within_limits: bool) -> Array:
         scale = self._loops.column_scale
         return close_gaps(
@@ -484,7 +498,14 @@ class ClosedLoopKinematics:
     ) -> Array:
         """Return x with x_a given and J x + drift = 0: J_p x_p = -J_a x_a - drift."""
         rest = self._passive
-        if given is not self._actuated:
+        if given is self._actuated:
+            right = (jacobian.take(given, axis=1) @ values + drift)[:, None]
+            solved = self._solver.solve(jacobian, right)
+            if solved is not None:
+                full = np.empty(self.model.nv)
+                full[given], full[rest] = values, -solved[:, 0]
+                return full
+        else:
             rest = np.setdiff1d(np.arange(self.model.nv), given)
         rows, columns = self._scales[0], self._loops.column_scale[rest]
         left = rows * jacobian[:, rest] * columns

@@ -1,7 +1,8 @@
-"""The passive joints' Jacobian J_p with redundant rows, factorised.
+"""The passive joints' Jacobian J_p, factorised.
 
-A mechanism with as many actuators as mobility has a J_p of full column rank; with redundant rows it
-is taller than wide. Scaled to one unit and with its columns permuted, J_p = Q R. Then
+A mechanism with as many actuators as mobility has a J_p of full column rank. Where it is square,
+LU serves; with redundant rows it is taller than wide, and, scaled to one unit and its columns
+permuted, J_p = Q R. Then
 
 - J_p' lambda = f_p has the solution of least norm lambda = Q R^-T f_p;
 - J_p x_p = b has the least-squares solution x_p = R^-1 Q' b, and b lies in the range of J_p if the
@@ -10,11 +11,15 @@ is taller than wide. Scaled to one unit and with its columns permuted, J_p = Q R
 
 from __future__ import annotations
 
+import math
+
+import eigenpy
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import dasum
 from scipy.linalg.lapack import dgeqp3, dormqr, dtrtrs
 
-from rps_pin.closed_loop.inverse_dynamics import RANK_TOLERANCE
+from rps_pin.closed_loop.inverse_dynamics import RANK_TOLERANCE, condition_number
 
 Array = NDArray[np.float64]
 
@@ -74,3 +79,81 @@ class PassiveFactors:
         turned, _, _ = dormqr("L", transposed, self._packed, self._reflectors, right, self._work)
         product: Array = turned
         return product
+
+
+class PassiveSolver:
+    """Solves J_p x_p = b of one mechanism, memory allocated once.
+
+    Parameters
+    ----------
+    passive, actuated
+        Indices of the velocities, shapes (np,) and (na,).
+    rows, columns
+        Scaling of J_p to one unit, shapes (nc, 1) and (np,).
+    max_condition
+        Of `ClosedLoopModel`.
+
+    Attributes
+    ----------
+    square : bool
+        Whether J_p is square. (eigenpy takes a vector of one number for a matrix: one row is not
+        counted as square.)
+    lu
+        Space for the factors of a square J_p.
+    harmless_rcond : float
+        Its reciprocal condition estimate above which no closer look is needed.
+    """
+
+    def __init__(
+        self,
+        passive: NDArray[np.intp],
+        actuated: NDArray[np.intp],
+        rows: Array,
+        columns: Array,
+        max_condition: float,
+    ) -> None:
+        self._passive, self._actuated = passive, actuated
+        self._scales, self._max_condition = (rows, columns), max_condition
+        self.square = rows.size == passive.size > 1
+        self.lu = eigenpy.PartialPivLU(passive.size)
+        self.harmless_rcond = self._least_harmless_rcond()
+
+    def solve(self, jacobian: Array, right: Array) -> Array | None:
+        """Return x_p (np, k) with J_p x_p = b, if the actuators well determine the motion.
+
+        None near a singularity, and where they are more or fewer than the mobility. Of a b that no
+        x_p solves, the least-squares solution.
+        """
+        if self.square:
+            self.lu.compute(jacobian.take(self._passive, axis=1))
+            solved: Array = self.lu.solve(right).reshape(right.shape)  # one column comes flat
+            # (Of a pivot that is exactly zero the estimate knows nothing: the solution does.)
+            well = self.lu.rcond() > self.harmless_rcond and math.isfinite(dasum(solved.ravel("K")))
+            return solved if well else None
+        factors = self.factors(jacobian)
+        return None if factors is None else factors.passive(right)[0]
+
+    def factors(self, jacobian: Array) -> PassiveFactors | None:
+        """Return the factors of a J_p taller than wide, or None in the same cases."""
+        rows, columns = self._scales
+        if not rows.size >= columns.size > 0:
+            return None
+        passive = jacobian[:, self._passive]
+        factors = PassiveFactors(passive, rows, columns)
+        well = (
+            100 * factors.condition <= self._max_condition
+            or condition_number(rows * passive * columns) <= self._max_condition
+        )
+        return factors if well and factors.determines(jacobian[:, self._actuated]) else None
+
+    def _least_harmless_rcond(self) -> float:
+        """Return the reciprocal condition estimate above which no closer look is needed.
+
+        The estimate is in the 1-norm, without scaling, and rarely off by more than a factor of 3
+        (Higham). The norms differ by at most a factor of the size, the scaling by at most the
+        ratios of its factors; one of 100 is for the estimate.
+        """
+        if not self.square:
+            return 0.0
+        spread = sum(float(np.ptp(np.log(scale))) for scale in self._scales)
+        return min(100 * self._passive.size * math.exp(spread) / self._max_condition, 1.0)

@@ -21,9 +21,13 @@ def checked_vector(value: ArrayLike, size: int, name: str) -> Array:
     InputError
         If it is not; says how.
     """
-    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.shape == (size,):
-        if math.isfinite(dasum(value)):  # the fast way, for control loops
-            return value
+    if (  # the fast way, for control loops
+        isinstance(value, np.ndarray)
+        and value.dtype == np.float64
+        and value.shape == (size,)
+        and math.isfinite(dasum(value))
+    ):
+        return value
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
