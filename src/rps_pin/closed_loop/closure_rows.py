@@ -22,6 +22,7 @@ accelerations (first) and for derivatives of the dynamics (first and second).
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
@@ -51,6 +52,10 @@ class Rows(ABC):
         """Return W, shape (k, 6), (force, moment) at a's origin."""
 
     @abstractmethod
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return W' X, shape (k,), where a moves with the twist X relative to b: -(D X) X."""
+
+    @abstractmethod
     def slope(self, placement: pin.SE3) -> Array:
         """Return D, shape (k, 6, 6): dW along a relative twist eta is D @ eta."""
 
@@ -64,6 +69,7 @@ class PointRows(Rows):
 
     def __init__(self, directions: Array) -> None:
         self.directions = directions
+        self._at_origin = np.hstack([directions, np.zeros_like(directions)])
         self.angular = np.zeros(len(directions), dtype=bool)
         self._cross = np.array([skew(u) for u in directions])
 
@@ -74,7 +80,16 @@ class PointRows(Rows):
 
     def wrenches(self, placement: pin.SE3) -> Array:
         """Return (u, p x u)."""
-        return np.hstack([self.directions, -self._cross @ placement.translation])
+        wrenches = self._at_origin.copy()
+        wrenches[:, 3:] = -self._cross @ placement.translation
+        return wrenches
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return (u x s) . X_a = u . (s x X_a), s = X_l + X_a x p."""
+        linear, angular = twist[:3], twist[3:]
+        s = linear + skew(angular) @ placement.translation
+        bend: Array = self.directions @ (skew(s) @ angular)
+        return bend
 
     def slope(self, placement: pin.SE3) -> Array:
         """Return d(u, p x u) = (0, -u x dp)."""
@@ -100,8 +115,17 @@ class AxisRows(Rows):
 
     def wrenches(self, placement: pin.SE3) -> Array:
         """Return (0, m x n)."""
-        moments = np.cross(self.in_a, self.in_b @ placement.rotation.T)
-        return np.hstack([np.zeros_like(moments), moments])
+        wrenches = np.zeros((len(self.in_a), 6))
+        turned = self.in_b @ placement.rotation.T
+        wrenches[:, 3:] = np.matmul(self._cross, turned[:, :, None])[:, :, 0]
+        return wrenches
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return -(m x (X_a x n)) . X_a = -m . ((X_a x n) x X_a)."""
+        spin = skew(twist[3:])
+        turning = self.in_b @ placement.rotation.T @ spin.T  # X_a x n, row by row
+        bend: Array = np.einsum("ij,ij->i", self.in_a, turning @ spin.T)
+        return bend
 
     def slope(self, placement: pin.SE3) -> Array:
         """Return d(m x n) = m x (eta_a x n)."""
@@ -154,6 +178,10 @@ class FrameRows(Rows):
         """Return (0, e_i)."""
         return np.hstack([np.zeros((3, 3)), np.eye(3)])
 
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return 0."""
+        return np.zeros(3)
+
     def slope(self, placement: pin.SE3) -> Array:
         """Return 0."""
         return np.zeros((3, 6, 6))
@@ -178,7 +206,16 @@ class DistanceRows(Rows):
     def wrenches(self, placement: pin.SE3) -> Array:
         """Return (u, 0), u = p / |p|."""
         u, _ = self._direction(placement)
-        return np.concatenate([u, np.zeros(3)])[None]
+        wrench = np.zeros((1, 6))
+        wrench[0, :3] = u
+        return wrench
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return -(P s / |p|) . X_l, s = X_l + X_a x p, P = 1 - u u'."""
+        u, length = self._direction(placement)
+        linear = twist[:3]
+        s = linear + skew(twist[3:]) @ placement.translation
+        return np.array([((u @ s) * (u @ linear) - s @ linear) / length])
 
     def slope(self, placement: pin.SE3) -> Array:
         """Return du = P dp / |p|, P = 1 - u u'."""
@@ -199,10 +236,11 @@ class DistanceRows(Rows):
 
     def _direction(self, placement: pin.SE3) -> tuple[Array, float]:
         """Return u and |p|; where the origins coincide, any direction will do."""
-        length = float(np.linalg.norm(placement.translation))
+        p = placement.translation
+        length = math.sqrt(p @ p)
         if length < 1e-12 * self.distance:
             return np.array([1.0, 0.0, 0.0]), 1e-12 * self.distance
-        return placement.translation / length, length
+        return p / length, length
 
 
 class Stack(Rows):
@@ -219,6 +257,10 @@ class Stack(Rows):
     def wrenches(self, placement: pin.SE3) -> Array:
         """Return the parts' wrenches."""
         return np.concatenate([part.wrenches(placement) for part in self.parts])
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return the parts' W' X."""
+        return np.concatenate([part.bend(placement, twist) for part in self.parts])
 
     def slope(self, placement: pin.SE3) -> Array:
         """Return the parts' slopes."""
@@ -238,6 +280,10 @@ class WholeRows(Stack):
     def wrenches(self, placement: pin.SE3) -> Array:
         """Return 1."""
         return np.eye(6)
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return 0."""
+        return np.zeros(6)
 
     def slope(self, placement: pin.SE3) -> Array:
         """Return 0."""

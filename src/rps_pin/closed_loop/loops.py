@@ -288,8 +288,8 @@ class Loops:
         """
         placement, twist, acceleration, twist_a = self.relative_motion(frames)
         wrenches = frames.kept.wrenches(placement)
-        slope = -frames.kept.slope(placement) @ twist  # W': b moves by -X relative to a
-        rate, bend = wrenches @ twist, wrenches @ acceleration + slope @ twist
+        rate = wrenches @ twist
+        bend = wrenches @ acceleration + frames.kept.bend(placement, twist)
         if not frames.in_world:
             return rate, bend
         frame = self.model.frames[frames.frame_a]
