@@ -138,7 +138,9 @@ class MechanismDescription:
                 joint._asdict() | {"lower": _plain(joint.lower), "upper": _plain(joint.upper)}
                 for joint in self.joints
             ],
-            "closures": [closure._asdict() for closure in self.closures],
+            "closures": [
+                closure._asdict() | {"between": list(closure.between)} for closure in self.closures
+            ],
             "configuration": self.configuration.tolist(),
             "home_is_singular": self.home_is_singular,
             "nv": self.nv,
