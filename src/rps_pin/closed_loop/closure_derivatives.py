@@ -55,17 +55,37 @@ class _Frame(NamedTuple):
     acceleration_v: Array
 
 
-def closure_derivatives(loops: Loops, q: Array, v: Array, a: Array) -> ClosureDerivatives:
-    """Return the derivatives of the rows' rates and accelerations.
+class FrameMotions:
+    """The motions of frames, and their derivatives, at one motion of the tree.
 
-    Fills the loops' data with what `closure_force_slope` needs.
+    Parameters
+    ----------
+    loops
+        The tree; its data are filled.
+    motion
+        q (nq,), v (nv,), a (nv,).
     """
-    pin.computeForwardKinematicsDerivatives(loops.model, loops.data, q, v, a)
-    pin.updateFramePlacements(loops.model, loops.data)
+
+    def __init__(self, loops: Loops, motion: tuple[Array, Array, Array]) -> None:
+        self.loops = loops
+        self._known: dict[int, _Frame] = {}
+        pin.computeForwardKinematicsDerivatives(loops.model, loops.data, *motion)
+        pin.updateFramePlacements(loops.model, loops.data)
+
+    def __getitem__(self, index: int) -> _Frame:
+        """Return a frame's, by its index; before the data are used for anything else."""
+        if index not in self._known:
+            self._known[index] = _frame(self.loops, index)
+        return self._known[index]
+
+
+def closure_derivatives(motions: FrameMotions) -> ClosureDerivatives:
+    """Return the derivatives of the rows' rates and accelerations."""
+    loops = motions.loops
     shape = loops.size, loops.model.nv
     found = ClosureDerivatives(np.zeros(shape), np.zeros(shape), np.zeros(shape))
     for frames in loops.closed_frames:
-        of_a, of_b = _frame(loops, frames.frame_a), _frame(loops, frames.frame_b)
+        of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
         own = (
             _of_point(of_a, of_b)
             if frames.closure.kind == "spherical"
@@ -76,20 +96,20 @@ def closure_derivatives(loops: Loops, q: Array, v: Array, a: Array) -> ClosureDe
     return found
 
 
-def closure_force_slope(loops: Loops, multipliers: Array) -> Array:
+def closure_force_slope(motions: FrameMotions, multipliers: Array) -> Array:
     """Return d(J' lambda)/dq beyond that of wrenches fixed in the bodies, shape (nv, nv).
 
-    That part is Pinocchio's: `computeRNEADerivatives` with the wrenches as external forces. After
-    `closure_derivatives`.
+    That part is Pinocchio's: `computeRNEADerivatives` with the wrenches as external forces.
 
     On a's side acts f = W' lambda, on b's side -f. With G = sum lambda_k D_k, df = G eta (and, f
     held in world axes, f turns against a's rotation); b's own frame moving under it by eta adds
     eta x* f, the cross product of a twist and a wrench.
     """
+    loops = motions.loops
     slope = np.zeros((loops.model.nv, loops.model.nv))
     for frames in loops.closed_frames:
         own = multipliers[frames.rows]
-        of_a, of_b = _frame(loops, frames.frame_a), _frame(loops, frames.frame_b)
+        of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
         if frames.closure.kind == "spherical":
             slope += world_wrench_slope(of_a, np.concatenate([own, np.zeros(3)]))
             slope -= world_wrench_slope(of_b, np.concatenate([own, np.zeros(3)]))
@@ -113,11 +133,12 @@ def world_wrench_slope(frame: _Frame, wrench: Array) -> Array:
     return slope
 
 
-def external_force_slope(loops: Loops, wrenches: Mapping[int, Array]) -> Array:
+def external_force_slope(motions: FrameMotions, wrenches: Mapping[int, Array]) -> Array:
     """Return the same of external wrenches by frame index, shape (nv, nv)."""
-    slope = np.zeros((loops.model.nv, loops.model.nv))
+    nv = motions.loops.model.nv
+    slope = np.zeros((nv, nv))
     for frame, wrench in wrenches.items():
-        slope += world_wrench_slope(_frame(loops, frame), wrench)
+        slope += world_wrench_slope(motions[frame], wrench)
     return slope
 
 
@@ -148,7 +169,7 @@ def _of_point(of_a: _Frame, of_b: _Frame) -> tuple[Array, Array, Array]:
 def _point(frame: _Frame) -> tuple[Array, Array, Array]:
     """Return the derivatives of R v by q, and of R (v' + w x v) by q and v, (3, nv) each."""
     turn, (v, w) = frame.placement.rotation, frame.twist.reshape(2, 3)
-    along = frame.acceleration[:3] + np.cross(w, v)
+    along = frame.acceleration[:3] + pin.skew(w) @ v
     turning = frame.jacobian[3:]
     rate_q = frame.twist_q[:3] - pin.skew(v) @ turning
 

@@ -19,7 +19,7 @@ the independent joints' own rows of V_y, A_y and A_y' being zero.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from rps_pin.closed_loop.closure_derivatives import (
     ClosureDerivatives,
+    FrameMotions,
     closure_derivatives,
     closure_force_slope,
     external_force_slope,
@@ -37,6 +38,7 @@ from rps_pin.closed_loop.loops import Loops
 from rps_pin.closed_loop.wrenches import closure_wrenches, forces_on_joints
 
 Array = NDArray[np.float64]
+Solved = Callable[[Array], Array]
 
 
 class InverseDynamicsDerivatives(NamedTuple):
@@ -114,8 +116,9 @@ def dynamics_slopes(
     """
     model, data = loops.model, loops.data
     on_closures = closure_wrenches(loops, motion[0], multipliers)
-    rows = closure_derivatives(loops, *motion)
-    beyond = closure_force_slope(loops, multipliers) + external_force_slope(loops, wrenches)
+    motions = FrameMotions(loops, motion)
+    rows = closure_derivatives(motions)
+    beyond = closure_force_slope(motions, multipliers) + external_force_slope(motions, wrenches)
     forces = forces_on_joints(loops, on_closures, wrenches)
     by_q, by_v, mass = (
         np.array(part).reshape(model.nv, model.nv)
@@ -138,20 +141,16 @@ class Following:
         T, shape (nv, m).
     chosen
         Indices of the independent velocities, shape (m,).
-    pseudo_inverse
-        Of J, shape (nv, nc).
+    solved
+        Right-hand sides b (nc, k) to some solutions x (nv, k) of J x = b.
     rows
         Derivatives of the closures' rows.
     """
 
     def __init__(
-        self,
-        basis: Array,
-        chosen: NDArray[np.intp],
-        pseudo_inverse: Array,
-        rows: ClosureDerivatives,
+        self, basis: Array, chosen: NDArray[np.intp], solved: Solved, rows: ClosureDerivatives
     ) -> None:
-        self.T, self._chosen, self._pseudo_inverse = basis, chosen, pseudo_inverse
+        self.T, self._chosen, self.solved = basis, chosen, solved
         self.velocity_y = self._held(-rows.rate_q @ basis)
         self.acceleration_y = self._held(
             -rows.acceleration_q @ basis - rows.acceleration_v @ self.velocity_y
@@ -160,7 +159,7 @@ class Following:
 
     def _held(self, right: Array) -> Array:
         """Return x with J x = right and zero rows for the independent joints."""
-        x = self._pseudo_inverse @ right
+        x = self.solved(right)
         held: Array = x - self.T @ x[self._chosen]
         return held
 
@@ -183,7 +182,6 @@ def forward_derivatives(
     slopes: _Slopes,
     rows: ClosureDerivatives,
     following: Following,
-    pseudo_inverse: Array,
     indices: tuple[NDArray[np.intp], NDArray[np.intp]],
 ) -> ForwardDynamicsDerivatives:
     """Return the derivatives of a; `indices` of the independent and of the actuated velocities."""
@@ -192,7 +190,7 @@ def forward_derivatives(
 
     def response(force: Array, opening: Array) -> Array:
         """Return da of dF and dc, shapes (nv, k) and (nc, k)."""
-        x = -pseudo_inverse @ opening
+        x = -following.solved(opening)
         along = np.linalg.solve(mass, -T.T @ (force + slopes.a @ x))
         da: Array = T @ along + x
         return da

@@ -16,6 +16,7 @@ from rps_pin.closed_loop.derivatives import (
     ForwardDynamicsDerivatives,
     InverseDynamicsDerivatives,
     Linearisation,
+    Solved,
     dynamics_slopes,
     forward_derivatives,
     inverse_derivatives,
@@ -290,8 +291,8 @@ class ClosedLoopModel(ClosedLoopDynamics):
         slopes, rows = dynamics_slopes(
             self._loops, (q_, v_, a_), multipliers, self._by_frame(wrenches), self.effects
         )
-        inverse = self._pseudo_inverse(q_)
-        return inverse_derivatives(slopes, Following(basis, self._actuated, inverse, rows))
+        following = Following(basis, self._actuated, self._solution(q_), rows)
+        return inverse_derivatives(slopes, following)
 
     def forward_dynamics_derivatives(
         self,
@@ -323,9 +324,8 @@ class ClosedLoopModel(ClosedLoopDynamics):
         slopes, rows = dynamics_slopes(
             self._loops, (q_, v_, a), multipliers, self._by_frame(wrenches), self.effects
         )
-        inverse = self._pseudo_inverse(q_)
-        following = Following(basis, chosen, inverse, rows)
-        return forward_derivatives(slopes, rows, following, inverse, (chosen, self._actuated))
+        following = Following(basis, chosen, self._solution(q_), rows)
+        return forward_derivatives(slopes, rows, following, (chosen, self._actuated))
 
     def linearize(
         self,
@@ -351,11 +351,22 @@ class ClosedLoopModel(ClosedLoopDynamics):
             self.forward_dynamics_derivatives(q, v, tau, independent, wrenches=wrenches)
         )
 
-    def _pseudo_inverse(self, q: Array) -> Array:
-        """Return the pseudo-inverse of J, in one unit, shape (nv, nc)."""
-        inverse = np.linalg.pinv(self._scaled(self._loops.jacobian(q)), rcond=1e-10)
-        unscaled: Array = self._loops.column_scale[:, None] * inverse * self._loops.row_scale
-        return unscaled
+    def _solution(self, q: Array) -> Solved:
+        """Return what solves J x = b at q: of x, the passive joints' rows if they determine it."""
+        jacobian = self._loops.jacobian(q).copy()
+        if self._solver.solve(jacobian, np.zeros((self.constraint_size, 1))) is None:
+            inverse = np.linalg.pinv(self._scaled(jacobian), rcond=1e-10)
+            unscaled = self._loops.column_scale[:, None] * inverse * self._loops.row_scale
+            return lambda right: unscaled @ right
+
+        def solved(right: Array) -> Array:
+            x = np.zeros((self.model.nv, right.shape[1]))
+            found = self._solver.solve(jacobian, np.asfortranarray(right))
+            assert found is not None  # as it was above
+            x[self._passive] = found
+            return x
+
+        return solved
 
 
 def _rebuilt(
