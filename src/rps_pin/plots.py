@@ -25,7 +25,8 @@ from rps_pin.rps.motion_run import MotionRun
 LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73")
 _LEG_STYLES = ("-", "--", "-.")
 
-_STYLE: Any = {
+#: Of all figures.
+STYLE: Any = {
     "axes.grid": True,
     "grid.alpha": 0.3,
     "axes.spines.top": False,
@@ -40,7 +41,7 @@ def plot_path(run: MotionRun, figure: Figure | None = None) -> Figure:
 
     x and y are in millimetres; z is in millimetres above its lowest value, which the label says.
     """
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(5.6, 5.0), layout="constrained")
         axes = figure.add_subplot(projection="3d")
         assert isinstance(axes, Axes3D)  # what the projection "3d" makes
@@ -75,7 +76,7 @@ def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
     written = []
     for suffix, metadata in ((".png", {}), (".svg", {"Date": None})):
         path = folder / f"{name}{suffix}"
-        with matplotlib.rc_context(_STYLE), whole_file(path) as scratch:
+        with matplotlib.rc_context(STYLE), whole_file(path) as scratch:
             figure.savefig(scratch, metadata=metadata)
         written.append(path)
     return written
@@ -88,7 +89,7 @@ def _over_time(
     title: str,
     axes: Axes | None,
 ) -> Figure:
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         if axes is None:
             axes = Figure(figsize=(6.4, 3.8), layout="constrained").add_subplot()
         legs: Sequence[tuple[str, str]] = list(zip(LEG_COLOURS, _LEG_STYLES, strict=True))

@@ -6,7 +6,7 @@ Each function makes a figure, or draws on one of your own. Nothing here opens a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import matplotlib
 import numpy as np
@@ -19,7 +19,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import NDArray
 
 from rps_pin.errors import InputError
-from rps_pin.plots import LEG_COLOURS
+from rps_pin.plots import LEG_COLOURS, STYLE
 from rps_pin.rps.legs import RADIAL
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.geometry import boundary
@@ -45,14 +45,6 @@ _FAMILIES = (
     ("unreachable", Reason.UNREACHABLE),
 )
 _VIEWS = (("XY", 0, 1), ("XZ", 0, 2), ("YZ", 1, 2))
-_STYLE: Any = {
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "figure.dpi": 150,
-    "svg.hashsalt": "rps_pin",
-}
 
 
 class Modes(Protocol):
@@ -101,7 +93,7 @@ def plot_assembly_modes(
     low, high = min(0.0, float(tips[..., 2].min())), max(1.0, float(tips[..., 2].max()))
     columns = min(4, count)
     rows = -(-count // columns)
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(3.0 * columns, 3.4 * rows), layout="constrained")
         for k in range(count):
             axes = _space(figure, (rows, columns, k + 1))
@@ -123,7 +115,7 @@ def plot_theoretical(parameters: RPSParameters, figure: Figure | None = None) ->
     axes in the base plane, where its centre lies on the cylinder.
     """
     h = 1e3 * parameters.platform_radius
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(5.6, 5.2), layout="constrained")
         axes = _space(figure, (1, 1, 1))
         _draw_cylinder(axes, h, -h, h)
@@ -151,7 +143,7 @@ def plot_effective(workspace: Workspace, figure: Figure | None = None) -> Figure
     points = 1e3 * mesh.vertices
     h = 1e3 * workspace.parameters.platform_radius
     low, high = float(points[:, 2].min()), float(points[:, 2].max())
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(5.6, 5.2), layout="constrained")
         axes = _space(figure, (1, 1, 1))
         _draw_cylinder(axes, h, low, high)
@@ -181,7 +173,7 @@ def plot_space(workspace: Workspace, figure: Figure | None = None) -> Figure:
     """
     mesh = boundary(workspace)
     points = 1e3 * mesh.vertices
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(5.6, 5.4), layout="constrained")
         axes = _space(figure, (1, 1, 1))
         triangles = points[mesh.faces]
@@ -203,7 +195,7 @@ def plot_views(workspace: Workspace, figure: Figure | None = None) -> Figure:
     points = 1e3 * workspace.position[workspace.inside]
     if not len(points):
         raise InputError("no point is inside the workspace: there is nothing to draw")
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(10.5, 3.8), layout="constrained")
         for axes, (name, i, j) in zip(figure.subplots(1, 3), _VIEWS, strict=True):
             axes.plot(points[:, i], points[:, j], ",", color=_INSIDE, alpha=0.5, rasterized=True)
@@ -245,7 +237,7 @@ def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) 
     for i, (_, bits) in reversed(list(enumerate(_FAMILIES))):  # the first family wins
         family[(reason & np.uint16(bits)) != 0] = i + 1
     _, x, y = (np.rad2deg(axis) for axis in plane.grid.axes)
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         if axes is None:
             axes = Figure(figsize=(6.4, 4.4), layout="constrained").add_subplot()
         image = np.array(colours)[family]
@@ -282,7 +274,7 @@ def plot_comparison(rows: Sequence[PaperComparison], axes: Axes | None = None) -
     if len(rows) == 0:
         raise InputError("there is nothing to compare: rows is empty")
     radius = [1e3 * row.base_radius for row in rows]
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         if axes is None:
             axes = Figure(figsize=(6.4, 3.8), layout="constrained").add_subplot()
         lines = (
