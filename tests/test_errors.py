@@ -7,7 +7,7 @@ import pickle
 import pytest
 
 from rps_pin import errors
-from rps_pin.errors import LimitViolation
+from rps_pin.errors import LimitExcess, LimitViolation
 
 EXAMPLES = [
     errors.RPSPinError("text"),
@@ -17,6 +17,7 @@ EXAMPLES = [
     errors.UnreachableError("text", [LimitViolation(2, "length", 0.261, 0.2, 0.25, "m")]),
     errors.ClosureError("text", 0.5),
     errors.SingularityError("text", 1e9, 1e8),
+    errors.InfeasibleError("text", [LimitExcess("crank", 3.5, 2.0, "N m")]),
 ]
 
 

@@ -4,6 +4,8 @@ from importlib.metadata import version
 
 from rps_pin.closed_loop import (
     ClosedLoopModel,
+    ForceBound,
+    ForceDistribution,
     InverseDynamics,
     JointCoupling,
     JointEffects,
@@ -11,6 +13,7 @@ from rps_pin.closed_loop import (
 )
 from rps_pin.errors import (
     ClosureError,
+    InfeasibleError,
     InputError,
     MechanismError,
     ParameterError,
@@ -26,6 +29,9 @@ __version__ = version("rps-pin")
 __all__ = [
     "ClosedLoopModel",
     "ClosureError",
+    "ForceBound",
+    "ForceDistribution",
+    "InfeasibleError",
     "InputError",
     "InverseDynamics",
     "JointCoupling",

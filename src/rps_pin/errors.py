@@ -10,6 +10,9 @@ import reprlib
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 _LONGEST = 400
 _REPR = reprlib.Repr()
 _REPR.maxlevel, _REPR.maxlist, _REPR.maxstring, _REPR.maxother = 3, 9, _LONGEST, _LONGEST
@@ -129,4 +132,53 @@ class SingularityError(RPSPinError, ArithmeticError):
     def __init__(self, message: str, condition: float, limit: float) -> None:
         self.condition = condition
         self.limit = limit
+        super().__init__(message)
+
+
+class LimitExcess(NamedTuple):
+    """One force that would have to go beyond its limit."""
+
+    name: str
+    """Of the actuator, or of the bound."""
+    value: float
+    """What it would have to be, in `unit`."""
+    limit: float
+    """The limit it breaks, in `unit`."""
+    unit: str
+    """``"N"`` or ``"N m"``."""
+
+    @property
+    def excess(self) -> float:
+        """How far beyond, in `unit`; positive."""
+        return abs(self.value - self.limit)
+
+    def __str__(self) -> str:
+        side = "upper" if self.value > self.limit else "lower"
+        return (
+            f"{self.name} would need {self.excess:.6g} {self.unit} beyond its {side} limit of "
+            f"{self.limit:.6g} {self.unit}"
+        )
+
+
+class InfeasibleError(RPSPinError, ArithmeticError):
+    """No forces do what is asked: the limits leave none, or the actuators cannot produce them.
+
+    Attributes
+    ----------
+    violations : tuple of LimitExcess
+        The limits that would have to give way, by how much: of all ways to break the limits, that
+        of the least sum. Empty where no limit is the reason.
+    unproduced : (nv,) array or None
+        Where the actuators cannot do it even without limits: the smallest generalised force that
+        would have to be added (see `least_effort.unproduced_force`).
+    """
+
+    def __init__(
+        self,
+        message: str,
+        violations: Sequence[LimitExcess] = (),
+        unproduced: NDArray[np.float64] | None = None,
+    ) -> None:
+        self.violations = tuple(violations)
+        self.unproduced = unproduced
         super().__init__(message)

@@ -8,11 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, RPSRobot, SingularityError
-from rps_pin.closed_loop.inverse_dynamics import (
-    allowed_motions,
-    condition_number,
-    solve_by_allowed_motions,
-)
+from rps_pin.closed_loop.by_motions import solve_by_allowed_motions
+from rps_pin.closed_loop.inverse_dynamics import allowed_motions, condition_number
 from tests import strategies
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import loop_jacobian
@@ -64,7 +61,8 @@ def test_answer_satisfies_the_kkt_equations(rank: int) -> None:
     jacobian, force = matrix(rank, 4, 5), np.arange(1.0, 6)
     actuated = np.arange(5 - rank)
     scale = np.array([1, 2, 0.5, 1, 3.0])
-    tau, multipliers = solve_by_allowed_motions(jacobian, actuated, force, scale)
+    tau, multipliers, unproduced = solve_by_allowed_motions(jacobian, actuated, force, scale)
+    assert unproduced is None
     total = jacobian.T @ multipliers
     total[actuated] += tau
     np.testing.assert_allclose(total, force, rtol=0, atol=1e-12)
@@ -81,10 +79,32 @@ def test_answer_does_not_depend_on_the_scale() -> None:
     np.testing.assert_allclose(*answers, rtol=1e-11)
 
 
-@pytest.mark.parametrize(("actuators", "word"), [(1, "fewer"), (3, "more")])
-def test_other_than_mobility_many_actuators_are_refused(actuators: int, word: str) -> None:
-    with pytest.raises(SingularityError, match=rf"{actuators} actuated .* mobility of 2.*{word}"):
-        solve_by_allowed_motions(matrix(3, 3, 5), np.arange(actuators), np.ones(5), np.ones(5))
+def test_more_actuators_than_mobility_share_with_least_norm() -> None:
+    jacobian, force = matrix(3, 3, 5), np.arange(1.0, 6)
+    scale = np.array([1, 2, 0.5, 1, 3.0])
+    tau, multipliers, unproduced = solve_by_allowed_motions(jacobian, np.arange(4), force, scale)
+    assert unproduced is None
+    total = jacobian.T @ multipliers
+    total[:4] += tau
+    np.testing.assert_allclose(total, force, rtol=0, atol=1e-11)
+    # Any other solution tau + y, N' S' y = 0, is no shorter: scale * tau is orthogonal to all y.
+    others = allowed_motions(allowed_motions(jacobian)[:4].T)
+    np.testing.assert_allclose((scale[:4] ** 2 * tau) @ others, 0, rtol=0, atol=1e-10)
+
+
+def test_what_too_few_actuators_leave_is_told() -> None:
+    """It is zero where actuators act, and the smallest such force."""
+    jacobian, force = matrix(3, 3, 5), np.arange(1.0, 6)
+    scale = np.array([1, 2, 0.5, 1, 3.0])
+    tau, multipliers, unproduced = solve_by_allowed_motions(jacobian, np.arange(1), force, scale)
+    assert unproduced is not None
+    total = jacobian.T @ multipliers + unproduced
+    total[:1] += tau
+    np.testing.assert_allclose(total, force, rtol=0, atol=1e-11)
+    # Least in the scaled norm: orthogonal to all that the actuator and the closures produce.
+    products = np.vstack([np.eye(5)[:1], jacobian])
+    np.testing.assert_allclose(products @ (scale**2 * unproduced), 0, rtol=0, atol=1e-11)
+    assert np.linalg.norm(unproduced) > 0.1
 
 
 def test_actuators_that_cannot_move_the_mechanism_are_refused() -> None:
@@ -125,7 +145,7 @@ def test_square_way_equals_the_way_by_allowed_motions(make) -> None:
         if mechanism.condition(q) > 1e4:
             continue
         found = mechanism.inverse_dynamics(q, v, a)
-        tau, multipliers = solve_by_allowed_motions(
+        tau, multipliers, _ = solve_by_allowed_motions(
             loop_jacobian(mechanism, q),
             mechanism.actuated_indices,
             pin.rnea(model, data, q, v, a),

@@ -21,6 +21,7 @@ from rps_pin import (
     RPSRobot,
     SingularityError,
 )
+from rps_pin.closed_loop.inverse_dynamics import allowed_motions
 from tests import strategies
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import (
@@ -369,12 +370,22 @@ def test_limit_of_the_condition_is_the_user_s(make) -> None:
 
 
 @pytest.mark.parametrize("make", ["mechanism", "spherical_mechanism"])
-def test_more_actuators_than_mobility_have_no_unique_forces(make: str) -> None:
+def test_two_actuators_of_a_four_bar_share_its_torque(make: str) -> None:
+    """Of all pairs with t_1 w_1 + t_2 w_2 = power, that of least norm is along the rates."""
     mechanism = getattr(FOUR_BAR, make)(actuated=["crank_joint", "rocker_joint"])
-    q = values(mechanism, FOUR_BAR.joint_values(1.0))
-    still = np.zeros(mechanism.model.nv)
-    with pytest.raises(SingularityError, match="2 actuated joints for a mobility of 1"):
-        mechanism.inverse_dynamics(q, still, still)
+    angle, rate = 1.0, 2.0
+    q = values(mechanism, FOUR_BAR.joint_values(angle))
+    rates = FOUR_BAR.joint_rates(angle)
+    asked = rate * np.array([rates["crank_joint"], rates["rocker_joint"]])
+    v = mechanism.velocity(q, asked)
+    bend = derivative(lambda x: values(mechanism, FOUR_BAR.joint_rates(x)), angle)
+    a = values(mechanism, rates) * 3.0 + bend * rate**2
+    found = mechanism.inverse_dynamics(q, v, a)
+    torque = FOUR_BAR.torque(angle, rate, 3.0)
+    expected = torque * rate * asked / (asked @ asked)
+    np.testing.assert_allclose(found.tau, expected, rtol=1e-9)
+    assert found.residual < 1e-11
+    assert found.unproduced is None
 
 
 def test_redundant_actuators_must_agree_about_the_motion() -> None:
@@ -396,11 +407,18 @@ def test_fewer_actuators_than_mobility_do_not_determine_the_motion() -> None:
     mechanism = mechanisms.five_bar(actuated=["left_joint"])
     q = mechanism.close(mechanisms.guess(mechanism))
     assert mechanism.condition(q) > 1e12
-    still = np.zeros(4)
-    with pytest.raises(SingularityError):
-        mechanism.inverse_dynamics(q, still, still)
     with pytest.raises(SingularityError):
         mechanism.velocity(q, [1.0])
+    still = np.zeros(4)
+    found = mechanism.inverse_dynamics(q, still, still)
+    assert found.unproduced is not None
+    assert found.residual < 1e-12
+    assert "unproduced" in repr(found)
+    # What is missing bears the weight in the motion that leaves the actuator at rest.
+    motions = mechanism.allowed_motions(q)
+    at_rest = motions @ allowed_motions(motions[mechanism.actuated_indices])
+    weight = mechanism.generalised_force(q, still, still)
+    np.testing.assert_allclose(at_rest.T @ found.unproduced, at_rest.T @ weight, rtol=1e-10)
 
 
 def test_more_passive_joints_than_rows_are_never_determined() -> None:
@@ -411,8 +429,9 @@ def test_more_passive_joints_than_rows_are_never_determined() -> None:
     q, v, a = robot_.state([0.4, 0, 0], [0, 0, 0], [0, 0, 0])
     assert two.condition(q) == np.inf
     with pytest.raises(SingularityError) as caught:
-        two.inverse_dynamics(q, v, a)
+        two.velocity(q, [0.0, 0.0])
     assert caught.value.condition == np.inf
+    assert two.inverse_dynamics(q, v, a).unproduced is not None
 
 
 def test_open_chain_with_every_joint_driven_is_plain_rnea() -> None:

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.optimize import minimize
 
-from rps_pin import ClosedLoopModel, LoopClosure
+from rps_pin import ClosedLoopModel, InfeasibleError, LoopClosure
 from rps_pin.closed_loop.composing import Part, body, compose
-from rps_pin.closed_loop.force_bounds import ForceBound, InfeasibleError
+from rps_pin.closed_loop.force_bounds import ForceBound
 from rps_pin.closed_loop.force_distribution import ForceDistribution
 from tests.closed_loop import mechanisms
 from tests.proofs import common, optima, robot_data

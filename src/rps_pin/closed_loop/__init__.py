@@ -2,6 +2,8 @@
 
 from rps_pin.closed_loop.closure import JointCoupling, LoopClosure
 from rps_pin.closed_loop.composing import Part, body, compose
+from rps_pin.closed_loop.force_bounds import ForceBound, friction_pyramid
+from rps_pin.closed_loop.force_distribution import DistributedForces, ForceDistribution
 from rps_pin.closed_loop.inverse_dynamics import InverseDynamics
 from rps_pin.closed_loop.joint_effects import JointEffects
 from rps_pin.closed_loop.loops import LoopErrors
@@ -11,6 +13,9 @@ from rps_pin.closed_loop.model import ClosedLoopModel
 
 __all__ = [
     "ClosedLoopModel",
+    "DistributedForces",
+    "ForceBound",
+    "ForceDistribution",
     "InverseDynamics",
     "JointCoupling",
     "JointEffects",
@@ -21,5 +26,6 @@ __all__ = [
     "Part",
     "body",
     "compose",
+    "friction_pyramid",
     "merged",
 ]

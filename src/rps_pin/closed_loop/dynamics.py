@@ -12,12 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from pinocchio import computeJointJacobians, getConstraintsJacobian, rnea
 from scipy.linalg.blas import dgemv, dnrm2
 
+from rps_pin.closed_loop.by_motions import scaled_motions, solve_by_allowed_motions
 from rps_pin.closed_loop.closure import Closure
 from rps_pin.closed_loop.forward_dynamics import ProximalDynamics, basis_and_drift, solve_reduced
-from rps_pin.closed_loop.inverse_dynamics import (
-    InverseDynamics,
-    solve_by_allowed_motions,
-)
+from rps_pin.closed_loop.inverse_dynamics import InverseDynamics
 from rps_pin.closed_loop.joint_effects import JointEffects, coordinate_indices
 from rps_pin.closed_loop.kinematics import MAX_CONDITION, ClosedLoopKinematics
 from rps_pin.closed_loop.vectors import checked_vector
@@ -97,15 +95,17 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         Returns
         -------
         InverseDynamics
-            `tau` (na,), `constraint_forces` (nc,), `residual`, `condition`.
+            `tau` (na,), `constraint_forces` (nc,), `residual`, `condition`. With more actuators
+            than mobility, the tau of least norm, torques made forces by `characteristic_length`
+            (with limits and weights: `ForceDistribution`). With fewer, the tau that misses least,
+            and what is missing in `unproduced`.
 
         Raises
         ------
         InputError
             If an argument has the wrong shape or is not finite.
         SingularityError
-            If the configuration is singular (condition number above `max_condition`), or actuators
-            and mobility do not match.
+            If the configuration is singular (condition number above `max_condition`).
         """
         model, data, calls, constraints, constraint_data = self._pinocchio
         try:
@@ -134,13 +134,14 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         multipliers = factors.solve(force.take(passive))  # J_p' lambda = rnea_p
         if not factors.rcond() > harmless_rcond:
             self._checked_state(q, v, a)
-            self._refuse_singular(jacobian)
+            if not self._condition(jacobian) <= self.max_condition:
+                return self._inverse_dynamics_by_motions(jacobian, force)  # refuses, or reports
         # rnea - J' lambda, the passive rows first: they are the residual, the actuated ones tau.
         rest = dgemv(-1.0, jacobian.T, multipliers, 1.0, force).take(order)
         residual = dnrm2(rest, size)
         if not residual < _INFINITY:  # a pivot that is exactly zero escapes the estimate
             self._checked_state(q, v, a)
-            self._refuse(math.inf)
+            return self._inverse_dynamics_by_motions(jacobian, force)
         return InverseDynamics(rest[size:], multipliers, residual, (scales, passive_jacobian))
 
     def generalised_force(
@@ -278,24 +279,29 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         return self._inverse_answer(rest[self._actuated], multipliers, rest, jacobian)
 
     def _inverse_dynamics_by_motions(self, jacobian: Array, force: Array) -> InverseDynamics:
-        self._refuse_singular(jacobian)
-        tau, multipliers = solve_by_allowed_motions(
-            self._loops.row_scale[:, None] * jacobian,
-            self._actuated,
-            force,
-            self._loops.column_scale,
+        scaled_jacobian, scale = self._scaled_rows(jacobian), self._loops.column_scale
+        motions = scaled_motions(scaled_jacobian, scale)
+        if motions.shape[1] == self._actuated.size:
+            self._refuse_singular(jacobian)
+        tau, scaled, unproduced = solve_by_allowed_motions(
+            scaled_jacobian, self._actuated, force, scale, self.max_condition, motions
         )
-        multipliers = self._loops.row_scale * multipliers
+        multipliers = self._loops.row_scale * scaled
         rest = force - jacobian.T @ multipliers
-        return self._inverse_answer(tau, multipliers, rest, jacobian)
+        return self._inverse_answer(tau, multipliers, rest, jacobian, unproduced)
 
     def _inverse_answer(
-        self, tau: Array, multipliers: Array, rest: Array, jacobian: Array
+        self,
+        tau: Array,
+        multipliers: Array,
+        rest: Array,
+        jacobian: Array,
+        unproduced: Array | None = None,
     ) -> InverseDynamics:
-        residual = float(dnrm2(rest[self._passive])) if self._passive.size else 0.0
-        return InverseDynamics(
-            tau, multipliers, residual, (self._scales, jacobian[:, self._passive])
-        )
+        wrong = rest if unproduced is None else rest - unproduced
+        residual = float(dnrm2(wrong[self._passive])) if self._passive.size else 0.0
+        of_passive = jacobian[:, self._passive]
+        return InverseDynamics(tau, multipliers, residual, (self._scales, of_passive), unproduced)
 
     def _reduced_dynamics(
         self, q: Array, v: Array, tau: Array, wrenches: Wrenches | None, drift: Array

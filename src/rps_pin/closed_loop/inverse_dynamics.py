@@ -4,19 +4,16 @@ With S picking the actuated rows and J the loop closures' Jacobian,
 
     S' tau + J' lambda = rnea(q, v, a).
 
-The passive rows hold no actuator: J_p' lambda = rnea_p. Where J_p is square, which is the case of a
-mechanism with as many actuators as mobility and no redundant rows, lambda follows from one LU
-factorisation, and the actuated rows give tau. In every other case tau comes from the motions N that
-the closures allow (J N = 0), which do not feel lambda: (S N)' tau = N' rnea; then lambda, of least
-norm since redundant rows leave it undetermined.
+The passive rows hold no actuator: J_p' lambda = rnea_p. With as many actuators as mobility, lambda
+follows from one factorisation of J_p (LU where it is square, QR where rows are redundant: then of
+least norm), and the actuated rows give tau. In every other case, see `by_motions`. Damping,
+friction and springs add to rnea, external forces take from it.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-
-from rps_pin.errors import SingularityError
 
 Array = NDArray[np.float64]
 
@@ -38,9 +35,13 @@ class InverseDynamics:
         tells which are a closure's.
     residual : float
         Norm of the KKT equations' error on the passive rows, in the units of generalised forces.
+    unproduced : (nv,) array or None
+        Where actuators are lacking, the generalised force that the motion takes and nothing in the
+        mechanism produces, S' tau + J' lambda + unproduced = rnea + ...: the smallest that would
+        have to be added. None if the actuators can do it.
     """
 
-    __slots__ = ("_scaled_jacobian", "constraint_forces", "residual", "tau")
+    __slots__ = ("_scaled_jacobian", "constraint_forces", "residual", "tau", "unproduced")
 
     def __init__(
         self,
@@ -48,11 +49,13 @@ class InverseDynamics:
         constraint_forces: Array,
         residual: float,
         scaled_jacobian: tuple[tuple[Array, Array], Array],
+        unproduced: Array | None = None,
     ) -> None:
         self.tau = tau
         self.constraint_forces = constraint_forces
         self.residual = residual
         self._scaled_jacobian = scaled_jacobian
+        self.unproduced = unproduced
 
     @property
     def condition(self) -> float:
@@ -81,7 +84,8 @@ class InverseDynamics:
     def __repr__(self) -> str:
         return (
             f"InverseDynamics(tau={self.tau}, constraint_forces={self.constraint_forces}, "
-            f"residual={self.residual:.3g})"
+            f"residual={self.residual:.3g}"
+            + (")" if self.unproduced is None else f", unproduced={self.unproduced})")
         )
 
 
@@ -107,50 +111,3 @@ def allowed_motions(jacobian: Array) -> Array:
     _, values, vectors = np.linalg.svd(jacobian)
     rank = int(np.count_nonzero(values > RANK_TOLERANCE * values[0])) if values.size else 0
     return vectors[rank:].T
-
-
-def solve_by_allowed_motions(
-    jacobian: Array, actuated: NDArray[np.intp], generalised_force: Array, scale: Array
-) -> tuple[Array, Array]:
-    """Return tau and lambda for any number of closure rows, redundant ones included.
-
-    Parameters
-    ----------
-    jacobian
-        J, shape (nc, nv).
-    actuated
-        Indices of the actuated velocities.
-    generalised_force
-        rnea(q, v, a), shape (nv,).
-    scale
-        Positive scaling of the velocities, shape (nv,): coordinates v / scale share one unit.
-
-    Raises
-    ------
-    SingularityError
-        If the actuators cannot produce the forces asked for, or if there are more of them than the
-        mobility, so that tau is not unique.
-    """
-    motions = scale[:, None] * allowed_motions(jacobian * scale)  # J N = 0, column scaling undone
-    mobility = motions.shape[1]
-    actuator_motions = motions[actuated]
-    if len(actuated) != mobility:
-        kind = "more" if len(actuated) > mobility else "fewer"
-        raise SingularityError(
-            f"{len(actuated)} actuated joints for a mobility of {mobility} at this configuration: "
-            f"with {kind} actuators than mobility their forces are not determined",
-            np.inf,
-            1 / RANK_TOLERANCE,
-        )
-    condition = condition_number(actuator_motions)
-    if not condition * RANK_TOLERANCE < 1:
-        raise SingularityError(
-            f"the actuated joints do not move all of the mechanism here: condition {condition:.3g}",
-            condition,
-            1 / RANK_TOLERANCE,
-        )
-    tau = np.asarray(np.linalg.solve(actuator_motions.T, motions.T @ generalised_force), np.float64)
-    rest = generalised_force.copy()
-    rest[actuated] -= tau
-    multipliers, *_ = np.linalg.lstsq(jacobian.T, rest, rcond=RANK_TOLERANCE)
-    return tau, np.asarray(multipliers, np.float64)

@@ -100,6 +100,16 @@ class ClosedLoopKinematics:
         return self._loops.column_scale.copy()
 
     @property
+    def angular_rows(self) -> NDArray[np.bool_]:
+        """Which rows are angular (rad, N m), shape (nc,)."""
+        return self._loops.angular_rows.copy()
+
+    @property
+    def angular_velocities(self) -> NDArray[np.bool_]:
+        """Which velocities are angular (rad/s), shape (nv,)."""
+        return self._loops.angular_velocities.copy()
+
+    @property
     def actuated_indices(self) -> NDArray[np.intp]:
         """Indices of the actuated joints in a velocity vector, shape (na,)."""
         return self._actuated.copy()

@@ -84,6 +84,8 @@ class Loops:
     row_scale, column_scale : (nc,) and (nv,) arrays
         ``row_scale[:, None] * J * column_scale`` has entries of one unit: angular rows count with
         the length as their lever, angular velocities are those of a point at that lever.
+    angular_rows, angular_velocities : (nc,) and (nv,) bool arrays
+        Which they are.
     data, calls, constraints, constraint_data
         For calling Pinocchio: `getConstraintsJacobian` reads what each of the `calls` refreshes.
     plain : bool
@@ -129,7 +131,7 @@ class Loops:
         self.plain = bool(self.closed_frames) and not self.couplings
         self.plain = self.plain and all(frames.in_world for frames in self.closed_frames)
         self.length = self._length(characteristic_length)
-        angular = self._is_angular()
+        self.angular_velocities = angular = self._is_angular()
         self.column_scale = np.where(angular, 1 / self.length, 1.0)
         self.angular_rows = np.zeros(self.size, dtype=bool)
         for frames in self.closed_frames:
