@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pinocchio as pin
 import pytest
 
-from rps_pin import LoopClosure, MechanismError
+from rps_pin import JointCoupling, LoopClosure, MechanismError
+from rps_pin.closed_loop.closure import KINDS
 from tests.closed_loop.mechanisms import FourBar
 
 
@@ -58,3 +60,142 @@ def test_closures_are_immutable_and_hashable() -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         closure.kind = "rigid"
     assert {closure, LoopClosure("a", "b")} == {closure}
+
+
+# Every kind ---------------------------------------------------------------------------------------
+
+ROWS = {
+    "spherical": 3,
+    "rigid": 6,
+    "revolute": 5,
+    "prismatic": 5,
+    "cylindrical": 4,
+    "universal": 4,
+    "planar": 3,
+    "point_on_line": 2,
+    "point_on_plane": 1,
+    "distance": 1,
+}
+AXES = ["revolute", "prismatic", "cylindrical", "universal", "planar"]
+AXES += ["point_on_line", "point_on_plane"]
+TWO_AXES = ["revolute", "cylindrical", "universal", "planar"]
+
+
+def closure(kind: str, **options: object) -> LoopClosure:
+    if kind == "distance":
+        options = {"distance": 0.5} | options
+    return LoopClosure("knee", "rocker_tip", kind, **options)
+
+
+@pytest.mark.parametrize("kind", ROWS)
+def test_every_kind_has_its_rows_and_a_constraint_model(kind: str) -> None:
+    """Of a point for spherical, else of a frame, whose six rows it combines."""
+    assert set(KINDS) == set(ROWS)
+    model = pin.buildModelFromXML(FourBar().urdf())
+    assert closure(kind).size == ROWS[kind]
+    size = closure(kind).constraint_model(model).residualSize()
+    assert size == (3 if kind == "spherical" else 6)
+
+
+@pytest.mark.parametrize("kind", AXES)
+def test_axes_are_unit_vectors_of_any_given_length(kind: str) -> None:
+    found = closure(kind, axis=[0, 3e-5, 4e-5])
+    assert found.axis == pytest.approx((0, 0.6, 0.8), rel=1e-15)
+    expected = (0.0, 1.0, 0.0) if kind == "universal" else (0, 0.6, 0.8)
+    if kind in TWO_AXES:
+        assert found.axis_b == pytest.approx(expected, rel=1e-15)
+        assert closure(kind, axis_b=[-2.0, 0, 0]).axis_b == (-1, 0, 0)
+    else:
+        assert found.axis_b is None
+
+
+@pytest.mark.parametrize("kind", ROWS)
+def test_axes_left_out_are_z_or_those_of_a_cross(kind: str) -> None:
+    found = closure(kind)
+    if kind == "universal":
+        assert (found.axis, found.axis_b) == ((1, 0, 0), (0, 1, 0))
+    else:
+        assert found.axis == ((0, 0, 1) if kind in AXES else None)
+        assert found.axis_b == ((0, 0, 1) if kind in TWO_AXES else None)
+
+
+@pytest.mark.parametrize("kind", ROWS)
+@pytest.mark.parametrize("option", ["axis", "axis_b"])
+def test_axes_of_kinds_that_have_none_are_refused(kind: str, option: str) -> None:
+    allowed = AXES if option == "axis" else TWO_AXES
+    if kind in allowed:
+        closure(kind, **{option: [1.0, 0.0, 0.0]})
+        return
+    with pytest.raises(
+        MechanismError, match=f"{option} does not belong to kind '{kind}', only to {allowed[0]}"
+    ):
+        closure(kind, **{option: [1.0, 0.0, 0.0]})
+
+
+@pytest.mark.parametrize("bad", [[0, 0, 0], [1, np.nan, 0], [np.inf, 0, 0]])
+def test_axes_without_direction_are_refused(bad: list[float]) -> None:
+    with pytest.raises(MechanismError, match=r"closure 'knee = rocker_tip': axis = .* direction"):
+        closure("revolute", axis=bad)
+
+
+@pytest.mark.parametrize("bad", [[1, 0], [1, 0, 0, 0], 3.0, "z", [[1], [2], ["x"]]])
+def test_axes_that_are_not_three_numbers_are_refused(bad: object) -> None:
+    with pytest.raises(MechanismError, match=r"axis_b = .* must be three numbers"):
+        closure("revolute", axis_b=bad)
+
+
+@pytest.mark.parametrize("bad", [None, 0.0, -1.0, np.nan, np.inf, "long"])
+def test_rods_need_a_length(bad: object) -> None:
+    with pytest.raises(MechanismError, match=r"distance = .*; it must be a positive length in m"):
+        closure("distance", distance=bad)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in ROWS if kind != "distance"])
+def test_lengths_of_other_kinds_are_refused(kind: str) -> None:
+    with pytest.raises(MechanismError, match=f"belongs to kind 'distance' only, not to '{kind}'"):
+        closure(kind, distance=0.3)
+
+
+def test_closures_of_arrays_are_hashable_too() -> None:
+    assert len({closure("revolute", axis=np.array([0, 0, 2.0])), closure("revolute")}) == 1
+
+
+# Couplings ----------------------------------------------------------------------------------------
+
+
+def test_couplings_have_one_row_and_are_named_after_their_joints() -> None:
+    coupling = JointCoupling("left", "right", 2.0, 0.1)
+    assert coupling.size == 1
+    assert coupling.name == "left = right"
+    assert JointCoupling("left", "right", name="gear").name == "gear"
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        coupling.ratio = 3.0
+
+
+def test_joint_coupled_to_itself_is_refused() -> None:
+    with pytest.raises(MechanismError, match="cannot tie joint 'left' to itself"):
+        JointCoupling("left", "left")
+
+
+@pytest.mark.parametrize("option", ["ratio", "offset"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, "two", None])
+def test_couplings_are_of_finite_numbers(option: str, bad: object) -> None:
+    with pytest.raises(MechanismError, match=f"coupling 'left = right': {option} = .* finite"):
+        JointCoupling("left", "right", **{option: bad})
+
+
+def test_ratio_of_zero_is_refused() -> None:
+    with pytest.raises(MechanismError, match="a ratio of 0 couples nothing"):
+        JointCoupling("left", "right", 0)
+
+
+@pytest.mark.parametrize("joints", [("crank_joint", "ball"), ("elbow", "crank_joint")])
+def test_joints_that_cannot_be_coupled_are_refused_with_those_that_can(
+    joints: tuple[str, str],
+) -> None:
+    model = pin.buildModelFromXML(FourBar().urdf())
+    model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
+    with pytest.raises(MechanismError, match="of one coordinate; there are: crank_joint") as caught:
+        JointCoupling(*joints).joint_ids(model)
+    assert "universe" not in str(caught.value)
+    assert caught.match("no joint '(ball|elbow)'")

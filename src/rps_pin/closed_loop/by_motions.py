@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rps_pin.closed_loop.inverse_dynamics import (
     RANK_TOLERANCE,
     allowed_motions,
+    least_norm,
 )
 from rps_pin.closed_loop.least_effort import (
     least_effort,
@@ -85,8 +86,7 @@ def solve_by_allowed_motions(
             unproduced = unproduced_force(motions, effort.missing, scale)
     rest = force.copy() if unproduced is None else force - unproduced
     rest[actuated] -= tau
-    multipliers, *_ = np.linalg.lstsq((jacobian * scale).T, scale * rest, rcond=RANK_TOLERANCE)
-    return ByMotions(tau, np.asarray(multipliers, np.float64), unproduced)
+    return ByMotions(tau, least_norm((jacobian * scale).T, scale * rest), unproduced)
 
 
 def scaled_motions(jacobian: Array, scale: Array) -> Array:

@@ -156,11 +156,10 @@ class ParallelRows(AxisRows):
     def gap(self, placement: pin.SE3) -> Array:
         """Return the rotation vector from n to n_a; it does not vanish where they are opposite."""
         n = placement.rotation @ self.in_b[0]
-        turn = np.cross(n, self.axis)
-        sine = float(np.linalg.norm(turn))
-        angle = np.arctan2(sine, n @ self.axis)
-        turn = turn / sine if sine > 0 else self.across[0]
-        gap: Array = self.across @ (angle * turn)
+        turn = self.across @ (skew(n) @ self.axis)
+        sine = math.sqrt(turn @ turn)
+        angle = math.atan2(sine, n @ self.axis)
+        gap: Array = angle * (turn / sine if sine > 0 else np.array([1.0, 0.0]))
         return gap
 
 

@@ -15,8 +15,8 @@ from scipy.linalg.blas import dgemv, dnrm2
 from rps_pin.closed_loop.by_motions import scaled_motions, solve_by_allowed_motions
 from rps_pin.closed_loop.closure import Closure
 from rps_pin.closed_loop.forward_dynamics import ProximalDynamics, basis_and_drift, solve_reduced
-from rps_pin.closed_loop.inverse_dynamics import InverseDynamics
-from rps_pin.closed_loop.joint_effects import JointEffects, coordinate_indices
+from rps_pin.closed_loop.inverse_dynamics import InverseDynamics, least_norm
+from rps_pin.closed_loop.joint_effects import JointEffects, coordinate_indices, refuse_springs
 from rps_pin.closed_loop.kinematics import MAX_CONDITION, ClosedLoopKinematics
 from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.closed_loop.wrenches import Wrenches, checked_wrench, generalised_force
@@ -25,6 +25,8 @@ from rps_pin.errors import InputError, MechanismError
 Array = NDArray[np.float64]
 
 _INFINITY = math.inf
+#: How many times the forces of the tree no well conditioned closure carries.
+_HUGE = 1e12
 
 
 class ClosedLoopDynamics(ClosedLoopKinematics):
@@ -52,6 +54,8 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         )
         if effects is not None and effects.damping.size != model.nv:
             raise InputError(f"effects are of {effects.damping.size} velocities, not {model.nv}")
+        if effects is not None:
+            refuse_springs(model, effects)
         self.effects = effects
         self.name = name or model.name
         self._q_of_v = coordinate_indices(model)
@@ -139,7 +143,8 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         # rnea - J' lambda, the passive rows first: they are the residual, the actuated ones tau.
         rest = dgemv(-1.0, jacobian.T, multipliers, 1.0, force).take(order)
         residual = dnrm2(rest, size)
-        if not residual < _INFINITY:  # a pivot that is exactly zero escapes the estimate
+        # A pivot that is exactly zero, and a J_p that is all rounding, escape the estimate.
+        if not (residual < _INFINITY and dnrm2(multipliers) <= _HUGE * dnrm2(force)):
             self._checked_state(q, v, a)
             return self._inverse_dynamics_by_motions(jacobian, force)
         return InverseDynamics(rest[size:], multipliers, residual, (scales, passive_jacobian))
@@ -177,8 +182,7 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         rest[self._actuated] -= checked_vector(tau, self._actuated.size, "tau")
         rows, columns = self._loops.row_scale, self._loops.column_scale
         jacobian = self._scaled(self._loops.jacobian(np.asarray(q, dtype=np.float64)))
-        multipliers, *_ = np.linalg.lstsq(jacobian.T, columns * rest, rcond=1e-10)
-        scaled: Array = rows * multipliers
+        scaled: Array = rows * least_norm(jacobian.T, columns * rest)
         return scaled
 
     # Forward dynamics -----------------------------------------------------------------------------
@@ -257,13 +261,11 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
     def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
         """Return kinetic energy, rotors included, and potential energy, springs included, J."""
         q_, v_ = checked_vector(q, self.model.nq, "q"), checked_vector(v, self.model.nv, "v")
-        data = self._loops.data
-        kinetic = pin.computeKineticEnergy(self.model, data, q_, v_)
-        kinetic += float(self.model.armature @ v_**2) / 2
-        potential = pin.computePotentialEnergy(self.model, data, q_)
+        kinetic = float(v_ @ self._tree_mass(q_) @ v_) / 2  # with armature, unlike Pinocchio's own
+        potential = pin.computePotentialEnergy(self.model, self._loops.data, q_)
         if self.effects is not None:
             potential += self.effects.energy(q_, self._q_of_v)
-        return float(kinetic), float(potential)
+        return kinetic, float(potential)
 
     # Inner workings -------------------------------------------------------------------------------
 

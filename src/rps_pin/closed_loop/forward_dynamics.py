@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
-from rps_pin.closed_loop.inverse_dynamics import RANK_TOLERANCE
+from rps_pin.closed_loop.inverse_dynamics import RANK_TOLERANCE, rank_of
 from rps_pin.errors import MechanismError, SingularityError
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ def basis_and_drift(jacobian: Array, drift: Array, scale: Array) -> tuple[Array,
         Scaling of the velocities to one unit, shape (nv,).
     """
     left, values, right = np.linalg.svd(jacobian * scale)
-    rank = int(np.count_nonzero(values > RANK_TOLERANCE * values[0])) if values.size else 0
+    rank = rank_of(values)
     along = (left[:, :rank].T @ drift) / values[:rank]
     return scale[:, None] * right[rank:].T, -scale * (right[:rank].T @ along)
 

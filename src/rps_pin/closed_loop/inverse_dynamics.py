@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Relative size below which a singular value counts as zero.
+#: Below this a singular value counts as zero, relative to the largest (or to 1 if that is less).
 RANK_TOLERANCE = 1e-10
 
 
@@ -106,8 +106,32 @@ def condition_number(passive_jacobian: Array) -> float:
     return float(values[0] / values[-1]) if values[-1] > 0 else np.inf
 
 
+def rank_of(values: Array) -> int:
+    """Return how many singular values, largest first, of a matrix in one unit are not rounding.
+
+    In one unit a row that says anything has entries of about 1: if all are far smaller, they are
+    rounding themselves (rows that a plane mechanism fulfils anyway).
+    """
+    if not values.size:
+        return 0
+    return int(np.count_nonzero(values > RANK_TOLERANCE * max(float(values[0]), 1.0)))
+
+
 def allowed_motions(jacobian: Array) -> Array:
-    """Return an orthonormal basis N of the motions N that the closures allow, shape (nv, m)."""
+    """Return an orthonormal basis N of the motions with J N = 0, shape (nv, m); J in one unit."""
     _, values, vectors = np.linalg.svd(jacobian)
-    rank = int(np.count_nonzero(values > RANK_TOLERANCE * values[0])) if values.size else 0
-    return vectors[rank:].T
+    return vectors[rank_of(values) :].T
+
+
+def pseudo_inverse(jacobian: Array) -> Array:
+    """Return the pseudo-inverse of a matrix in one unit, rounding taken as zero."""
+    left, values, right = np.linalg.svd(jacobian, full_matrices=False)
+    rank = rank_of(values)
+    inverse: Array = (right[:rank].T / values[:rank]) @ left[:, :rank].T
+    return inverse
+
+
+def least_norm(matrix: Array, right: Array) -> Array:
+    """Return the least-squares solution of least norm, rounding in the matrix taken as zero."""
+    solution: Array = pseudo_inverse(matrix) @ right
+    return solution

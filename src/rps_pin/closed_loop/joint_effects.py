@@ -116,7 +116,7 @@ class JointEffects:
     def slopes(self, v: Array) -> tuple[Array, Array]:
         """Return the derivatives of e with respect to q and v, both diagonal, shapes (nv,)."""
         steep = self.friction / self.friction_speed
-        return self.stiffness, self.damping + steep / np.cosh(v / self.friction_speed) ** 2
+        return self.stiffness, self.damping + steep * (1 - np.tanh(v / self.friction_speed) ** 2)
 
     def energy(self, q: Array, q_of_v: NDArray[np.intp]) -> float:
         """Return what the springs hold, k (q - q_0)^2 / 2, J."""
@@ -134,6 +134,14 @@ def coordinate_indices(model: pin.Model) -> NDArray[np.intp]:
         own = np.arange(joint.nv) if joint.nq == joint.nv else np.zeros(joint.nv, np.intp)
         indices[joint.idx_v : joint.idx_v + joint.nv] = joint.idx_q + own
     return indices
+
+
+def refuse_springs(model: pin.Model, effects: JointEffects) -> None:
+    """Raise `MechanismError` if a spring acts on a joint of several coordinates."""
+    for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
+        own = effects.stiffness[joint.idx_v : joint.idx_v + joint.nv]
+        if own.any() and not joint.nq == joint.nv == 1:
+            raise MechanismError(f"stiffness: joint {name!r} has {joint.nq} coordinates, not one")
 
 
 def by_joint(model: pin.Model, values: Mapping[str, ArrayLike], what: str) -> Array:

@@ -19,6 +19,7 @@ from rps_pin.closed_loop.closure import Closure, frame_id
 from rps_pin.closed_loop.inverse_dynamics import allowed_motions, condition_number
 from rps_pin.closed_loop.limits import JointLimits
 from rps_pin.closed_loop.loops import LoopErrors, Loops, refuse_twice
+from rps_pin.closed_loop.nearest import NearestSearch
 from rps_pin.closed_loop.passive_factors import PassiveSolver
 from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import ClosureError, InputError, MechanismError, SingularityError
@@ -33,8 +34,6 @@ MAX_CONDITION = 1e8
 _CLOSED = 1e-12
 #: What `velocity` and `acceleration` accept of their arguments, relative to the rates given.
 _CONSISTENT = 1e-8
-#: The nearest closed configuration is found when a further step would be below this (radians).
-_NEAREST = 1e-9
 
 
 class ClosedLoopKinematics:
@@ -177,7 +176,8 @@ class ClosedLoopKinematics:
         Returns
         -------
         array
-            Closed configuration, shape (nq,), gaps at most 1e-12 characteristic lengths.
+            Closed configuration, shape (nq,), gaps at most 1e-12 m (or 1e-12 characteristic
+            lengths where that is more than a metre).
 
         Raises
         ------
@@ -190,14 +190,18 @@ class ClosedLoopKinematics:
         held = np.zeros(self.model.nv, dtype=bool)
         held[self._velocity_indices(fixed, "to fix")] = True
         start = self._limits.clip(guess) if within_limits else guess
-        if held.any() and (pin.difference(self.model, guess, start)[held] != 0).any():
-            raise ClosureError("a fixed joint is outside its limits in the guess", np.inf)
+        moved = (pin.difference(self.model, guess, start) != 0) & held
+        if moved.any():
+            outside = [name for name in fixed if moved[self._velocity_indices([name], "")].any()]
+            raise ClosureError(
+                f"in the guess, fixed joints are outside their limits: {', '.join(outside)}", np.inf
+            )
         best, best_gap, rng = start, np.inf, np.random.default_rng(0)
         for attempt in range(1 + restarts):
             q = self._closed_from(start, held, within_limits)
-            gap, _ = self._loops.worst(self._loops.gaps(q))
-            if gap <= _CLOSED * max(self.characteristic_length, 1.0):
+            if self._is_closed(q):
                 return q
+            gap, _ = self._loops.worst(self._loops.gaps(q))
             if gap < best_gap:
                 best, best_gap = q, gap
             spread = np.pi * (attempt + 1) / max(restarts, 1)
@@ -210,8 +214,7 @@ class ClosedLoopKinematics:
         """Return the closed configuration nearest to a guess.
 
         Nearest in the norm that makes angles lengths by `characteristic_length`; a local minimum of
-        the distance, found by steps along the allowed motions towards the guess, the loops closed
-        after each. A joint at its limit stays there.
+        the distance (see `nearest`).
 
         Raises
         ------
@@ -219,37 +222,16 @@ class ClosedLoopKinematics:
             As `close`; also if the steps do not settle.
         """
         guess = self._normal(q_guess, "q_guess")
-        q = self.close(guess, within_limits=within_limits)
-        units, none = self._units(), np.zeros(self.model.nv, dtype=bool)
-        towards = units * pin.difference(self.model, q, guess)
-        length = 1.0
-        for _ in range(500):
-            motions = allowed_motions(self._scaled(self._loops.jacobian(q)))
-            step = motions @ (motions.T @ towards)
-            if within_limits:
-                blocked = self._limits.blocked(q, step)
-                if blocked.any():  # only motions that leave those joints where they are
-                    motions = motions @ allowed_motions(motions[blocked])
-                    step = motions @ (motions.T @ towards)
-            if np.linalg.norm(step) <= _NEAREST * self.characteristic_length:
-                return q
-            moved = pin.integrate(self.model, q, length * step / units)
-            moved = self._limits.clip(moved) if within_limits else moved
-            moved = self._closed_from(moved, none, within_limits)
-            moved_towards = units * pin.difference(self.model, moved, guess)
-            if np.linalg.norm(moved_towards) < np.linalg.norm(towards) and self.loop_gap(
-                moved
-            ) <= _CLOSED * max(self.characteristic_length, 1.0):
-                q, towards, length = moved, moved_towards, min(1.0, 2 * length)
-            elif length < 1e-6:
-                return q  # nearer by no more than rounding
-            else:
-                length /= 2
-        raise ClosureError(
-            "the nearest closed configuration was not found in 500 steps: the last would still "
-            f"move by {float(np.linalg.norm(step)):.3g} m",
-            self.loop_gap(q),
+        start = self.close(guess, within_limits=within_limits)
+        none = np.zeros(self.model.nv, dtype=bool)
+        search = NearestSearch(
+            self.model,
+            self._loops,
+            self._limits if within_limits else None,
+            lambda q: self._closed_from(q, none, within_limits),
+            self._is_closed,
         )
+        return search.run(guess, start)
 
     def complete(
         self,
@@ -335,7 +317,10 @@ class ClosedLoopKinematics:
                 np.inf,
                 self.max_condition,
             )
-        condition = condition_number(own)
+        # N is orthonormal in one unit: joints that take part in all motions have a block of size 1.
+        scaled = own / self._loops.column_scale[chosen][:, None]
+        smallest = float(np.linalg.svd(scaled, compute_uv=False).min(initial=1.0))
+        condition = 1 / smallest if smallest > 0 else np.inf
         if not condition <= self.max_condition:
             raise SingularityError(
                 "these joints do not determine the motion here: the condition number is "
@@ -382,7 +367,7 @@ class ClosedLoopKinematics:
             self._frame(frame),
             reference,
         )
-        product: Array = jacobian @ basis
+        product: Array = jacobian.reshape(6, self.model.nv) @ basis
         return product
 
     def velocity(
@@ -490,6 +475,10 @@ class ClosedLoopKinematics:
             held=held,
             box=self._limits if within_limits else None,
         )
+
+    def _is_closed(self, q: Array) -> bool:
+        gap, _ = self._loops.worst(self._loops.gaps(q))
+        return gap <= _CLOSED * max(self.characteristic_length, 1.0)
 
     def _open(self, guess: Array, best: Array, within_limits: bool) -> ClosureError:
         """Return the error that says how far the loops stay open."""

@@ -107,6 +107,7 @@ class Loops:
         closures: Sequence[Closure],
         characteristic_length: float | None = None,
     ) -> None:
+        _refuse_other_orders(model)
         self.model = model
         self.closures = tuple(closures)
         refuse_twice("closure", [closure.name for closure in self.closures])
@@ -348,6 +349,20 @@ class Loops:
             own = local.reshape(6, self.model.nv)[:, columns]
             angular[columns] = np.abs(own[3:]).max(axis=0) > 1e-12
         return angular
+
+
+def _refuse_other_orders(model: pin.Model) -> None:
+    """Raise `MechanismError` unless the joints after any joint's are those that it carries."""
+    for index in range(2, model.njoints):
+        parent, before = model.parents[index], index - 1
+        while before not in (0, parent):
+            before = model.parents[before]
+        if before != parent:
+            raise MechanismError(
+                f"joint {model.names[index]!r} was added after another branch than its own: "
+                "Pinocchio's mass matrix is wrong in such a tree; add each branch to its end "
+                "before the next"
+            )
 
 
 def refuse_twice(what: str, names: Sequence[str]) -> None:

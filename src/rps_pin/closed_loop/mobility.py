@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rps_pin.closed_loop.closure import Closure, LoopClosure
-from rps_pin.closed_loop.inverse_dynamics import RANK_TOLERANCE
+from rps_pin.closed_loop.inverse_dynamics import rank_of
 from rps_pin.errors import ClosureError
 
 if TYPE_CHECKING:
@@ -242,8 +242,7 @@ def _scaled(mechanism: ClosedLoopModel, q: Array) -> Array:
 
 
 def _rank(matrix: Array) -> int:
-    values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.count_nonzero(values > RANK_TOLERANCE * max(values, default=0.0)))
+    return rank_of(np.asarray(np.linalg.svd(matrix, compute_uv=False), np.float64))
 
 
 def _joint(model: pin.Model, index: int, actuated: tuple[str, ...]) -> JointDescription:

@@ -16,12 +16,15 @@ import math
 import eigenpy
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.blas import dasum
-from scipy.linalg.lapack import dgeqp3, dormqr, dtrtrs
+from scipy.linalg.blas import dasum, dtrsm
+from scipy.linalg.lapack import dgeqp3, dormqr
 
 from rps_pin.closed_loop.inverse_dynamics import RANK_TOLERANCE, condition_number
 
 Array = NDArray[np.float64]
+
+#: What no well conditioned J_p, in one unit, makes of a right side of 1.
+_HUGE = 1e12
 
 
 class PassiveFactors:
@@ -45,7 +48,9 @@ class PassiveFactors:
         pivots = np.abs(packed.diagonal())
         self._largest, smallest = float(pivots.max()), float(pivots.min())
         #: Estimate of the condition number from the pivots; the true one is rarely 10 times larger.
-        self.condition = self._largest / smallest if smallest > 0 else np.inf
+        self.condition = np.inf
+        if smallest > RANK_TOLERANCE * max(1.0, self._largest):  # more than rounding (`rank_of`)
+            self.condition = self._largest / smallest
 
     def multipliers(self, force: Array) -> Array:
         """Return lambda (nc,) of least norm (in one unit) with J_p' lambda = f_p (np,)."""
@@ -71,8 +76,7 @@ class PassiveFactors:
         return left <= RANK_TOLERANCE
 
     def _solve(self, right: Array, transposed: int) -> Array:
-        solution, _ = dtrtrs(self._packed[: self._size], right, trans=transposed)
-        solved: Array = solution
+        solved: Array = dtrsm(1.0, self._packed[: self._size], right, trans_a=transposed)
         return solved
 
     def _turn(self, right: Array, transposed: str) -> Array:
@@ -127,8 +131,12 @@ class PassiveSolver:
         if self.square:
             self.lu.compute(jacobian.take(self._passive, axis=1))
             solved: Array = self.lu.solve(right).reshape(right.shape)  # one column comes flat
-            # (Of a pivot that is exactly zero the estimate knows nothing: the solution does.)
-            well = self.lu.rcond() > self.harmless_rcond and math.isfinite(dasum(solved.ravel("K")))
+            # Of a pivot that is exactly zero, and of a matrix that is all rounding, the estimate
+            # knows nothing: the solution does.
+            size = dasum(solved.ravel("K"))
+            well = self.lu.rcond() > self.harmless_rcond and size <= _HUGE * (
+                1.0 + dasum(right.ravel("K"))
+            )
             return solved if well else None
         factors = self.factors(jacobian)
         return None if factors is None else factors.passive(right)[0]
@@ -140,7 +148,7 @@ class PassiveSolver:
             return None
         passive = jacobian[:, self._passive]
         factors = PassiveFactors(passive, rows, columns)
-        well = (
+        well = factors.condition < np.inf and (
             100 * factors.condition <= self._max_condition
             or condition_number(rows * passive * columns) <= self._max_condition
         )
