@@ -30,7 +30,7 @@ test: setup-dev ## lint, format check, types and all tests; installs or finds Ch
 	@sh tools/check lint format types tests
 
 bench: setup-dev ## measure the speed of the solvers
-	.venv/bin/python -m pytest benchmarks --benchmark-only $(PYTEST_ARGS)
+	OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks --benchmark-only $(PYTEST_ARGS)
 
 lint: setup-dev ## lint, format check and types only
 	@sh tools/check lint format types

@@ -9,6 +9,7 @@ development dependencies (about five minutes):
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -41,7 +42,8 @@ def measured() -> Times:
         report = Path(folder) / "report.json"
         files = [str(ROOT / "benchmarks" / f"bench_{name}.py") for name in FILES]
         command = [sys.executable, "-m", "pytest", *files, "--benchmark-only", "-q"]
-        subprocess.run([*command, f"--benchmark-json={report}"], cwd=ROOT, check=True)
+        single = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+        subprocess.run([*command, f"--benchmark-json={report}"], cwd=ROOT, check=True, env=single)
         found: Times = defaultdict(dict)
         for bench in json.loads(report.read_text("utf-8"))["benchmarks"]:
             if "role" in bench["extra_info"]:
