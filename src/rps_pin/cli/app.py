@@ -15,6 +15,7 @@ from rps_pin.cli.describe import describe_command
 from rps_pin.cli.fk import fk_command
 from rps_pin.cli.helix import helix_command
 from rps_pin.cli.ik import ik_command
+from rps_pin.cli.simulate import simulate_command
 from rps_pin.cli.urdf import urdf_command
 from rps_pin.cli.view import view_command
 from rps_pin.cli.workspace import workspace_command
@@ -35,6 +36,7 @@ app.command("check")(check_command)
 app.command("workspace")(workspace_command)
 app.command("urdf")(urdf_command)
 app.command("describe")(describe_command)
+app.command("simulate")(simulate_command)
 
 
 def _version(asked: bool) -> None:

@@ -10,6 +10,8 @@ from rps_pin.closed_loop.loops import LoopErrors
 from rps_pin.closed_loop.merging import JointMerge, merged
 from rps_pin.closed_loop.mobility import MechanismDescription
 from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.closed_loop.simulated_motion import JointLimitPassed, Simulation
+from rps_pin.closed_loop.simulation import simulate
 
 __all__ = [
     "ClosedLoopModel",
@@ -19,13 +21,16 @@ __all__ = [
     "InverseDynamics",
     "JointCoupling",
     "JointEffects",
+    "JointLimitPassed",
     "JointMerge",
     "LoopClosure",
     "LoopErrors",
     "MechanismDescription",
     "Part",
+    "Simulation",
     "body",
     "compose",
     "friction_pyramid",
     "merged",
+    "simulate",
 ]

@@ -27,6 +27,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rps_pin.closed_loop.column_names import column_names
 from rps_pin.closed_loop.force_bounds import ForceBound
 from rps_pin.closed_loop.least_distance import LeastDistance, NearestPoint, least_violation
 from rps_pin.closed_loop.least_effort import (
@@ -278,7 +279,7 @@ class ForceDistribution:
     def _unproduced(self, force: Array) -> InfeasibleError:
         """Return the error that says what the actuators cannot produce."""
         scaled = np.abs(self._columns * force)
-        names = _velocity_names(self.mechanism)
+        names = column_names(self.mechanism.model)[1]
         parts = [
             f"{force[i]:.6g} {'N' if self._columns[i] == 1.0 else 'N m'} at joint {names[i]!r}"
             for i in np.argsort(-scaled)[:3]
@@ -319,7 +320,7 @@ class ForceDistribution:
         return lower, upper
 
     def _actuator_names(self) -> list[str]:
-        names = _velocity_names(self.mechanism)
+        names = column_names(self.mechanism.model)[1]
         return [f"actuator {names[i]!r}" for i in self._actuated]
 
 
@@ -351,12 +352,3 @@ def _spread(value: ArrayLike, size: int, name: str) -> Array:
     if np.isnan(array).any():
         raise InputError(f"{name} = {value!r} is not a number everywhere")
     return np.array(np.broadcast_to(array, size))
-
-
-def _velocity_names(mechanism: ClosedLoopModel) -> list[str]:
-    """Return a name for each velocity component: its joint's, numbered if that has several."""
-    names: list[str] = [""] * mechanism.model.nv
-    for name, joint in zip(mechanism.model.names, mechanism.model.joints, strict=True):
-        for i in range(joint.nv if name != "universe" else 0):
-            names[joint.idx_v + i] = name if joint.nv == 1 else f"{name}[{i}]"
-    return names

@@ -114,7 +114,7 @@ def merged(model: pin.Model, merges: Sequence[JointMerge]) -> pin.Model:
     for old, new in new_ids.items():
         result.inertias[new] = model.inertias[old]
     renamed = {joint: merge.name for joint, (merge, _) in last.items()}
-    _add_frames(model, result, new_ids, renamed)
+    add_frames(model, result, new_ids, renamed)
     result.gravity = model.gravity
     for entry in model.referenceConfigurations:
         result.referenceConfigurations[entry.key()] = merged_configuration(
@@ -185,10 +185,23 @@ def _add_merged(
     return new
 
 
-def _add_frames(
+def add_frames(
     model: pin.Model, result: pin.Model, new_ids: dict[int, int], renamed: dict[int, str]
 ) -> None:
-    """Copy the frames of the joints that are left, each below the nearest frame that is."""
+    """Copy the frames of the joints that are left, each below the nearest frame that is.
+
+    Parameters
+    ----------
+    model
+        The model as it was.
+    result
+        The rebuilt model, all its joints in place.
+    new_ids
+        Index in `result` of the joint that carries what each joint of `model` carried, by index
+        in `model`; the frames of joints that are not among them are left out.
+    renamed
+        New names of joint frames, by the joint's index in `model`.
+    """
     new_frames = {0: 0}
     for index in range(1, model.nframes):
         old = model.frames[index]

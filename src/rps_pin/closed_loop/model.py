@@ -24,12 +24,15 @@ from rps_pin.closed_loop.derivatives import (
 )
 from rps_pin.closed_loop.description import parts_from_yaml
 from rps_pin.closed_loop.dynamics import ClosedLoopDynamics
+from rps_pin.closed_loop.inverse_dynamics import pseudo_inverse
 from rps_pin.closed_loop.joint_effects import FRICTION_SPEED, JointEffects
 from rps_pin.closed_loop.kinematics import MAX_CONDITION
 from rps_pin.closed_loop.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.mobility import MechanismDescription, describe
 from rps_pin.closed_loop.parts import MechanismParts
 from rps_pin.closed_loop.reading import model_from_urdf
+from rps_pin.closed_loop.simulated_motion import Simulation
+from rps_pin.closed_loop.simulation import simulate
 from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.closed_loop.wrenches import Wrenches, closure_wrenches, forces_on_joints
 from rps_pin.errors import InputError
@@ -351,11 +354,30 @@ class ClosedLoopModel(ClosedLoopDynamics):
             self.forward_dynamics_derivatives(q, v, tau, independent, wrenches=wrenches)
         )
 
+    # Motion in time -------------------------------------------------------------------------------
+
+    def simulate(
+        self, q: ArrayLike, v: ArrayLike | None = None, *, duration: float, **options: Any
+    ) -> Simulation:
+        """Return the motion from a closed state; see `simulation.simulate` for all its options.
+
+        Parameters
+        ----------
+        q, v
+            Closed configuration (nq,), and a velocity that keeps it closed (nv,); at rest if left
+            out.
+        duration
+            s.
+        **options
+            ``step``, ``method``, ``controller``, ``tau``, ``wrenches``, ``closing`` and others.
+        """
+        return simulate(self, q, v, duration=duration, **options)
+
     def _solution(self, q: Array) -> Solved:
         """Return what solves J x = b at q: of x, the passive joints' rows if they determine it."""
         jacobian = self._loops.jacobian(q).copy()
         if self._solver.solve(jacobian, np.zeros((self.constraint_size, 1))) is None:
-            inverse = np.linalg.pinv(self._scaled(jacobian), rcond=1e-10)
+            inverse = pseudo_inverse(self._scaled(jacobian))
             unscaled = self._loops.column_scale[:, None] * inverse * self._loops.row_scale
             return lambda right: unscaled @ right
 

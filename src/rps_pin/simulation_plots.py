@@ -1,0 +1,66 @@
+"""Figures of a simulated motion: axes with units, colours told apart by all.
+
+Nothing here opens a window.
+"""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.closed_loop.simulated_motion import Simulation
+from rps_pin.plots import STYLE
+
+#: Okabe and Ito's colours; and line styles for where they come round again.
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+_STYLES = ("-", "--", "-.", ":")
+
+
+def plot_simulation(
+    simulation: Simulation, mechanism: ClosedLoopModel, figure: Figure | None = None
+) -> Figure:
+    """Draw the actuated joints' positions, the energies and the largest gap over time."""
+    with matplotlib.rc_context(STYLE):
+        figure = figure or Figure(figsize=(7.0, 7.2), layout="constrained")
+        positions, energies, gaps = figure.subplots(3, 1, sharex=True)
+        _plot_positions(positions, simulation, mechanism)
+        _lines(
+            energies,
+            simulation.time,
+            {
+                "kinetic": simulation.kinetic,
+                "potential, from the start": simulation.potential - simulation.potential[0],
+                "both": simulation.energy - simulation.potential[0],
+            },
+        )
+        energies.set_ylabel("energy (J)")
+        visible = np.where(simulation.gap > 0, simulation.gap, np.nan)  # an axis of powers has no 0
+        gaps.semilogy(simulation.time, visible, ".", markersize=2, color=_COLOURS[0])
+        gaps.set_ylabel("largest loop gap (m)")
+        gaps.set_xlabel("time (s)")
+        gaps.margins(x=0)
+        positions.set_title(mechanism.name, loc="left")
+    return figure
+
+
+def _plot_positions(axes: Axes, simulation: Simulation, mechanism: ClosedLoopModel) -> None:
+    model = mechanism.model
+    joints = [(name, model.joints[model.getJointId(name)]) for name in mechanism.actuated]
+    simple = [(name, joint) for name, joint in joints if joint.nq == joint.nv == 1]
+    _lines(axes, simulation.time, {name: simulation.q[:, joint.idx_q] for name, joint in simple})
+    prismatic = {joint.shortname().startswith("JointModelP") for _, joint in simple}
+    unit = {frozenset({True}): "m", frozenset({False}): "rad"}.get(frozenset(prismatic), "rad, m")
+    axes.set_ylabel(f"actuated joints ({unit})")
+
+
+def _lines(axes: Axes, time: np.ndarray, curves: dict[str, np.ndarray]) -> None:
+    for index, (name, values) in enumerate(curves.items()):
+        colour = _COLOURS[index % len(_COLOURS)]
+        style = _STYLES[(index // len(_COLOURS) + index) % len(_STYLES)]
+        axes.plot(time, values, color=colour, linestyle=style, label=name)
+    axes.margins(x=0)
+    if curves:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small")

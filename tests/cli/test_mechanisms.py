@@ -1,0 +1,161 @@
+"""The commands for any mechanism, as a person types them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rps_pin import ClosedLoopModel
+from tests.cli.test_cli import rps_pin
+
+URDF = Path(__file__).resolve().parents[2] / "urdf"
+
+MJCF = """<mujoco model="swing"><worldbody>
+<body name="left" pos="0 0 1"><joint name="left_hinge" axis="0 1 0"/>
+  <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.5"/>
+  <body name="seat" pos="0 0 -0.5"><joint name="seat_hinge" axis="0 1 0"/>
+    <geom type="capsule" size="0.02" fromto="0 0 0 0.6 0 0"/></body></body>
+<body name="right" pos="0.6 0 1"><joint name="right_hinge" axis="0 1 0"/>
+  <geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.5"/></body>
+</worldbody>
+<equality><connect body1="seat" body2="right" anchor="0.6 0 0"/></equality>
+<actuator><motor joint="left_hinge"/></actuator></mujoco>"""
+
+
+def test_describe_prints_a_table() -> None:
+    run = rps_pin("describe", str(URDF / "four_bar.yaml"))
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.startswith("four-bar: mobility 1, actuation sufficient: 1 actuator\n")
+    for words in ("crank_joint", "revolute", "actuated", "rank 2, redundant rows 3"):
+        assert words in run.stdout
+
+
+def test_describe_as_json_is_what_the_library_says() -> None:
+    file = URDF / "stewart.yaml"
+    run = rps_pin("describe", str(file), "--json")
+    assert run.returncode == 0, run.stderr
+    assert json.loads(run.stdout) == ClosedLoopModel.load(file).describe().as_dict()
+
+
+def test_describe_reads_mujoco_files(tmp_path: Path) -> None:
+    file = tmp_path / "swing.xml"
+    file.write_text(MJCF)
+    run = rps_pin("describe", str(file), "--json")
+    assert run.returncode == 0, run.stderr
+    found = json.loads(run.stdout)
+    assert (found["name"], found["mobility"], found["redundant_rows"]) == ("swing", 1, 1)
+    assert found["actuated"] == ["left_hinge"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("missing.yaml", None, "missing.yaml"),
+        ("robot.urdf", "<robot/>", "a URDF has no closures"),
+        ("robot.txt", "", "ends in .yaml"),
+        ("robot.yaml", "urdf: missing.urdf", "missing.urdf"),
+        ("robot.yaml", "urdf: [", "line 1"),
+        ("robot.xml", MJCF.replace('axis="0 1 0"', 'axis="0 b 0"', 1), "line 2"),
+        ("robot.xml", "<!DOCTYPE x [<!ENTITY a 'b'>]><mujoco>&a;</mujoco>", "document type"),
+    ],
+)
+@pytest.mark.parametrize("command", ["describe", "simulate"])
+def test_bad_files_are_told_in_one_line(
+    tmp_path: Path, command: str, name: str, text: str | None, words: str
+) -> None:
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    run = rps_pin(command, name, folder=tmp_path)
+    assert run.returncode == 1
+    assert run.stdout == ""
+    assert run.stderr.startswith("error: ")
+    assert run.stderr.count("\n") == 1
+    assert words in run.stderr
+
+
+def test_a_loop_that_cannot_close_says_which_and_by_how_much(tmp_path: Path) -> None:
+    """The slider-crank's guide raised to 2 m: its bars reach much less high."""
+    shutil.copy(URDF / "slider_crank.urdf", tmp_path)
+    text = (URDF / "slider_crank.yaml").read_text()
+    file = tmp_path / "slider_crank.yaml"
+    file.write_text(text)
+    urdf = tmp_path / "slider_crank.urdf"
+    raised = urdf.read_text()
+    mechanism = ClosedLoopModel.load(file)
+    frame = mechanism.model.frames[mechanism.model.getFrameId("guide")]
+    x, _, z = frame.placement.translation
+    old, new = f'xyz="{x:g} 0 {z:g}"', f'xyz="{x:g} 0 2"'
+    assert old in raised
+    urdf.write_text(raised.replace(old, new))
+    run = rps_pin("describe", str(file))
+    assert run.returncode == 1
+    assert "closure 'slide' stays open by" in run.stderr
+
+
+def test_simulate_writes_table_figures_and_page(tmp_path: Path) -> None:
+    file = URDF / "four_bar.yaml"
+    run = rps_pin("simulate", str(file), "--duration", "0.2", "--step", "0.002", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert run.stderr == ""
+    folder = tmp_path / "four_bar-simulation"
+    names = {"simulation.csv", "simulation.png", "simulation.svg", "viewer.html"}
+    assert {path.name for path in folder.iterdir()} == names
+    table = np.genfromtxt(folder / "simulation.csv", delimiter=",", names=True)
+    assert len(table) == 101
+    np.testing.assert_allclose(np.diff(table["time"]), 0.002, rtol=0, atol=1e-12)
+    assert table["gap"].max() <= 1e-12
+    energy = table["kinetic"] + table["potential"]
+    np.testing.assert_allclose(energy, energy[0], rtol=0, atol=1e-8 * table["kinetic"].max())
+
+
+def test_held_mechanism_stays_where_it_is(tmp_path: Path) -> None:
+    run = rps_pin(
+        *("simulate", str(URDF / "delta.yaml"), "--hold", "--duration", "0.1", "--json"),
+        *("--start", "arm_1_joint=0.5", "--output", str(tmp_path / "out")),
+    )
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)
+    assert summary["kinetic_peak"] < 1e-20
+    assert summary["largest_gap"] <= 1e-12
+    table = np.genfromtxt(tmp_path / "out" / "simulation.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(table["q_arm_1_joint"], 0.5, rtol=0, atol=1e-9)
+
+
+def test_speeds_and_forces_are_those_asked_for(tmp_path: Path) -> None:
+    run = rps_pin(
+        *("simulate", str(URDF / "five_bar.yaml"), "--duration", "0.01", "--method", "adaptive"),
+        *("--speed", "left_joint=0.3", "--tau", "right_joint=-2.5", "-o", str(tmp_path / "out")),
+    )
+    assert run.returncode == 0, run.stderr
+    table = np.genfromtxt(tmp_path / "out" / "simulation.csv", delimiter=",", names=True)
+    assert table["v_left_joint"][0] == pytest.approx(0.3, abs=1e-15)
+    assert table["v_right_joint"][0] == pytest.approx(0.0, abs=1e-15)
+    assert (table["tau_right_joint"] == -2.5).all()
+    assert (table["tau_left_joint"] == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (("--tau", "knee=1"), "no actuated joint 'knee'; there are: crank_joint"),
+        (("--speed", "crank_joint"), "must be JOINT=NUMBER"),
+        (("--start", "crank_joint=fast"), "must be JOINT=NUMBER"),
+        (("--start", "nothing=1"), "no joint 'nothing'"),
+        (("--tau", "crank_joint=1", "--tau", "crank_joint=2"), "named twice"),
+        (("--tau", "crank_joint=nan"), "finite"),
+        (("--step", "0"), "step = 0"),
+        (("--duration", "inf"), "duration = inf"),
+    ],
+)
+def test_bad_options_are_told_in_one_line(
+    tmp_path: Path, option: tuple[str, ...], words: str
+) -> None:
+    run = rps_pin("simulate", str(URDF / "four_bar.yaml"), *option, folder=tmp_path)
+    assert run.returncode == 1
+    assert words in run.stderr
+    assert run.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
