@@ -41,6 +41,15 @@ def test_describe_as_json_is_what_the_library_says() -> None:
     assert json.loads(run.stdout) == ClosedLoopModel.load(file).describe().as_dict()
 
 
+def test_mechanisms_of_the_package_go_by_their_names(tmp_path: Path) -> None:
+    run = rps_pin("describe", "delta", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == f"{ClosedLoopModel.load(URDF / 'delta.yaml').describe()}\n"
+    run = rps_pin("describe", "dleta", folder=tmp_path)
+    assert run.returncode == 1
+    assert "those are: delta, delta_rods, five_bar" in run.stderr
+
+
 def test_describe_reads_mujoco_files(tmp_path: Path) -> None:
     file = tmp_path / "swing.xml"
     file.write_text(MJCF)

@@ -22,7 +22,7 @@ def describe_command(
 
     Examples:
 
-    - `rps-pin describe urdf/delta.yaml`
+    - `rps-pin describe delta`, or `rps-pin describe mine.yaml`
 
     - `rps-pin describe robot.xml --json` of a MuJoCo file
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
@@ -14,8 +15,9 @@ from rps_pin.errors import InputError
 FileArgument = Annotated[
     Path,
     typer.Argument(
-        metavar="FILE",
-        help="A mechanism's description (**.yaml**), or a MuJoCo file (**.xml**).",
+        metavar="FILE|NAME",
+        help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), or the name of one "
+        "that comes with the package, such as **delta**.",
         show_default=False,
     ),
 ]
@@ -29,6 +31,30 @@ def load_mechanism(file: Path) -> ClosedLoopModel:
     InputError
         If the suffix is of neither kind; says what a URDF lacks.
     """
+    return _loaded(mechanism_file(file))
+
+
+def mechanism_file(file: Path) -> Path:
+    """Return a file's path as it is, or that of a mechanism of the package by its name.
+
+    Raises
+    ------
+    InputError
+        If it is a name, and there is none such; lists those there are.
+    """
+    if file.suffix or file.exists():
+        return file
+    folder = Path(str(resources.files("rps_pin"))) / "urdf"
+    names = sorted(path.stem for path in folder.glob("*.yaml"))
+    if str(file) not in names:
+        raise InputError(
+            f"{str(file)!r} is no file, and no mechanism of the package; those are: "
+            f"{', '.join(names)}"
+        )
+    return folder / f"{file}.yaml"
+
+
+def _loaded(file: Path) -> ClosedLoopModel:
     suffix = file.suffix.lower()
     if suffix in (".yaml", ".yml"):
         return ClosedLoopModel.load(file)

@@ -14,7 +14,12 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from rps_pin.cli.mechanism_options import FileArgument, by_joint, load_mechanism
+from rps_pin.cli.mechanism_options import (
+    FileArgument,
+    by_joint,
+    load_mechanism,
+    mechanism_file,
+)
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.simulated_motion import Simulation
 from rps_pin.errors import InputError
@@ -80,12 +85,13 @@ def simulate_command(
 
     Examples:
 
-    - `rps-pin simulate urdf/four_bar.yaml --duration 3`
+    - `rps-pin simulate four_bar --duration 3`
 
-    - `rps-pin simulate urdf/delta.yaml --hold --speed arm_1_joint=0.5`
+    - `rps-pin simulate delta --hold --speed arm_1_joint=0.5`
     """
     from rps_pin.closed_loop.simulation import simulate
 
+    file = mechanism_file(file)
     mechanism = load_mechanism(file)
     q, v, forces = _start(mechanism, start, speed, tau, hold)
     console = Console(quiet=as_json, soft_wrap=True)
