@@ -27,12 +27,14 @@ from rps_pin.closed_loop.dynamics import ClosedLoopDynamics
 from rps_pin.closed_loop.inverse_dynamics import pseudo_inverse
 from rps_pin.closed_loop.joint_effects import FRICTION_SPEED, JointEffects
 from rps_pin.closed_loop.kinematics import MAX_CONDITION
+from rps_pin.closed_loop.loops import Loops
 from rps_pin.closed_loop.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.mobility import MechanismDescription, describe
 from rps_pin.closed_loop.parts import MechanismParts
 from rps_pin.closed_loop.reading import model_from_urdf
 from rps_pin.closed_loop.simulated_motion import Simulation
 from rps_pin.closed_loop.simulation import simulate
+from rps_pin.closed_loop.splitting import split
 from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.closed_loop.wrenches import Wrenches, closure_wrenches, forces_on_joints
 from rps_pin.errors import InputError
@@ -74,6 +76,8 @@ class ClosedLoopModel(ClosedLoopDynamics):
     InputError
         If a number or an array does not fit.
     """
+
+    _split_loops: Loops | None = None  # made when first needed
 
     @classmethod
     def from_urdf(
@@ -287,12 +291,18 @@ class ClosedLoopModel(ClosedLoopDynamics):
         ------
         SingularityError
             If the actuated joints do not determine the motion here, or are more than the mobility.
+        MechanismError
+            If the tree holds a joint whose derivatives are not known (ellipsoid, mimic).
         """
         q_, v_, a_ = self._checked_state(q, v, a)
         basis = self.motion_basis(q_)
         multipliers = self.inverse_dynamics(q_, v_, a_, wrenches=wrenches).constraint_forces
         slopes, rows = dynamics_slopes(
-            self._loops, (q_, v_, a_), multipliers, self._by_frame(wrenches), self.effects
+            self._differentiable(),
+            (q_, v_, a_),
+            multipliers,
+            self._by_frame(wrenches),
+            self.effects,
         )
         following = Following(basis, self._actuated, self._solution(q_), rows)
         return inverse_derivatives(slopes, following)
@@ -325,7 +335,7 @@ class ClosedLoopModel(ClosedLoopDynamics):
         multipliers = self.constraint_forces(q_, v_, a, tau, wrenches=wrenches)
         basis, chosen = self.motion_basis(q_, independent), self._independent(independent)
         slopes, rows = dynamics_slopes(
-            self._loops, (q_, v_, a), multipliers, self._by_frame(wrenches), self.effects
+            self._differentiable(), (q_, v_, a), multipliers, self._by_frame(wrenches), self.effects
         )
         following = Following(basis, chosen, self._solution(q_), rows)
         return forward_derivatives(slopes, rows, following, (chosen, self._actuated))
@@ -372,6 +382,17 @@ class ClosedLoopModel(ClosedLoopDynamics):
             ``step``, ``method``, ``controller``, ``tau``, ``wrenches``, ``closing`` and others.
         """
         return simulate(self, q, v, duration=duration, **options)
+
+    def _differentiable(self) -> Loops:
+        """Return the loops on a tree whose derivatives Pinocchio knows; see `splitting`."""
+        if self._split_loops is None:
+            twin = split(self.model)
+            self._split_loops = (
+                self._loops
+                if twin is self.model
+                else Loops(twin, self.closures, self.characteristic_length)
+            )
+        return self._split_loops
 
     def _solution(self, q: Array) -> Solved:
         """Return what solves J x = b at q: of x, the passive joints' rows if they determine it."""
