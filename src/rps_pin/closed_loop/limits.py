@@ -39,6 +39,15 @@ class JointLimits:
         clipped[self.q] = np.clip(q[self.q], self.lower, self.upper)
         return clipped
 
+    def outside(self, q: Array) -> dict[str, str]:
+        """Return a phrase for each joint outside its limits, by its name."""
+        x = q[self.q]
+        return {
+            self.names[i]: f"{self.names[i]!r} at {x[i]:.6g} ({self.lower[i]:.6g} to "
+            f"{self.upper[i]:.6g})"
+            for i in np.flatnonzero((x < self.lower) | (x > self.upper))
+        }
+
     def blocked(self, q: Array, step: Array) -> NDArray[np.bool_]:
         """Return which velocities, shape (nv,), a step would drive out through a limit at once."""
         x, outward = q[self.q], step[self.v]

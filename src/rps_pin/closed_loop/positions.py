@@ -170,12 +170,10 @@ class ClosedLoopPositions:
         held = np.zeros(self.model.nv, dtype=bool)
         held[self._velocity_indices(fixed, "to fix")] = True
         start = self._limits.clip(guess) if within_limits else guess
-        moved = (pin.difference(self.model, guess, start) != 0) & held
-        if moved.any():
-            outside = [name for name in fixed if moved[self._velocity_indices([name], "")].any()]
-            raise ClosureError(
-                f"in the guess, fixed joints are outside their limits: {', '.join(outside)}", np.inf
-            )
+        outside = self._limits.outside(guess) if within_limits else {}
+        if outside.keys() & set(fixed):
+            phrases = ", ".join(outside[name] for name in fixed if name in outside)
+            raise ClosureError(f"fixed joints are outside their limits: {phrases}", np.inf)
         best, best_gap, rng = start, np.inf, np.random.default_rng(0)
         for attempt in range(1 + restarts):
             q = self._closed_from(start, held, within_limits)
