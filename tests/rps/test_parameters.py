@@ -38,6 +38,11 @@ LEGAL = {
     "actuator_force_limit": 50.0,
     "actuator_speed_limit": 0.5,
     "gravity": [0.0, 0.0, -1.62],
+    "prismatic_damping": 12.0,
+    "prismatic_friction": 3.0,
+    "revolute_damping": 0.2,
+    "revolute_friction": 0.1,
+    "friction_speed": 0.02,
 }
 FLOATS = [name for name, value in LEGAL.items() if isinstance(value, float)]
 ARRAYS = {"platform_inertia": (3, 3), "gravity": (3,)}
@@ -228,7 +233,9 @@ def test_infinite_sizes_and_masses_are_refused(field: str, bad: float) -> None:
     refused(field, bad)
 
 
-@pytest.mark.parametrize("field", ["base_radius", "platform_radius", "platform_mass"])
+@pytest.mark.parametrize(
+    "field", ["base_radius", "platform_radius", "platform_mass", "friction_speed"]
+)
 @pytest.mark.parametrize("bad", [0.0, -0.1])
 def test_what_must_exist_is_positive(field: str, bad: float) -> None:
     refused(field, bad, "greater than 0")
@@ -237,6 +244,14 @@ def test_what_must_exist_is_positive(field: str, bad: float) -> None:
 @pytest.mark.parametrize("field", ["leg_mass", "leg_com", "leg_inertia", "rod_mass", "rod_inertia"])
 def test_masses_and_inertias_are_not_negative(field: str) -> None:
     refused(field, -1e-12, "greater than or equal to 0")
+
+
+@pytest.mark.parametrize("joint", ["prismatic", "revolute"])
+@pytest.mark.parametrize("kind", ["damping", "friction"])
+def test_friction_is_none_unless_given_and_never_negative(joint: str, kind: str) -> None:
+    for preset in RPSParameters.presets():
+        assert getattr(RPSParameters.from_preset(preset), f"{joint}_{kind}") == 0
+    refused(f"{joint}_{kind}", -1e-12, "greater than or equal to 0")
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,11 @@ from rps_pin.rps.conversions import (
     pose_from_position,
     position_from_pose,
 )
+from rps_pin.rps.force_causes import ForceCauses, force_causes
 from rps_pin.rps.forward import EncoderTracker, ForwardKinematics
+from rps_pin.rps.lagrange import LagrangeDynamics, lagrange_forces
 from rps_pin.rps.legs import LegMotion, Legs
+from rps_pin.rps.loads import Payload
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.path_check import check_path
 from rps_pin.rps.path_events import LimitEvent, PathCheck, SingularityEvent
@@ -22,28 +25,41 @@ from rps_pin.rps.rates import (
     pose_acceleration,
     pose_rate,
 )
+from rps_pin.rps.reactions import JointReactions, joint_reactions
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity import SingularityMeasures, singular_surface, singularity_measures
+from rps_pin.rps.sizing import ActuatorLimits, size_motion, size_trajectory
+from rps_pin.rps.sizing_sheet import SizingSheet
 from rps_pin.rps.three_quantities import poses_from
 from rps_pin.rps.urdf import build_urdf
+from rps_pin.rps.virtual_work import virtual_work_forces
 
 __all__ = [
+    "ActuatorLimits",
     "AssemblyModes",
     "EncoderTracker",
+    "ForceCauses",
     "ForwardKinematics",
+    "JointReactions",
+    "LagrangeDynamics",
     "LegMotion",
     "Legs",
     "LimitEvent",
     "PathCheck",
+    "Payload",
     "PlatformMotion",
     "RPSParameters",
     "RPSRobot",
     "SingularityEvent",
     "SingularityMeasures",
+    "SizingSheet",
     "angles_from_pose",
     "build_urdf",
     "check_path",
     "constraint_residuals",
+    "force_causes",
+    "joint_reactions",
+    "lagrange_forces",
     "leg_jacobian_rates",
     "leg_jacobians",
     "parasitic_motion",
@@ -57,4 +73,7 @@ __all__ = [
     "position_from_pose",
     "singular_surface",
     "singularity_measures",
+    "size_motion",
+    "size_trajectory",
+    "virtual_work_forces",
 ]

@@ -26,6 +26,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.error import YAMLError
 
+from rps_pin.closed_loop.joint_effects import FRICTION_SPEED
 from rps_pin.errors import InputError, ParameterError
 from rps_pin.files import whole_file
 
@@ -82,7 +83,10 @@ class RPSParameters(BaseModel):
 
     Immutable; compare with ``==``, derive a changed copy with :meth:`replace`. Each symbol of the
     paper has its field, and so has what the paper leaves out (the moving rods, the limits, the
-    direction of gravity). Fields that the paper leaves out default to "none".
+    direction of gravity, friction). Fields that the paper leaves out default to "none".
+
+    Friction resists a joint's speed v with d v + f tanh(v / v_s): viscous, and dry friction made
+    smooth near zero speed, where it creeps instead of sticking (v_s is ``friction_speed``).
 
     The middle of a spherical joint's cone is its *rest axis*, fixed in the platform: in the plane
     of the platform's normal n and the joint's radial direction e_i, it is
@@ -159,6 +163,19 @@ class RPSParameters(BaseModel):
     )
     gravity: Vector3 = Field(
         np.array([0.0, 0.0, -9.81]), description="gravity's acceleration in base axes, m/s^2"
+    )
+
+    prismatic_damping: NonNegative = Field(
+        0.0, description="viscous friction of an actuator, N s/m"
+    )
+    prismatic_friction: NonNegative = Field(0.0, description="dry friction of an actuator, N")
+    revolute_damping: NonNegative = Field(
+        0.0, description="viscous friction of a revolute joint, N m s/rad"
+    )
+    revolute_friction: NonNegative = Field(0.0, description="dry friction of a revolute joint, N m")
+    friction_speed: Positive = Field(
+        FRICTION_SPEED,
+        description="speed at which dry friction reaches 76 % of its value, m/s and rad/s",
     )
 
     def __init__(self, **values: Any) -> None:

@@ -9,11 +9,16 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.closed_loop import ClosedLoopModel, InverseDynamics, LoopClosure
+from rps_pin.closed_loop.reading import model_from_urdf
 from rps_pin.errors import InputError, UnreachableError
+from rps_pin.rps import actuator_forces as fast_path
 from rps_pin.rps import legs as leg_kinematics
 from rps_pin.rps.assembly import AssemblyModes, assembly_modes
+from rps_pin.rps.force_equations import ForceTerms
 from rps_pin.rps.forward import forward_kinematics
+from rps_pin.rps.friction import friction_effects
 from rps_pin.rps.legs import LegMotion, Legs
+from rps_pin.rps.loads import Payload
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.pose import (
     Array,
@@ -39,27 +44,41 @@ class RPSRobot:
     Parameters
     ----------
     parameters
-        Geometry, masses and limits.
+        Geometry, masses, friction and limits.
+    payload
+        What the platform carries; see `with_payload`.
 
     Attributes
     ----------
     parameters : RPSParameters
         As given.
+    payload : Payload or None
+        As given.
     urdf : str
         The URDF of the open tree, generated from the parameters.
     mechanism : ClosedLoopModel
         The tree with its three spherical closures ``leg_1``, ``leg_2``, ``leg_3``; nv = 12, nine
-        rows, mobility 3, the prismatic joints actuated. Its characteristic length is h.
+        rows, mobility 3, the prismatic joints actuated. Its characteristic length is h. Friction
+        and payload are in it.
+    force_terms : ForceTerms
+        What the closed form of the actuator forces is made of.
     """
 
-    def __init__(self, parameters: RPSParameters) -> None:
+    def __init__(self, parameters: RPSParameters, payload: Payload | None = None) -> None:
         self.parameters = parameters
+        self.payload = payload
         self.urdf = build_urdf(parameters)
-        self.mechanism = ClosedLoopModel.from_urdf(
-            self.urdf,
+        self.force_terms = ForceTerms.of(parameters, payload)
+        model = model_from_urdf(self.urdf)
+        model.gravity.linear = np.array(parameters.gravity)
+        if payload is not None:
+            platform = model.getJointId("platform_free")
+            model.appendBodyToJoint(platform, payload.as_inertia(), pin.SE3.Identity())
+        self.mechanism = ClosedLoopModel(
+            model,
             closures=[LoopClosure(*ball_frames(leg), name=f"leg_{leg}") for leg in LEGS],
             actuated=[f"leg_{leg}_prismatic" for leg in LEGS],
-            gravity=parameters.gravity,
+            effects=friction_effects(model, parameters),
             characteristic_length=parameters.platform_radius,
         )
         joints = self.mechanism.model.joints
@@ -80,11 +99,19 @@ class RPSRobot:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Give copies, and other processes, scratch memory of their own."""
-        return type(self), (self.parameters,)
+        return type(self), (self.parameters, self.payload)
 
     def __repr__(self) -> str:
         p = self.parameters
         return f"RPSRobot({p.name!r}, g = {p.base_radius} m, h = {p.platform_radius} m)"
+
+    def with_payload(self, payload: Payload | None) -> RPSRobot:
+        """Return this robot carrying a payload (instead of the one it carries, if any).
+
+        All its dynamics then include the payload. Its parameters and its URDF are the robot's own,
+        without it.
+        """
+        return type(self)(self.parameters, payload)
 
     # Kinematics -----------------------------------------------------------------------------------
 
@@ -249,13 +276,18 @@ class RPSRobot:
 
     # Dynamics -------------------------------------------------------------------------------------
 
-    def inverse_dynamics(self, q: Array, v: Array, a: Array) -> InverseDynamics:
+    def inverse_dynamics(
+        self, q: Array, v: Array, a: Array, *, wrench: ArrayLike | None = None
+    ) -> InverseDynamics:
         """Return actuator forces and joint reactions of one state, through the constraint models.
 
         Parameters
         ----------
         q, v, a
             One state as `state` gives it: (13,), (12,), (12,).
+        wrench
+            What something outside exerts on the platform: force (N) in base axes and moment (N m)
+            about the platform's centre, shape (6,).
 
         Returns
         -------
@@ -270,7 +302,52 @@ class RPSRobot:
         InputError, SingularityError
             As `ClosedLoopModel.inverse_dynamics`.
         """
-        return self.mechanism.inverse_dynamics(q, v, a)
+        if wrench is None:
+            return self.mechanism.inverse_dynamics(q, v, a)
+        return self.mechanism.inverse_dynamics(q, v, a, wrenches={"platform": wrench})
+
+    def actuator_forces(
+        self,
+        pose: ArrayLike,
+        rate: ArrayLike,
+        acceleration: ArrayLike,
+        *,
+        wrench: ArrayLike | None = None,
+        errors: Literal["raise", "mask"] = "raise",
+    ) -> Array:
+        """Return the actuator forces of whole trajectories, in closed form.
+
+        The same forces as `inverse_dynamics`, for many samples at once.
+
+        Parameters
+        ----------
+        pose, rate, acceleration
+            Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
+        wrench
+            What something outside exerts on the platform: force (N) in base axes and moment (N m)
+            about the platform's centre, shape (6,) or one for each sample (..., 6).
+        errors
+            ``"raise"`` refuses the first sample that is out of reach or singular; ``"mask"``
+            returns a masked array (`numpy.ma`), such samples masked.
+
+        Returns
+        -------
+        array
+            Shape (..., 3), N; positive pushes the leg out.
+
+        Raises
+        ------
+        InputError
+            If an argument is not finite, or shapes do not go together.
+        UnreachableError
+            As `inverse_kinematics`; names the sample.
+        SingularityError
+            If a pose is singular: where ``mechanism.condition`` exceeds
+            ``mechanism.max_condition``. Names the sample, the condition and its limit.
+        """
+        return fast_path.actuator_forces(
+            self, pose, rate, acceleration, wrench=wrench, errors=errors
+        )
 
     def visual_model(self) -> pin.GeometryModel:
         """Return the shapes of the robot's links, for `rps_pin.viewer`."""

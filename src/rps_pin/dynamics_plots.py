@@ -1,0 +1,168 @@
+"""Figures of what moves a robot: forces by cause, and the actuators' forces over their speeds.
+
+Each function draws on axes of your own, or makes a figure. Nothing here opens a window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import ArrayLike
+
+from rps_pin.errors import InputError
+from rps_pin.plots import LEG_COLOURS, STYLE
+from rps_pin.rps.checks import finite_entries
+from rps_pin.rps.force_causes import ForceCauses
+from rps_pin.rps.sizing_sheet import SizingSheet
+
+#: Okabe and Ito's colours for the causes, told apart by colour-blind readers; and hatches, so that
+#: print without colour will do.
+_CAUSES = {
+    "gravity": ("#0072B2", ""),
+    "inertia": ("#E69F00", "//"),
+    "coriolis": ("#009E73", "\\\\"),
+    "friction": ("#CC79A7", "xx"),
+    "payload": ("#56B4E9", ".."),
+    "external": ("#F0E442", "--"),
+}
+_LABELS = {"coriolis": "Coriolis"}
+_LEG_STYLES = ("-", "--", "-.")
+
+
+def plot_force_causes(
+    time: ArrayLike, causes: ForceCauses, axes: Sequence[Axes] | None = None
+) -> Figure:
+    """Draw the actuator forces over time as stacks of their causes, a panel for each actuator.
+
+    Positive parts stand on zero, negative ones hang from it; the black line is the force, their
+    sum. Causes that are zero throughout are left out.
+
+    Parameters
+    ----------
+    time
+        Increasing, shape (n,), s.
+    causes
+        Of n samples.
+    axes
+        Three axes to draw on; a new figure's if left out.
+
+    Raises
+    ------
+    InputError
+        If the shapes do not fit, or there are not three axes.
+    """
+    times = finite_entries(time, (), "time")
+    total = causes.total
+    if times.ndim != 1 or total.shape != (times.size, 3):
+        raise InputError(
+            f"time has shape {times.shape} and the causes {total.shape}; they must be (n,) and "
+            "(n, 3)"
+        )
+    with matplotlib.rc_context(STYLE):
+        if axes is None:
+            figure = Figure(figsize=(6.4, 7.2), layout="constrained")
+            axes = list(figure.subplots(3, 1, sharex=True))
+            figure.suptitle("Actuator forces by cause")
+        if len(axes) != 3:
+            raise InputError(f"axes: {len(axes)} given; one is needed for each of 3 actuators")
+        shown = {name: part for name, part in causes.parts().items() if part.any()}
+        for leg, own in enumerate(axes):
+            _stacks(own, times, {name: part[:, leg] for name, part in shown.items()})
+            own.plot(times, total[:, leg], color="black", linewidth=1.2, label="sum")
+            own.axhline(0.0, color="black", linewidth=0.6)
+            own.set_ylabel(f"force $F_{leg + 1}$ (N)")
+            own.margins(x=0)
+        axes[-1].set_xlabel("time (s)")
+        _legend_above(axes[0], columns=7)
+    return _figure_of(axes[0])
+
+
+def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
+    """Draw each actuator's force over its speed, and the box of the limits.
+
+    A motion that keeps the limits stays within the box; the dotted curves are the limit of power.
+    A limit that there is not is not drawn. Crosses mark the peak forces.
+    """
+    with matplotlib.rc_context(STYLE):
+        if axes is None:
+            figure = Figure(figsize=(6.4, 4.6), layout="constrained")
+            figure.suptitle("Force and speed of the actuators")
+            axes = figure.add_subplot()
+        legs = list(zip(LEG_COLOURS, _LEG_STYLES, sheet.actuators, strict=True))
+        for leg, (colour, style, actuator) in enumerate(legs):
+            speed, force = sheet.speed[:, leg], sheet.force[:, leg]
+            label = f"actuator {actuator.actuator}"
+            axes.plot(speed, force, color=colour, linestyle=style, label=label)
+            peak = int(np.abs(force).argmax())
+            axes.plot(speed[peak], force[peak], "x", color=colour)
+        _limit_box(axes, sheet)
+        axes.axhline(0.0, color="black", linewidth=0.6)
+        axes.axvline(0.0, color="black", linewidth=0.6)
+        axes.set_xlabel("speed $\\dot d_i$ (m/s), positive is out")
+        axes.set_ylabel("force $F_i$ (N), positive pushes out")
+        _legend_above(axes, columns=5)
+    return _figure_of(axes)
+
+
+def _stacks(axes: Axes, time: np.ndarray, parts: dict[str, np.ndarray]) -> None:
+    above, below = np.zeros_like(time), np.zeros_like(time)
+    for name, part in parts.items():
+        colour, hatch = _CAUSES[name]
+        upper, lower = above + np.maximum(part, 0.0), below + np.minimum(part, 0.0)
+        look: dict[str, Any] = {
+            "facecolor": colour,
+            "edgecolor": "white",
+            "linewidth": 0.0,
+            "hatch": hatch,
+        }
+        axes.fill_between(time, above, upper, label=_LABELS.get(name, name), **look)
+        axes.fill_between(time, below, lower, **look)
+        above, below = upper, lower
+
+
+def _limit_box(axes: Axes, sheet: SizingSheet) -> None:
+    """Draw what limits there are: a box, or two lines where one side is open."""
+    force, speed, power = sheet.limits.force, sheet.limits.speed, sheet.limits.power
+    look: dict[str, Any] = {"color": "black", "linewidth": 1.0}
+    if np.isfinite(force) and np.isfinite(speed):
+        corner = (-speed, -force)
+        axes.add_patch(Rectangle(corner, 2 * speed, 2 * force, fill=False, label="limits"))
+        axes.autoscale_view()
+    elif np.isfinite(force):
+        axes.axhline(force, label="limits", **look)
+        axes.axhline(-force, **look)
+    elif np.isfinite(speed):
+        axes.axvline(speed, label="limits", **look)
+        axes.axvline(-speed, **look)
+    if np.isfinite(power):
+        largest = speed if np.isfinite(speed) else 1.2 * float(np.abs(sheet.speed).max())
+        highest = force if np.isfinite(force) else 1.2 * float(np.abs(sheet.force).max())
+        if largest * highest > power:  # else the curves lie outside
+            v = np.linspace(power / highest, largest, 100)
+            for sides in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+                label = "power limit" if sides == (1, 1) else None
+                axes.plot(sides[0] * v, sides[1] * power / v, ":", color="black", label=label)
+
+
+def _legend_above(axes: Axes, columns: int) -> None:
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0, 1),
+        ncols=columns,
+        frameon=False,
+        fontsize="small",
+        columnspacing=1.0,
+        handlelength=1.6,
+    )
+
+
+def _figure_of(axes: Axes) -> Figure:
+    figure = axes.get_figure(root=True)
+    assert figure is not None  # axes of a figure have one
+    return figure
