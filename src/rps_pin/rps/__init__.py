@@ -28,8 +28,8 @@ from rps_pin.rps.rates import (
 from rps_pin.rps.reactions import JointReactions, joint_reactions
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity import SingularityMeasures, singular_surface, singularity_measures
-from rps_pin.rps.sizing import ActuatorLimits, size_motion, size_trajectory
-from rps_pin.rps.sizing_sheet import SizingSheet
+from rps_pin.rps.sizing import size_motion, size_trajectory
+from rps_pin.rps.sizing_sheet import ActuatorLimits, SizingSheet
 from rps_pin.rps.three_quantities import poses_from
 from rps_pin.rps.urdf import build_urdf
 from rps_pin.rps.virtual_work import virtual_work_forces

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rps_pin.errors import InputError, shown
+from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.rps.pose import Array
 
 
@@ -52,3 +53,27 @@ def finite_numbers(**values: ArrayLike) -> dict[str, Array]:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise InputError(f"the shapes do not go together: {shapes}") from None
     return dict(zip(arrays, together, strict=True))
+
+
+def refuse_large_gain(matrices: Array, limit: float, message: str) -> None:
+    """Raise `SingularityError` at the first matrix whose inverse is larger than a limit.
+
+    Parameters
+    ----------
+    matrices
+        Shape (..., n, n), in one unit.
+    limit
+        Largest norm of the inverse, the gain, that is accepted; positive.
+    message
+        With the fields ``{where}``, ``{gain}`` and ``{limit}``.
+    """
+    if not limit > 0:
+        raise InputError(f"max_gain = {limit}: it must be positive")
+    smallest = np.linalg.svd(matrices, compute_uv=False)[..., -1]
+    singular = ~(smallest * limit >= 1)
+    if not singular.any():
+        return
+    first = tuple(int(i) for i in np.argwhere(singular)[0])
+    where = f" (entry {first} of {singular.size})" if first else ""
+    gain = 1 / float(smallest[first]) if smallest[first] > 0 else math.inf
+    raise SingularityError(message.format(where=where, gain=gain, limit=limit), gain, limit)

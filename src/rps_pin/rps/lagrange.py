@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.closed_loop.kinematics import MAX_CONDITION
-from rps_pin.errors import InputError, SingularityError
+from rps_pin.rps.checks import refuse_large_gain
 from rps_pin.rps.lagrange_terms import lagrange_terms
 from rps_pin.rps.lagrange_vectors import times
 from rps_pin.rps.legs import leg_motion
@@ -116,25 +116,12 @@ def _multipliers(
     """Solve Eq. 25 for lambda, arcs d_i dphi_i instead of angles and distances instead of f."""
     side = 2 * math.sqrt(3.0) * parameters.platform_radius  # f = side * (distance - sqrt(3) h)
     cosines = jacobian[..., 3:] / (side * length[..., None, :])
-    _refuse_singular(cosines, max_gain)
+    refuse_large_gain(
+        cosines,
+        max_gain,
+        "Eq. 25 does not determine the multipliers{where}: the legs' angles could change with "
+        "their lengths held, a gain of {gain:.3g}; at most {limit:.3g} is accepted",
+    )
     across = effort[..., 3:] / length
     solved = np.linalg.solve(np.swapaxes(cosines, -1, -2), across[..., None])[..., 0]
     return np.asarray(solved / side, dtype=np.float64)
-
-
-def _refuse_singular(cosines: Array, limit: float) -> None:
-    if not limit > 0:
-        raise InputError(f"max_gain = {limit}: it must be positive")
-    smallest = np.linalg.svd(cosines, compute_uv=False)[..., -1]
-    singular = ~(smallest * limit >= 1)
-    if not singular.any():
-        return
-    first = tuple(int(i) for i in np.argwhere(singular)[0])
-    where = f" (entry {first} of {singular.size})" if first else ""
-    gain = 1 / float(smallest[first]) if smallest[first] > 0 else math.inf
-    raise SingularityError(
-        f"Eq. 25 does not determine the multipliers{where}: the legs' angles could change with "
-        f"their lengths held, a gain of {gain:.3g}; at most {limit:.3g} is accepted",
-        gain,
-        limit,
-    )

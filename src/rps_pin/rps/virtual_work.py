@@ -20,14 +20,13 @@ velocities. Without mass in the rods this is the robot of the paper's Lagrangian
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.closed_loop.kinematics import MAX_CONDITION
-from rps_pin.errors import InputError, SingularityError
+from rps_pin.rps.checks import refuse_large_gain
 from rps_pin.rps.legs import RADIAL
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.pose import checked_motion, platform_motion
@@ -93,7 +92,12 @@ def virtual_work_forces(
     # Tilts made lengths by h, on both sides.
     units = np.array([1.0, *2 * [1 / parameters.platform_radius]])
     scaled = legs.length_jacobian * units
-    _refuse_singular(scaled, max_gain)
+    refuse_large_gain(
+        scaled,
+        max_gain,
+        "the actuators cannot hold the platform here{where}: it could move {gain:.3g} times as "
+        "fast as they, and at most {limit:.3g} times is accepted",
+    )
     force: Array = np.linalg.solve(np.swapaxes(scaled, -1, -2), (units * needed)[..., None])[..., 0]
     return force
 
@@ -179,21 +183,3 @@ def _leg_forces(
 def _times(matrix: Array, vector: Array) -> Array:
     product: Array = np.einsum("...ij,...j->...i", matrix, vector)
     return product
-
-
-def _refuse_singular(scaled: Array, limit: float) -> None:
-    if not limit > 0:
-        raise InputError(f"max_gain = {limit}: it must be positive")
-    smallest = np.linalg.svd(scaled, compute_uv=False)[..., -1]
-    singular = ~(smallest * limit >= 1)
-    if not singular.any():
-        return
-    first = tuple(int(i) for i in np.argwhere(singular)[0])
-    where = f" (entry {first} of {singular.size})" if first else ""
-    gain = 1 / float(smallest[first]) if smallest[first] > 0 else math.inf
-    raise SingularityError(
-        f"the actuators cannot hold the platform here{where}: it could move {gain:.3g} times as "
-        f"fast as they, and at most {limit:.3g} times is accepted",
-        gain,
-        limit,
-    )
