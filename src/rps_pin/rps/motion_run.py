@@ -8,10 +8,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import trapezoid
 
-from rps_pin.errors import InputError, SingularityError, UnreachableError
+from rps_pin.errors import InputError, SingularityError
+from rps_pin.rps.path_refusal import require_clear
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.path import Trajectory
 
@@ -115,6 +116,7 @@ def run_motion(
     trajectory: Trajectory,
     sample_rate: float = 1000.0,
     *,
+    wrench: ArrayLike | None = None,
     progress: Progress = iter,
 ) -> MotionRun:
     """Compute the inverse dynamics of a robot along a trajectory, through its constraint models.
@@ -127,6 +129,9 @@ def run_motion(
         Poses and their exact derivatives over time.
     sample_rate
         Samples a second, Hz; the end of the trajectory is always the last sample.
+    wrench
+        What something outside exerts on the platform all along: force (N) in base axes and moment
+        (N m) about the platform's centre, shape (6,).
     progress
         Wraps the loop over the samples, for a progress bar.
 
@@ -135,13 +140,13 @@ def run_motion(
     InputError
         If the sample rate is not a positive number, or gives over ten million samples.
     UnreachableError
-        If a pose is out of reach; says when.
+        If the trajectory leaves the robot's limits; says when, before any force is computed.
     SingularityError
-        If the motion meets a singularity; says when.
+        If it meets a singularity; likewise.
     """
     time = sample_times(trajectory.duration, sample_rate)
+    require_clear(robot, trajectory)
     pose, rate, acceleration = trajectory.sample(time)
-    _refuse_unreachable(robot, time, pose)
     q, v, a = robot.state(pose, rate, acceleration)
     platform, legs = robot.motion(pose, rate, acceleration)
     n = len(time)
@@ -150,7 +155,7 @@ def run_motion(
     side = 0
     for i in progress(range(n)):
         try:
-            result = robot.inverse_dynamics(q[i], v[i], a[i])
+            result = robot.inverse_dynamics(q[i], v[i], a[i], wrench=wrench)
         except SingularityError as error:
             raise SingularityError(
                 f"at t = {time[i]:.6g} s the motion meets a singularity: {error}",
@@ -217,18 +222,6 @@ def sample_times(duration: float, sample_rate: float) -> Array:
         )
     count = math.ceil(duration * sample_rate - 1e-9)
     return np.append(np.arange(count) / sample_rate, duration)
-
-
-def _refuse_unreachable(robot: RPSRobot, time: Array, pose: Array) -> None:
-    reachable = robot.inverse_kinematics(pose, errors="mask").reachable
-    if not reachable.all():
-        first = int(np.argmin(reachable))
-        try:
-            robot.inverse_kinematics(pose[first])
-        except UnreachableError as error:
-            raise UnreachableError(
-                f"at t = {time[first]:.6g} s of {time[-1]:.6g} s: {error}", error.violations
-            ) from None
 
 
 def _actuator_summary(run: MotionRun, leg: int) -> ActuatorSummary:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rps_pin.errors import InputError, SingularityError, UnreachableError
 from rps_pin.rps.checks import finite_entries
 from rps_pin.rps.motion_run import sample_times
+from rps_pin.rps.path_refusal import require_clear
 from rps_pin.rps.pose import Array
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity import singularity_measures
@@ -55,6 +56,7 @@ def size_trajectory(
         If the motion is out of reach, or meets a singularity; says when.
     """
     time = sample_times(trajectory.duration, sample_rate)
+    require_clear(robot, trajectory)
     motion = trajectory.sample(time)
     return size_motion(robot, time, *motion, limits=limits, wrench=wrench, threshold=threshold)
 

@@ -1,0 +1,100 @@
+"""Curves of poses, and laws of time that run along them: a trajectory is one in the other.
+
+A curve x(u) says where the robot goes, a law u(t) says when. The chain rule gives the rest:
+
+    x' = x_u u',    x'' = x_u u'' + x_uu u'^2.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.trajectories.path import Array, PathSample, checked_times
+
+
+class CurveSample(NamedTuple):
+    """A curve at given parameters u; poses are ``(z, tilt_x, tilt_y)`` in m and rad."""
+
+    pose: Array
+    """Shape (..., 3)."""
+    first: Array
+    """First derivative by u, shape (..., 3)."""
+    second: Array
+    """Second derivative by u, shape (..., 3)."""
+
+
+class Curve(Protocol):
+    """Poses along a parameter u that runs from 0 to `length`, without a time."""
+
+    @property
+    def length(self) -> float:
+        """Where u ends; positive. Its unit is the curve's own: a fraction, an angle, a chord."""
+        ...
+
+    def at(self, u: ArrayLike) -> CurveSample:
+        """Return pose and exact derivatives at parameters of shape (...)."""
+        ...
+
+
+class LawSample(NamedTuple):
+    """A law of time at given times; u in the unit of the curve that it runs along."""
+
+    u: Array
+    """Shape (...)."""
+    rate: Array
+    """First time derivative, shape (...)."""
+    acceleration: Array
+    """Second time derivative, shape (...)."""
+
+
+class TimeLaw(Protocol):
+    """How a parameter u grows over time, from 0 at time 0."""
+
+    @property
+    def duration(self) -> float:
+        """Length in time, s."""
+        ...
+
+    def at(self, t: ArrayLike) -> LawSample:
+        """Return u and its exact time derivatives at times of shape (...), s."""
+        ...
+
+
+class TimedCurve:
+    """A trajectory: a curve, and the law of time that runs along it.
+
+    Attributes
+    ----------
+    curve : Curve
+        Where the robot goes.
+    law : TimeLaw
+        When.
+    """
+
+    def __init__(self, curve: Curve, law: TimeLaw) -> None:
+        self.curve = curve
+        self.law = law
+
+    @property
+    def duration(self) -> float:
+        """Length in time, s."""
+        return self.law.duration
+
+    def __repr__(self) -> str:
+        return f"TimedCurve({self.curve!r}, {self.law!r})"
+
+    def sample(self, t: ArrayLike) -> PathSample:
+        """Return pose, rate and acceleration at times t of shape (...), s; exact.
+
+        Raises
+        ------
+        InputError
+            If a time lies outside the trajectory.
+        """
+        u, du, ddu = self.law.at(checked_times(t, self.duration))
+        pose, first, second = self.curve.at(np.clip(u, 0.0, self.curve.length))
+        rate = first * du[..., None]
+        return PathSample(pose, rate, first * ddu[..., None] + second * (du**2)[..., None])
