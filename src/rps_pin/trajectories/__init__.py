@@ -1,17 +1,33 @@
 """Trajectories of poses with exact first and second derivatives."""
 
 from rps_pin.trajectories.curve import Curve, CurveSample, LawSample, TimedCurve, TimeLaw
-from rps_pin.trajectories.helix import HelixPath, helix
+from rps_pin.trajectories.helix import HelixCurve, HelixPath, helix
 from rps_pin.trajectories.path import PathSample, Trajectory
+from rps_pin.trajectories.point_to_point import LineCurve, point_to_point
+from rps_pin.trajectories.spline import ChordSpline, TimedSpline, spline
+from rps_pin.trajectories.tilt_figures import HarmonicCurve, circle, lissajous
+from rps_pin.trajectories.time_laws import QuinticLaw, SCurveLaw, TrapezoidalLaw
 
 __all__ = [
+    "ChordSpline",
     "Curve",
     "CurveSample",
+    "HarmonicCurve",
+    "HelixCurve",
     "HelixPath",
     "LawSample",
+    "LineCurve",
     "PathSample",
+    "QuinticLaw",
+    "SCurveLaw",
     "TimeLaw",
     "TimedCurve",
+    "TimedSpline",
     "Trajectory",
+    "TrapezoidalLaw",
+    "circle",
     "helix",
+    "lissajous",
+    "point_to_point",
+    "spline",
 ]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.trajectories.path import Array, PathSample, checked_times
@@ -95,6 +94,6 @@ class TimedCurve:
             If a time lies outside the trajectory.
         """
         u, du, ddu = self.law.at(checked_times(t, self.duration))
-        pose, first, second = self.curve.at(np.clip(u, 0.0, self.curve.length))
+        pose, first, second = self.curve.at(u)
         rate = first * du[..., None]
         return PathSample(pose, rate, first * ddu[..., None] + second * (du**2)[..., None])

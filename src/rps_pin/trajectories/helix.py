@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
-from rps_pin.trajectories.path import Array, PathSample, checked_times
+from rps_pin.trajectories.curve import CurveSample
+from rps_pin.trajectories.path import Array, PathSample, checked_parameters, checked_times
 
 #: Eq. 29: t_a and t_t of Table 1, the latter unrounded (5.2388 s).
 PAPER_RAMP = 0.5
@@ -41,6 +42,41 @@ class _HasParameters(Protocol):
 class _Robot(Protocol):
     @property
     def parameters(self) -> _HasParameters: ...
+
+
+class HelixCurve:
+    """The helix without a time: u is phi, from 0 to 2 pi.
+
+    Parameters
+    ----------
+    tilt
+        The platform's constant tilt beta, rad; negative for the branch (alpha, -beta).
+    pitch, height
+        The climb in the turn, and where it starts, m.
+    """
+
+    length = 2 * math.pi
+
+    def __init__(self, tilt: float, pitch: float, height: float) -> None:
+        self.tilt = tilt
+        self.pitch = pitch
+        self.height = height
+
+    def __repr__(self) -> str:
+        return f"HelixCurve(tilt={self.tilt}, pitch={self.pitch}, height={self.height})"
+
+    def at(self, u: ArrayLike) -> CurveSample:
+        """Return pose and derivatives at phi = u of shape (...), rad."""
+        phi = checked_parameters(u, self.length)
+        # alpha = pi/2 - phi/2: (-sin(alpha), cos(alpha)) = (-cos(phi/2), sin(phi/2))
+        w = self.tilt * np.stack([-np.cos(phi / 2), np.sin(phi / 2)], axis=-1)
+        across = self.tilt * np.stack([np.sin(phi / 2), np.cos(phi / 2)], axis=-1)
+        climb = np.full_like(phi, self.pitch / (2 * math.pi))
+        return CurveSample(
+            _pose(self.height + climb * phi, w),
+            _pose(climb, across / 2),
+            _pose(np.zeros_like(phi), -w / 4),
+        )
 
 
 class HelixPath:
@@ -69,6 +105,8 @@ class HelixPath:
         self.tilt = 2 * math.asin(math.sqrt(radius / platform_radius))
         #: Duration of the rise and of the fall of the speed, s.
         self.ramp = duration * PAPER_RAMP / PAPER_DURATION
+        #: The helix without a time.
+        self.curve = HelixCurve(self.tilt if branch == "+" else -self.tilt, pitch, height)
 
     def __repr__(self) -> str:
         return (
@@ -104,19 +142,9 @@ class HelixPath:
             If a time lies outside the trajectory.
         """
         phi, dphi, ddphi = self.turn(t)
-        sign = 1.0 if self.branch == "+" else -1.0
-        # alpha = pi/2 - phi/2: (-sin(alpha), cos(alpha)) = (-cos(phi/2), sin(phi/2))
-        along = np.stack([-np.cos(phi / 2), np.sin(phi / 2)], axis=-1)
-        across = np.stack([np.sin(phi / 2), np.cos(phi / 2)], axis=-1)
-        w = sign * self.tilt * along
-        dw = sign * self.tilt * across * (dphi / 2)[..., None]
-        ddw = (
-            sign * self.tilt * (across * (ddphi / 2)[..., None] - along * (dphi**2 / 4)[..., None])
-        )
-        climb = self.pitch / (2 * math.pi)
-        return PathSample(
-            _pose(self.height + climb * phi, w), _pose(climb * dphi, dw), _pose(climb * ddphi, ddw)
-        )
+        pose, first, second = self.curve.at(phi)
+        rate = first * dphi[..., None]
+        return PathSample(pose, rate, first * ddphi[..., None] + second * (dphi**2)[..., None])
 
 
 def helix(

@@ -44,15 +44,41 @@ def checked_times(t: ArrayLike, duration: float) -> Array:
     InputError
         If a time is no finite number, or outside [0, duration] by more than rounding.
     """
-    try:
-        times = np.asarray(t, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError("times must be numbers, in seconds") from None
-    slack = 1e-12 * max(duration, 1.0)
-    outside = ~((times >= -slack) & (times <= duration + slack))
-    if outside.any():
+    times = _numbers(t, "times must be numbers, in seconds")
+    outside = _outside(times, duration)
+    if outside is not None:
         raise InputError(
-            f"time {times[outside].flat[0]:.9g} s is outside the trajectory, "
-            f"which runs from 0 to {duration:.9g} s"
+            f"time {outside:.9g} s is outside the trajectory, which runs from 0 to {duration:.9g} s"
         )
     return times.clip(0.0, duration)
+
+
+def checked_parameters(u: ArrayLike, length: float) -> Array:
+    """Return parameters of a curve as a float array.
+
+    Raises
+    ------
+    InputError
+        If one is no finite number, or outside [0, length] by more than rounding.
+    """
+    parameters = _numbers(u, "parameters of a curve must be numbers")
+    outside = _outside(parameters, length)
+    if outside is not None:
+        raise InputError(
+            f"u = {outside:.9g} is outside the curve, which runs from 0 to {length:.9g}"
+        )
+    return parameters.clip(0.0, length)
+
+
+def _numbers(values: ArrayLike, wanted: str) -> Array:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(wanted) from None
+
+
+def _outside(values: Array, end: float) -> float | None:
+    """Return the first value outside [0, end] by more than rounding, if there is one."""
+    slack = 1e-12 * max(end, 1.0)
+    outside = ~((values >= -slack) & (values <= end + slack))
+    return float(values[outside].flat[0]) if outside.any() else None

@@ -1,0 +1,50 @@
+"""Poses given to a trajectory: finite numbers of the right shape, kept where nobody writes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.errors import InputError, shown
+from rps_pin.trajectories.path import Array
+
+
+def finite_array(value: ArrayLike, ndim: int, name: str) -> Array:
+    """Return finite numbers, shape (3,) or (n, 3) or whatever its `ndim`, as a read-only copy.
+
+    Raises
+    ------
+    InputError
+        If they are no finite numbers, or of another dimension.
+    """
+    try:
+        given = np.asarray(value)
+    except ValueError:  # ragged
+        given = np.asarray("ragged")
+    if given.dtype.kind not in "iuf" or given.ndim != ndim:
+        raise InputError(f"{name} = {shown(value)}: it must be an array of {ndim} dimension(s)")
+    array = given.astype(np.float64)
+    if not np.isfinite(array).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(f"{name} is not finite: entry {where} is {array[where]}")
+    array.setflags(write=False)
+    return array
+
+
+def checked_pose(value: ArrayLike, name: str) -> Array:
+    """Return one pose (z, tilt_x, tilt_y), shape (3,), m and rad."""
+    pose = finite_array(value, 1, name)
+    if pose.shape != (3,):
+        raise InputError(f"{name} has shape {pose.shape}; a pose is (z, tilt_x, tilt_y)")
+    return pose
+
+
+def checked_poses(value: ArrayLike, name: str) -> Array:
+    """Return two or more poses, shape (n, 3), m and rad."""
+    poses = finite_array(value, 2, name)
+    if poses.shape[1] != 3 or len(poses) < 2:
+        raise InputError(
+            f"{name} has shape {poses.shape}; it must be (n, 3) with n of 2 or more: "
+            "(z, tilt_x, tilt_y) each"
+        )
+    return poses
