@@ -109,7 +109,10 @@ def test_helix_takes_a_parameter_file_and_other_numbers(tmp_path: Path) -> None:
         (["helix", "--robot", "micro"], "leg 1: length would be"),
         (["helix", "--radius", "nan"], "radius = nan"),
         (["helix", "--radius", "75e-3", "--pitch", "50e-3"], "crosses a type II singularity"),
-        (["helix", "--radius", "0", "--pitch", "0", "--height", "0"], "stays for 5.23884 s in a type II"),
+        (
+            ["helix", "--radius", "0", "--pitch", "0", "--height", "0"],
+            "stays for 5.23884 s in a type II",
+        ),
         (["helix", "--rate", "0"], "must be a positive number of Hz"),
         (["helix", "--duration", "-1"], "positive number of seconds"),
         (["urdf", "--robot", "mine.yaml"], "base_radius"),

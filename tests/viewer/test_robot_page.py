@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rps_pin import RPSRobot, helix
-from rps_pin.cli.helix import write_results
+from rps_pin.cli.motion_report import write_motion
 from rps_pin.rps.motion_run import MotionRun, run_motion
 
 
@@ -21,7 +21,7 @@ def run(robot: RPSRobot) -> MotionRun:
 
 
 def test_the_helix_page_loads_shows_the_robot_and_moves(robot, run, watched, tmp_path: Path):
-    page = write_results(tmp_path, robot, run)[-1]
+    page = write_motion(tmp_path, "helix", "a helix", robot, run)[-1]
     assert page.name == "viewer.html"
     watched.page.context.set_offline(True)
     watched.page.goto(page.as_uri())

@@ -8,8 +8,6 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import track
-from rich.table import Table
 
 from rps_pin.cli.console import RobotOption, load_robot
 from rps_pin.cli.helix_options import (
@@ -24,8 +22,15 @@ from rps_pin.cli.helix_options import (
     RadiusOption,
     chosen_helix,
 )
-from rps_pin.rps.motion_csv import write_csv
-from rps_pin.rps.motion_run import ActuatorSummary, MotionRun, MotionSummary, run_motion, summarise
+from rps_pin.cli.motion_report import (
+    actuator_table,
+    print_exceeded,
+    print_files,
+    run_table,
+    sample_progress,
+    write_motion,
+)
+from rps_pin.rps.motion_run import MotionSummary, run_motion, summarise
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.helix import PAPER_DURATION, HelixPath
 
@@ -70,53 +75,16 @@ def helix_command(
     machine = load_robot(robot)
     path = chosen_helix(machine, radius, pitch, height, branch, duration)
     console = Console(quiet=as_json)
-    run = run_motion(
-        machine,
-        path,
-        rate,
-        progress=lambda samples: track(
-            samples,
-            "inverse dynamics",
-            console=console,
-            transient=True,
-            disable=not console.is_terminal,
-        ),
-    )
+    run = run_motion(machine, path, rate, progress=sample_progress(console))
     summary = summarise(run, machine)
     output.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
-        files = write_results(output, machine, run)
+        title = f"3-RPS {machine.parameters.name} along a helix"
+        files = write_motion(output, "helix", title, machine, run)
     if as_json:
         typer.echo(json.dumps(_as_json(machine, path, summary, files), indent=2))
     else:
         _print_tables(console, machine, path, summary, files)
-
-
-def write_results(folder: Path, robot: RPSRobot, run: MotionRun) -> list[Path]:
-    """Write a motion's table, figures and animation into a folder; return the files."""
-    # Only this command draws: the others shall not wait for these to be imported.
-    from rps_pin.plots import plot_forces, plot_lengths, plot_path, save_figure
-    from rps_pin.viewer import write_html
-
-    table = folder / "helix.csv"
-    write_csv(table, run)
-    files = [table]
-    for name, plot in (
-        ("figure_7_path", plot_path),
-        ("figure_8_lengths", plot_lengths),
-        ("figure_9_forces", plot_forces),
-    ):
-        files += save_figure(plot(run), folder, name)
-    page = folder / "viewer.html"
-    write_html(
-        page,
-        robot.mechanism.model,
-        robot.visual_model(),
-        run.time,
-        run.configuration,
-        title=f"3-RPS {robot.parameters.name} along a helix",
-    )
-    return [*files, page]
 
 
 def _as_json(
@@ -148,42 +116,7 @@ def _print_tables(
         f"pitch {1e3 * path.pitch:g} mm, from {path.height:g} m",
         highlight=False,
     )
-    console.print(_actuator_table(summary.actuators))
-    console.print(_run_table(summary))
-    for sentence in summary.exceeded:
-        console.print(f"[bold yellow]beyond a limit:[/] {sentence}", highlight=False)
-    console.print("Written:")
-    for file in files:
-        console.print(f"  {file}", highlight=False, soft_wrap=True)
-
-
-def _actuator_table(actuators: tuple[ActuatorSummary, ...]) -> Table:
-    table = Table("", *(f"actuator {one.actuator}" for one in actuators), "unit")
-    for column in table.columns[1:-1]:
-        column.justify = "right"
-    for label, unit, attribute in (
-        ("force, minimum", "N", "force_min"),
-        ("force, maximum", "N", "force_max"),
-        ("force, RMS", "N", "force_rms"),
-        ("length, shortest", "m", "length_min"),
-        ("length, longest", "m", "length_max"),
-        ("speed, peak", "m/s", "speed_peak"),
-        ("power, peak", "W", "power_peak"),
-        ("power, mean of |F d'|", "W", "power_mean"),
-    ):
-        table.add_row(label, *(f"{getattr(one, attribute):.6g}" for one in actuators), unit)
-    return table
-
-
-def _run_table(summary: MotionSummary) -> Table:
-    z, tilt_x, tilt_y = summary.singularity_pose
-    table = Table(show_header=False)
-    table.add_row("duration", f"{summary.duration:.6g} s ({summary.samples} samples)")
-    table.add_row("largest loop gap", f"{summary.loop_gap_max:.2g} m")
-    table.add_row("largest KKT residual", f"{summary.residual_max:.2g} of the largest force")
-    table.add_row(
-        "smallest distance to a singularity\n(1 / condition number: 0 singular, 1 best)",
-        f"{summary.singularity_distance_min:.4g} at t = {summary.singularity_time:.4g} s,\n"
-        f"z = {z:.6g} m, tilt = ({tilt_x:.4g}, {tilt_y:.4g}) rad",
-    )
-    return table
+    console.print(actuator_table(summary.actuators))
+    console.print(run_table(summary))
+    print_exceeded(console, summary)
+    print_files(console, files)

@@ -1,0 +1,101 @@
+"""What the commands that compute a motion's forces share: progress, files, tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from rps_pin.rps.motion_csv import write_csv
+from rps_pin.rps.motion_run import ActuatorSummary, MotionRun, MotionSummary
+from rps_pin.rps.robot import RPSRobot
+
+
+def sample_progress(console: Console) -> Callable[[Iterable[int]], Iterable[int]]:
+    """Return what wraps the loop over a motion's samples with a bar, on a terminal."""
+    return lambda samples: track(
+        samples,
+        "inverse dynamics",
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+
+
+def write_motion(
+    folder: Path, name: str, title: str, robot: RPSRobot, run: MotionRun
+) -> list[Path]:
+    """Write a motion's table, figures and animation into a folder; return the files."""
+    # Only commands that draw wait for these to be imported.
+    from rps_pin.plots import plot_forces, plot_lengths, plot_path, save_figure
+    from rps_pin.viewer import write_html
+
+    table = folder / f"{name}.csv"
+    write_csv(table, run)
+    files = [table]
+    for figure, plot in (
+        ("figure_7_path", plot_path),
+        ("figure_8_lengths", plot_lengths),
+        ("figure_9_forces", plot_forces),
+    ):
+        files += save_figure(plot(run), folder, figure)
+    page = folder / "viewer.html"
+    write_html(
+        page,
+        robot.mechanism.model,
+        robot.visual_model(),
+        run.time,
+        run.configuration,
+        title=title,
+    )
+    return [*files, page]
+
+
+def actuator_table(actuators: tuple[ActuatorSummary, ...]) -> Table:
+    """Return forces, lengths, speeds and powers of the actuators, a column each."""
+    table = Table("", *(f"actuator {one.actuator}" for one in actuators), "unit")
+    for column in table.columns[1:-1]:
+        column.justify = "right"
+    for label, unit, attribute in (
+        ("force, minimum", "N", "force_min"),
+        ("force, maximum", "N", "force_max"),
+        ("force, RMS", "N", "force_rms"),
+        ("length, shortest", "m", "length_min"),
+        ("length, longest", "m", "length_max"),
+        ("speed, peak", "m/s", "speed_peak"),
+        ("power, peak", "W", "power_peak"),
+        ("power, mean of |F d'|", "W", "power_mean"),
+    ):
+        table.add_row(label, *(f"{getattr(one, attribute):.6g}" for one in actuators), unit)
+    return table
+
+
+def run_table(summary: MotionSummary) -> Table:
+    """Return duration, accuracy, and how near the motion comes to a singularity."""
+    z, tilt_x, tilt_y = summary.singularity_pose
+    table = Table(show_header=False)
+    table.add_row("duration", f"{summary.duration:.6g} s ({summary.samples} samples)")
+    table.add_row("largest loop gap", f"{summary.loop_gap_max:.2g} m")
+    table.add_row("largest KKT residual", f"{summary.residual_max:.2g} of the largest force")
+    table.add_row(
+        "smallest distance to a singularity\n(1 / condition number: 0 singular, 1 best)",
+        f"{summary.singularity_distance_min:.4g} at t = {summary.singularity_time:.4g} s,\n"
+        f"z = {z:.6g} m, tilt = ({tilt_x:.4g}, {tilt_y:.4g}) rad",
+    )
+    return table
+
+
+def print_exceeded(console: Console, summary: MotionSummary) -> None:
+    """Print a line for each actuator limit that the motion exceeds."""
+    for sentence in summary.exceeded:
+        console.print(f"[bold yellow]beyond a limit:[/] {sentence}", highlight=False)
+
+
+def print_files(console: Console, files: list[Path]) -> None:
+    """Print what was written."""
+    console.print("Written:")
+    for file in files:
+        console.print(f"  {file}", highlight=False, soft_wrap=True)
