@@ -12,9 +12,11 @@ from rps_pin import __version__
 from rps_pin.cli.check import check_command
 from rps_pin.cli.console import complain
 from rps_pin.cli.describe import describe_command
+from rps_pin.cli.dynamics import dynamics_command
 from rps_pin.cli.fk import fk_command
 from rps_pin.cli.helix import helix_command
 from rps_pin.cli.ik import ik_command
+from rps_pin.cli.reproduce import reproduce_command
 from rps_pin.cli.simulate import simulate_command
 from rps_pin.cli.urdf import urdf_command
 from rps_pin.cli.view import view_command
@@ -29,11 +31,13 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("helix")(helix_command)
+app.command("dynamics")(dynamics_command)
 app.command("view")(view_command)
 app.command("ik")(ik_command)
 app.command("fk")(fk_command)
 app.command("check")(check_command)
 app.command("workspace")(workspace_command)
+app.command("reproduce")(reproduce_command)
 app.command("urdf")(urdf_command)
 app.command("describe")(describe_command)
 app.command("simulate")(simulate_command)
@@ -56,7 +60,8 @@ def rps_pin(
     Everything is in SI units: metres, radians, seconds, kilograms, newtons.
 
     First steps: **rps-pin helix** computes the paper's motion, **rps-pin view** shows it live,
-    **rps-pin describe** tells what any other mechanism can do.
+    **rps-pin dynamics** takes any trajectory of yours, **rps-pin describe** tells what any other
+    mechanism can do.
     """
 
 
