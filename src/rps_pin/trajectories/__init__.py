@@ -1,9 +1,11 @@
 """Trajectories of poses with exact first and second derivatives."""
 
+from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.curve import Curve, CurveSample, LawSample, TimedCurve, TimeLaw
 from rps_pin.trajectories.helix import HelixCurve, HelixPath, helix
 from rps_pin.trajectories.path import PathSample, Trajectory
 from rps_pin.trajectories.point_to_point import LineCurve, point_to_point
+from rps_pin.trajectories.sampled_path import SampledPath
 from rps_pin.trajectories.spline import ChordSpline, TimedSpline, spline
 from rps_pin.trajectories.tilt_figures import HarmonicCurve, circle, lissajous
 from rps_pin.trajectories.time_laws import QuinticLaw, SCurveLaw, TrapezoidalLaw
@@ -20,6 +22,7 @@ __all__ = [
     "PathSample",
     "QuinticLaw",
     "SCurveLaw",
+    "SampledPath",
     "TimeLaw",
     "TimedCurve",
     "TimedSpline",
@@ -29,5 +32,6 @@ __all__ = [
     "helix",
     "lissajous",
     "point_to_point",
+    "read_csv",
     "spline",
 ]
