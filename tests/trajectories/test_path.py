@@ -1,4 +1,4 @@
-"""Times of a trajectory."""
+"""Times of a trajectory, parameters of a curve."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rps_pin import InputError
-from rps_pin.trajectories.path import checked_times
+from rps_pin.trajectories.path import checked_parameters, checked_times
 
 
 def test_times_within_the_trajectory_pass_unchanged() -> None:
@@ -35,3 +35,20 @@ def test_other_times_are_refused_with_the_range(bad: float) -> None:
 def test_things_that_are_no_times_are_refused(bad: object) -> None:
     with pytest.raises(InputError, match="time"):
         checked_times(bad, 2.0)
+
+
+def test_parameters_within_the_curve_pass_and_rounding_is_forgiven() -> None:
+    within = np.linspace(0, 7, 6).reshape(2, 3)
+    np.testing.assert_array_equal(checked_parameters(within, 7.0), within)
+    np.testing.assert_array_equal(checked_parameters([-1e-15, 7 + 2e-15], 7.0), [0.0, 7.0])
+
+
+@pytest.mark.parametrize("bad", [-1e-6, 7 + 1e-6, np.nan, np.inf])
+def test_other_parameters_are_refused_with_the_range(bad: float) -> None:
+    with pytest.raises(InputError, match=f"u = {bad:.9g} is outside the curve, .* 0 to 7"):
+        checked_parameters([1.0, bad], 7.0)
+
+
+def test_things_that_are_no_parameters_are_refused() -> None:
+    with pytest.raises(InputError, match="parameters of a curve must be numbers"):
+        checked_parameters("far", 7.0)

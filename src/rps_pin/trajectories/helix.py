@@ -17,7 +17,6 @@ second at its highest. Other proportions keep the same phi(t).
 from __future__ import annotations
 
 import math
-from numbers import Real
 from typing import Literal, Protocol
 
 import numpy as np
@@ -26,6 +25,7 @@ from numpy.typing import ArrayLike
 from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample
 from rps_pin.trajectories.path import Array, PathSample, checked_parameters, checked_times
+from rps_pin.trajectories.poses import finite_number
 
 #: Eq. 29: t_a and t_t of Table 1, the latter unrounded (5.2388 s).
 PAPER_RAMP = 0.5
@@ -53,14 +53,19 @@ class HelixCurve:
         The platform's constant tilt beta, rad; negative for the branch (alpha, -beta).
     pitch, height
         The climb in the turn, and where it starts, m.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite.
     """
 
     length = 2 * math.pi
 
     def __init__(self, tilt: float, pitch: float, height: float) -> None:
-        self.tilt = tilt
-        self.pitch = pitch
-        self.height = height
+        self.tilt = finite_number(tilt, "tilt")
+        self.pitch = finite_number(pitch, "pitch")
+        self.height = finite_number(height, "height")
 
     def __repr__(self) -> str:
         return f"HelixCurve(tilt={self.tilt}, pitch={self.pitch}, height={self.height})"
@@ -198,9 +203,7 @@ def _check(
 ) -> None:
     lengths = {"radius": radius, "pitch": pitch, "height": height}
     for name, value in (lengths | {"duration": duration}).items():
-        if not isinstance(value, Real) or not math.isfinite(value):
-            unit = "metres" if name in lengths else "seconds"
-            raise InputError(f"{name} = {value!r}: it must be a finite number of {unit}")
+        finite_number(value, name, "metres" if name in lengths else "seconds")
     if not 0 <= radius <= platform_radius:
         raise InputError(
             f"radius = {radius} m: the centre of a platform of radius h = {platform_radius} m "

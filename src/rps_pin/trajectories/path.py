@@ -72,13 +72,16 @@ def checked_parameters(u: ArrayLike, length: float) -> Array:
 
 def _numbers(values: ArrayLike, wanted: str) -> Array:
     try:
-        return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+        given = np.asarray(values)
+    except ValueError:  # ragged
         raise InputError(wanted) from None
+    if given.dtype.kind not in "iuf":
+        raise InputError(wanted)
+    return given.astype(np.float64)
 
 
 def _outside(values: Array, end: float) -> float | None:
     """Return the first value outside [0, end] by more than rounding, if there is one."""
-    slack = 1e-12 * max(end, 1.0)
+    slack = 1e-12 * end
     outside = ~((values >= -slack) & (values <= end + slack))
     return float(values[outside].flat[0]) if outside.any() else None

@@ -88,10 +88,14 @@ def point_to_point(
 def _along(limit: ArrayLike, way: Array, name: str) -> float:
     """Return the limit on u of limits on coordinates that change by `way` in all."""
     try:
-        limits = np.broadcast_to(np.asarray(limit, dtype=np.float64), (3,))
-    except (TypeError, ValueError):
-        raise InputError(f"{name} = {shown(limit)}: it must be a number, or three") from None
+        given = np.asarray(limit)
+    except ValueError:  # ragged
+        given = np.asarray("ragged")
+    if given.dtype.kind not in "iuf" or given.shape not in ((), (3,)):
+        raise InputError(f"{name} = {shown(limit)}: it must be a number, or three")
+    limits = np.broadcast_to(given.astype(np.float64), (3,))
     if not (limits > 0).all():
         raise InputError(f"{name} = {shown(limit)}: it must be positive")
     moving = way > 0
-    return float((limits[moving] / way[moving]).min())
+    with np.errstate(over="ignore"):  # of a way so short that it cannot matter
+        return float((limits[moving] / way[moving]).min())

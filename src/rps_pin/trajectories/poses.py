@@ -1,12 +1,36 @@
-"""Poses given to a trajectory: finite numbers of the right shape, kept where nobody writes."""
+"""Numbers and poses given to a trajectory: finite, of the right shape, kept where nobody writes."""
 
 from __future__ import annotations
+
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.path import Array
+
+#: No number given to a trajectory is larger (m, rad, s): what is reckoned from them stays finite.
+_LARGEST = 1e50
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value is a single real number; True and False are none."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def finite_number(value: float, name: str, unit: str = "") -> float:
+    """Return a number that is finite, and not absurdly large; `unit` is named in the error.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    if not is_number(value) or not abs(value) <= _LARGEST:
+        wanted = f"a finite number{unit and f' of {unit}'}"
+        raise InputError(f"{name} = {shown(value)}: it must be {wanted}, at most {_LARGEST}")
+    return float(value)
 
 
 def finite_array(value: ArrayLike, ndim: int, name: str) -> Array:
@@ -15,7 +39,7 @@ def finite_array(value: ArrayLike, ndim: int, name: str) -> Array:
     Raises
     ------
     InputError
-        If they are no finite numbers, or of another dimension.
+        If they are no finite numbers, absurdly large, or of another dimension.
     """
     try:
         given = np.asarray(value)
@@ -27,6 +51,8 @@ def finite_array(value: ArrayLike, ndim: int, name: str) -> Array:
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{name} is not finite: entry {where} is {array[where]}")
+    if (np.abs(array) > _LARGEST).any():
+        raise InputError(f"{name} = {shown(value)}: no entry may be beyond {_LARGEST}")
     array.setflags(write=False)
     return array
 

@@ -12,6 +12,7 @@ continuous; nothing in a step depends on samples elsewhere.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from scipy.interpolate import BPoly, BSpline, make_interp_spline
 from rps_pin.errors import InputError
 from rps_pin.trajectories.path import Array, PathSample, checked_times
 from rps_pin.trajectories.poses import checked_poses, finite_array
+from rps_pin.trajectories.resampled import ResampledCurve
 
 #: Samples that a quintic spline needs.
 FEWEST_POSES = 6
@@ -93,6 +95,11 @@ class SampledPath:
     def duration(self) -> float:
         """Length in time, s."""
         return float(self.times[-1])
+
+    @cached_property
+    def curve(self) -> ResampledCurve:
+        """The way without its times, to run along by another law."""
+        return ResampledCurve(self, self.times)
 
     def __repr__(self) -> str:
         return f"SampledPath(<{len(self.times)} samples>, duration={self.duration:.6g})"

@@ -11,6 +11,7 @@ and a law of time runs along it. Heights and tilts have different units: a chord
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,10 +28,13 @@ from rps_pin.trajectories.path import (
     checked_times,
 )
 from rps_pin.trajectories.poses import checked_poses, finite_array
+from rps_pin.trajectories.resampled import ResampledCurve
 from rps_pin.trajectories.time_laws import Profile, positive, time_law
 
 #: Metres that a radian of tilt counts for in a chord's length: the size of a small platform.
 TILT_SCALE = 0.1
+#: How well a spline must meet its poses, over the largest of them.
+_MET = 1e-9
 
 
 class ChordSpline:
@@ -41,26 +45,33 @@ class ChordSpline:
     poses
         Shape (n, 3), m and rad; no two neighbours alike.
     tilt_scale
-        L, m/rad: how tilts and heights make up a length.
+        L, m/rad: how tilts and heights make up a length; positive.
 
     Attributes
     ----------
     poses : (n, 3) array
         As given, read-only.
     knots : (n,) array
-        The parameters u at which the poses are met, m.
+        The parameters u at which the poses are met, read-only, m.
     length : float
         The last of them.
+
+    Raises
+    ------
+    InputError
+        If poses are not finite, of another shape, or neighbours are the same.
     """
 
     def __init__(self, poses: ArrayLike, *, tilt_scale: float = TILT_SCALE) -> None:
         self.poses = checked_poses(poses, "poses")
         scale = np.array([1.0, *2 * [positive(tilt_scale, "tilt_scale")]])
         chords = np.linalg.norm(np.diff(self.poses, axis=0) * scale, axis=-1)
-        if not (chords > 0).all():
-            i = int(np.argmin(chords > 0))
-            raise InputError(f"poses {i} and {i + 1} are the same: a chord has no length")
         self.knots = np.concatenate([[0.0], np.cumsum(chords)])
+        self.knots.setflags(write=False)
+        rising = np.diff(self.knots) > 0
+        if not rising.all():
+            i = int(np.argmin(rising))
+            raise InputError(f"poses {i} and {i + 1} are the same: the chord has no length")
         self.length = float(self.knots[-1])
         self._spline = CubicSpline(self.knots, self.poses, bc_type="natural")
 
@@ -89,6 +100,12 @@ class TimedSpline:
         From 0, read-only, s.
     poses : (n, 3) array
         As given, read-only.
+
+    Raises
+    ------
+    InputError
+        If poses or times are not finite, of other shapes, or do not increase; or if steps are so
+        unequal that rounding keeps the spline from meeting its poses.
     """
 
     def __init__(self, times: ArrayLike, poses: ArrayLike) -> None:
@@ -96,20 +113,24 @@ class TimedSpline:
         given = finite_array(times, 1, "times")
         if given.shape != (len(self.poses),):
             raise InputError(f"{len(given)} times for {len(self.poses)} poses: one each is needed")
-        rising = np.diff(given) > 0
+        self.times = given - given[0]
+        self.times.setflags(write=False)
+        rising = np.diff(self.times) > 0
         if not rising.all():
             i = int(np.argmin(rising))
             raise InputError(f"times must increase: {given[i]:.9g} s, then {given[i + 1]:.9g} s")
-        self.times = given - given[0]
-        self.times.setflags(write=False)
-        rest: Any = [(1, np.zeros(3)), (2, np.zeros(3))]  # scipy-stubs know names only
-        spline: BSpline = make_interp_spline(self.times, self.poses, k=5, bc_type=(rest, rest))
+        spline = _at_rest(self.times, self.poses)
         self._derivatives = [spline, spline.derivative(1), spline.derivative(2)]
 
     @property
     def duration(self) -> float:
         """Length in time, s."""
         return float(self.times[-1])
+
+    @cached_property
+    def curve(self) -> ResampledCurve:
+        """The way without its times, to run along by another law."""
+        return ResampledCurve(self, self.times)
 
     def __repr__(self) -> str:
         return f"TimedSpline(<{len(self.poses)} poses>, duration={self.duration:.6g})"
@@ -125,6 +146,24 @@ class TimedSpline:
         times = checked_times(t, self.duration)
         values: list[Array] = [np.asarray(spline(times)) for spline in self._derivatives]
         return PathSample(*values)
+
+
+def _at_rest(times: Array, poses: Array) -> BSpline:
+    """Return the quintic spline, or refuse steps for which its equations are ill-conditioned."""
+    rest: Any = [(1, np.zeros(3)), (2, np.zeros(3))]  # scipy-stubs know names only
+    try:
+        with np.errstate(all="ignore"):  # what overflows is not met
+            spline: BSpline = make_interp_spline(times, poses, k=5, bc_type=(rest, rest))
+            missed = np.abs(spline(times) - poses).max()
+    except (ValueError, np.linalg.LinAlgError):  # infinite, or singular
+        missed = np.inf
+    if not missed <= _MET * np.abs(poses).max():
+        steps = np.diff(times)
+        raise InputError(
+            f"times: steps of {steps.min():.3g} s to {steps.max():.3g} s are too unequal for a "
+            "spline"
+        )
+    return spline
 
 
 def spline(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from numbers import Integral, Real
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
 from rps_pin.trajectories.path import Array, checked_parameters
+from rps_pin.trajectories.poses import finite_array, finite_number
 from rps_pin.trajectories.time_laws import Profile, positive, time_law
 
 
@@ -29,17 +30,23 @@ class HarmonicCurve:
     frequency, phase
         Swings per turn of u, and where they begin (rad), shape (3,).
     length
-        Where u ends, rad.
+        Where u ends, rad; positive.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, or an array of another shape.
     """
 
     def __init__(
         self, middle: ArrayLike, size: ArrayLike, frequency: ArrayLike, phase: ArrayLike,
         length: float,
     ) -> None:  # fmt: skip
-        self._middle, self._size, self._frequency, self._phase = (
-            np.asarray(value, dtype=np.float64) for value in (middle, size, frequency, phase)
-        )
-        self.length = length
+        self._middle = _three(middle, "middle")
+        self._size = _three(size, "size")
+        self._frequency = _three(frequency, "frequency")
+        self._phase = _three(phase, "phase")
+        self.length = positive(length, "length")
 
     def __repr__(self) -> str:
         return (
@@ -92,10 +99,10 @@ def circle(
         If a number is not finite, or not positive where it must be.
     """
     quarter = math.pi / 2  # cos(start + u) = sin(u + start + pi/2)
-    first = _finite(start, "start")
+    first = finite_number(start, "start")
     size = positive(tilt, "tilt")
     curve = HarmonicCurve(
-        [_finite(height, "height"), 0.0, 0.0],
+        [finite_number(height, "height"), 0.0, 0.0],
         [0.0, size, size],
         [0.0, 1.0, 1.0],
         [0.0, first + quarter, first],
@@ -144,32 +151,38 @@ def lissajous(
         for name, value in (("amplitude", amplitude), ("frequency", frequency), ("phase", phase))
     )
     lifted, lift_frequency = _pair(lift, "lift")
-    size = [_finite(lifted, "lift"), *(_finite(one, "amplitude") for one in sizes)]
+    size = [
+        finite_number(lifted, "lift's amplitude"),
+        *(finite_number(one, "amplitude") for one in sizes),
+    ]
+    swings = [_whole(one, "frequency") for one in frequencies]
     if not any(size):
         raise InputError("amplitude and lift are zero: nothing moves")
     curve = HarmonicCurve(
-        [_finite(height, "height"), 0.0, 0.0],
+        [finite_number(height, "height"), 0.0, 0.0],
         size,
-        [_whole(one, "frequency") for one in (lift_frequency, *frequencies)],
-        [0.0, *(_finite(one, "phase") for one in phases)],
+        [_whole(lift_frequency, "lift's frequency"), *swings],
+        [0.0, *(finite_number(one, "phase") for one in phases)],
         2 * math.pi * positive(turns, "turns"),
     )
     return TimedCurve(curve, time_law(curve.length, profile, duration=duration))
 
 
 def _pair(value: Sequence[float], name: str) -> tuple[float, float]:
-    if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str) or len(value) != 2:
+    numbers = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(numbers, Sequence) or isinstance(numbers, str) or len(numbers) != 2:
         raise InputError(f"{name} = {shown(value)}: it must be two numbers")
-    return value[0], value[1]
+    return numbers[0], numbers[1]
+
+
+def _three(value: ArrayLike, name: str) -> Array:
+    array = finite_array(value, 1, name)
+    if array.shape != (3,):
+        raise InputError(f"{name} has shape {array.shape}; it must be (3,): of z, tilt_x, tilt_y")
+    return array
 
 
 def _whole(value: float, name: str) -> int:
     if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
         raise InputError(f"{name} = {shown(value)}: it must be a whole number of 1 or more")
     return int(value)
-
-
-def _finite(value: float, name: str) -> float:
-    if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
-        raise InputError(f"{name} = {shown(value)}: it must be a finite number")
-    return float(value)

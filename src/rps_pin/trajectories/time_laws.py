@@ -14,20 +14,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from numbers import Real
 from typing import Literal
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.curve import LawSample, TimeLaw
 from rps_pin.trajectories.path import checked_times
+from rps_pin.trajectories.piecewise_law import PiecewiseLaw
+from rps_pin.trajectories.poses import is_number
 
 Profile = Literal["quintic", "trapezoidal", "s-curve"]
 
 #: Of the quintic: largest speed, acceleration and jerk of D = T = 1.
 _QUINTIC_PEAKS = (15 / 8, 10 / math.sqrt(3), 60.0)
+
+#: Numbers that a law is made of lie between these: its speed and jerk are then finite, too.
+_SMALLEST, _LARGEST = 1e-50, 1e50
 
 #: Without limits, the share of the duration in which the speed rises, and in which it falls.
 RAMP = 0.25
@@ -88,55 +91,6 @@ class QuinticLaw:
         )
 
 
-class PiecewiseLaw:
-    """A law of pieces of steady jerk (or, without any jerk, of steady acceleration).
-
-    Parameters
-    ----------
-    durations
-        Of the pieces, s; none negative.
-    jerks
-        u''' in each piece.
-    accelerations
-        u'' at the start of each piece; it may jump.
-
-    Attributes
-    ----------
-    knots : array
-        Times at which the pieces begin, and the end, s.
-    distance, duration : float
-        Where u ends, and when (s).
-    """
-
-    def __init__(self, durations: ArrayLike, jerks: ArrayLike, accelerations: ArrayLike) -> None:
-        steps = np.asarray(durations, dtype=np.float64)
-        kept = steps > 0
-        self._steps = steps[kept]
-        self._jerk = np.asarray(jerks, dtype=np.float64)[kept]
-        self._acceleration = np.asarray(accelerations, dtype=np.float64)[kept]
-        self.knots = np.concatenate([[0.0], np.cumsum(self._steps)])
-        self.duration = float(self.knots[-1])
-        h, a, j = self._steps, self._acceleration, self._jerk
-        self._speed = np.concatenate([[0.0], np.cumsum(a * h + j * h**2 / 2)])
-        moved = self._speed[:-1] * h + a * h**2 / 2 + j * h**3 / 6
-        self._u = np.concatenate([[0.0], np.cumsum(moved)])
-        self.distance = float(self._u[-1])
-
-    def __repr__(self) -> str:
-        name = type(self).__name__
-        return f"{name}(distance={self.distance:.6g}, duration={self.duration:.6g})"
-
-    def at(self, t: ArrayLike) -> LawSample:
-        """Return u, u' and u'' at times of shape (...), s; where u'' jumps, the later piece's."""
-        times = checked_times(t, self.duration)
-        i = np.searchsorted(self.knots[1:-1], times, side="right")
-        h, a, j = times - self.knots[i], self._acceleration[i], self._jerk[i]
-        v = self._speed[i]
-        return LawSample(
-            self._u[i] + h * (v + h * (a / 2 + h * j / 6)), v + h * (a + h * j / 2), a + h * j
-        )
-
-
 class TrapezoidalLaw(PiecewiseLaw):
     """Trapezoidal speed: a push, a steady speed, a brake as long as the push.
 
@@ -184,9 +138,10 @@ class TrapezoidalLaw(PiecewiseLaw):
         if not math.isfinite(a):
             raise InputError("trapezoidal speed needs a limit of acceleration")
         D = positive(distance, "distance")
-        up = min(v / a, math.sqrt(D / a))
-        duration = D / (a * up) + up
-        return cls(D, duration, ramp=min(up / duration, 0.5))
+        if v * v >= D * a:  # a triangle: its top is sqrt(D a)
+            return cls(D, 2 * math.sqrt(D / a), ramp=0.5)
+        duration = D / v + v / a
+        return cls(D, duration, ramp=min(v / a / duration, 0.5))
 
 
 class SCurveLaw(PiecewiseLaw):
@@ -235,16 +190,18 @@ class SCurveLaw(PiecewiseLaw):
         if not math.isfinite(j):
             raise InputError("an S-curve needs a limit of jerk")
         D = positive(distance, "distance")
-        rise = min(a / j, math.sqrt(v / j), (D / (2 * j)) ** (1 / 3))
-        steady = 0.0
+        whole = (D / (2 * j)) ** (1 / 3)  # four rises cover the distance
+        rise = min(a / j, math.sqrt(v / j), whole)
+        steady, no_cruise = 0.0, rise == whole
         if rise == a / j:
             # The longest steady push that the speed, and the distance without a cruise, allow.
             by_speed = v / a - rise
             # a (r + s) (2 r + s) = D, a quadratic in s
             by_distance = (-3 * rise + math.sqrt(rise**2 + 4 * D / a)) / 2
             steady = max(0.0, min(by_speed, by_distance))
+            no_cruise = by_distance <= by_speed
         top = j * rise * (rise + steady)
-        cruise = max(0.0, D / top - (2 * rise + steady))
+        cruise = 0.0 if no_cruise else max(0.0, D / top - (2 * rise + steady))
         law = cls.__new__(cls)
         # The jerk is reckoned back from the pieces: the distance is met to rounding.
         covered = rise * (rise + steady) * (2 * rise + steady + cruise)
@@ -282,7 +239,7 @@ def time_law(
         "trapezoidal": (TrapezoidalLaw, TrapezoidalLaw.within),
         "s-curve": (SCurveLaw, SCurveLaw.within),
     }
-    if profile not in made:
+    if not isinstance(profile, str) or profile not in made:
         raise InputError(f"profile = {shown(profile)}; it must be one of {', '.join(made)}")
     for_duration, within = made[profile]
     limited = any(limit != math.inf for limit in (speed, acceleration, jerk))
@@ -295,23 +252,25 @@ def time_law(
 
 
 def positive(value: float, name: str) -> float:
-    """Return a number that is finite and above zero."""
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    if not number or not math.isfinite(value) or value <= 0:
+    """Return a number that is finite and above zero, and within what can be reckoned with."""
+    if not is_number(value) or not 0 < value < math.inf:
         raise InputError(f"{name} = {shown(value)}: it must be a positive number")
+    if not _SMALLEST <= value <= _LARGEST:
+        raise InputError(f"{name} = {shown(value)}: it must be from {_SMALLEST} to {_LARGEST}")
     return float(value)
 
 
 def checked_ramp(ramp: float) -> float:
     """Return a share of the duration above 0 and at most 1/2."""
-    if not 0 < ramp <= 0.5:
-        raise InputError(f"ramp = {ramp}: it must be above 0 and at most 0.5")
-    return float(ramp)
+    if not is_number(ramp) or not 0 < ramp <= 0.5:
+        raise InputError(f"ramp = {shown(ramp)}: it must be above 0 and at most 0.5")
+    return positive(ramp, "ramp")
 
 
 def _limits(speed: float, acceleration: float, jerk: float) -> tuple[float, float, float]:
-    limits = {"speed": speed, "acceleration": acceleration, "jerk": jerk}
-    for name, value in limits.items():
-        if not isinstance(value, Real) or isinstance(value, bool) or not value > 0:
-            raise InputError(f"limit of {name} = {shown(value)}: it must be a positive number")
-    return float(speed), float(acceleration), float(jerk)
+    """Return limits that are positive; infinity is none."""
+    v, a, j = (
+        math.inf if is_number(value) and value == math.inf else positive(value, f"limit of {name}")
+        for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
+    )
+    return v, a, j
