@@ -18,6 +18,7 @@ Law = QuinticLaw | TrapezoidalLaw | SCurveLaw
 LAWS: tuple[type[Law], ...] = (QuinticLaw, TrapezoidalLaw, SCurveLaw)
 
 POSITIVE = st.floats(-3, 3).map(lambda power: 10.0**power)
+DISTANCES = st.floats(-6, 3).map(lambda power: 10.0**power)
 RAMPS = st.floats(0.01, 0.5)
 
 
@@ -25,7 +26,7 @@ RAMPS = st.floats(0.01, 0.5)
 def laws(draw: st.DrawFn) -> Law:
     """Laws of any kind, for a duration."""
     kind = draw(st.sampled_from(LAWS))
-    distance, duration = draw(POSITIVE), draw(POSITIVE)
+    distance, duration = draw(DISTANCES), draw(POSITIVE)
     if kind is QuinticLaw:
         return QuinticLaw(distance, duration)
     return kind(distance, duration, ramp=draw(RAMPS))  # type: ignore[call-arg]

@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import sympy
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin import InputError
-from rps_pin.trajectories import CurveSample, LawSample, PathSample, TimedCurve
+from rps_pin.trajectories import (
+    ChordSpline,
+    Curve,
+    CurveSample,
+    HarmonicCurve,
+    HelixCurve,
+    LawSample,
+    LineCurve,
+    PathSample,
+    QuinticLaw,
+    TimedCurve,
+)
+from tests.trajectories.differences import difference
+from tests.trajectories.law_checks import LAWS, RAMPS, inside
 
 Array = NDArray[np.float64]
 
@@ -57,6 +74,37 @@ def test_sample_is_the_composition_s_own_derivatives(shape: tuple[int, ...]) -> 
     for order, one in enumerate(found):
         assert one.shape == (*shape, 3)
         np.testing.assert_allclose(one, values(composed, T, order, t), rtol=1e-12, atol=1e-12)
+
+
+CURVES: list[Curve] = [
+    LineCurve([0.2, 0.1, 0.0], [0.3, -0.1, 0.2]),
+    ChordSpline([[0.2, 0.1, 0.0], [0.25, 0.3, 0.1], [0.2, 0.0, 0.2], [0.3, 0.1, 0.1]]),
+    HarmonicCurve([0.3, 0, 0.1], [0.02, 0.2, 0.1], [3, 1, 2], [0.5, 0, 1], 4.0),
+    HelixCurve(0.3, 0.05, 0.4),
+]
+
+
+@pytest.mark.parametrize("curve", CURVES, ids=lambda curve: type(curve).__name__)
+@pytest.mark.parametrize("kind", LAWS)
+@given(st.floats(0.1, 10), RAMPS)
+def test_every_curve_can_run_by_every_law(
+    curve: Curve, kind: Any, duration: float, ramp: float
+) -> None:
+    """Rate and acceleration are the derivatives by time where nothing jumps."""
+    shape: dict[str, Any] = {} if kind is QuinticLaw else {"ramp": ramp}
+    law = kind(curve.length, duration, **shape)
+    path = TimedCurve(curve, law)
+    t, step = inside(law)
+    step = step / 64  # the differences' error, of sixth order, is then no more than rounding's
+    if isinstance(curve, ChordSpline):  # its third derivative jumps at its knots
+        u = [law.at(t + 3 * k * step).u for k in (-1, 1)]
+        smooth = np.equal(*(np.searchsorted(curve.knots, one) for one in u))
+        t, step = t[smooth], step[smooth]
+    found, size = path.sample(t), [np.abs(x).max() for x in path.sample(t)]
+    for k in (1, 2):
+        slope = difference(lambda x, k=k: path.sample(x)[k - 1], t, step)
+        rounding = 1e-14 * size[k - 1] / step[:, None]
+        assert (np.abs(found[k] - slope) <= 1e-9 * size[k] + rounding).all()
 
 
 def test_it_keeps_its_curve_and_its_law_and_lasts_as_long_as_the_law() -> None:

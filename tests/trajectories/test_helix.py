@@ -181,6 +181,8 @@ def test_sample_keeps_the_shape_of_the_times() -> None:
         ({"duration": -1.0}, "duration = -1.0"),
         ({"duration": np.nan}, "duration = nan"),
         ({"duration": np.inf}, "duration = inf"),
+        ({"duration": 1e-200}, "duration = 1e-200: it must be from 1e-50"),
+        ({"pitch": True}, "pitch = True: it must be a finite number of metres"),
         ({"branch": "*"}, r"branch = '\*'; it must be '\+' or '-'"),
         ({"branch": None}, "branch = None"),
         ({"radius": "wide"}, "radius"),

@@ -66,7 +66,9 @@ def test_parameters_outside_are_refused(bad: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["tilt", "pitch", "height"])
-@pytest.mark.parametrize("bad", [np.nan, np.inf, "wide", None])
+@pytest.mark.parametrize(
+    "bad", [np.nan, np.inf, "wide", None, True, pytest.param(10**400, id="huge")]
+)
 def test_numbers_that_are_none_are_refused(name: str, bad: Any) -> None:
     arguments: dict[str, Any] = {"tilt": 0.2, "pitch": 0.03, "height": 0.4} | {name: bad}
     with pytest.raises(InputError, match=f"{name} = "):

@@ -31,10 +31,16 @@ def test_other_times_are_refused_with_the_range(bad: float) -> None:
         checked_times([[1.0, bad]], 2.0)
 
 
-@pytest.mark.parametrize("bad", ["soon", [[1, 2], [3]]])
+@pytest.mark.parametrize("bad", ["soon", "1.0", True, 1j, None, [[1, 2], [3]]])
 def test_things_that_are_no_times_are_refused(bad: object) -> None:
-    with pytest.raises(InputError, match="time"):
+    with pytest.raises(InputError, match="times must be numbers, in seconds"):
         checked_times(bad, 2.0)
+
+
+def test_rounding_is_of_the_duration() -> None:
+    """A microsecond's trajectory has no picosecond to spare."""
+    with pytest.raises(InputError, match="outside"):
+        checked_times(1e-6 + 1e-13, 1e-6)
 
 
 def test_parameters_within_the_curve_pass_and_rounding_is_forgiven() -> None:
@@ -49,6 +55,7 @@ def test_other_parameters_are_refused_with_the_range(bad: float) -> None:
         checked_parameters([1.0, bad], 7.0)
 
 
-def test_things_that_are_no_parameters_are_refused() -> None:
+@pytest.mark.parametrize("bad", ["far", "1.0", False, [[1, 2], [3]]])
+def test_things_that_are_no_parameters_are_refused(bad: object) -> None:
     with pytest.raises(InputError, match="parameters of a curve must be numbers"):
-        checked_parameters("far", 7.0)
+        checked_parameters(bad, 7.0)

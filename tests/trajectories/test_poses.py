@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rps_pin import InputError
-from rps_pin.trajectories.poses import checked_pose, checked_poses, finite_array
+from rps_pin.trajectories.poses import checked_pose, checked_poses, finite_array, finite_number
 
 
 def test_a_pose_is_a_read_only_copy() -> None:
@@ -64,3 +64,19 @@ def test_what_is_no_list_of_poses_is_refused(bad: Any, message: str) -> None:
 
 def test_the_largest_number_is_still_taken() -> None:
     np.testing.assert_array_equal(finite_array([1e50, -1e50], 1, "x"), [1e50, -1e50])
+    assert finite_number(-1e50, "x") == -1e50
+
+
+def test_a_finite_number_becomes_a_float() -> None:
+    for given in (3, np.int64(3), np.float32(3)):
+        found = finite_number(given, "x")
+        assert type(found) is float
+        assert found == 3
+
+
+@pytest.mark.parametrize(
+    "bad", [np.nan, -np.inf, 1e51, pytest.param(-(10**400), id="huge"), True, "1", None, [1.0], 1j]
+)
+def test_what_is_no_finite_number_is_refused(bad: Any) -> None:
+    with pytest.raises(InputError, match=r"height = .*: it must be a finite number of metres"):
+        finite_number(bad, "height", "metres")

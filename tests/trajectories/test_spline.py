@@ -105,6 +105,16 @@ def test_through_two_poses_it_is_the_quintic_law() -> None:
 
 
 @given(SEEDS)
+def test_poses_that_are_all_the_same_are_stood_at(seed: int) -> None:
+    times, poses = random_points(seed)
+    path = TimedSpline(times, np.tile(poses[0], (len(times), 1)))
+    found = path.sample(np.linspace(0, path.duration, 50))
+    np.testing.assert_allclose(found.pose, np.tile(poses[0], (50, 1)), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(found.rate, 0, atol=1e-12)
+    np.testing.assert_allclose(found.acceleration, 0, atol=1e-11)
+
+
+@given(SEEDS)
 def test_backwards_through_the_poses_it_is_the_same_backwards(seed: int) -> None:
     times, poses = random_points(seed)
     forth, back = TimedSpline(times, poses), TimedSpline(-times[::-1], poses[::-1])
@@ -195,12 +205,42 @@ def test_derivatives_of_the_curve_are_its_derivatives(seed: int) -> None:
     assert (np.abs(found.second - second) <= 10 * size * tolerance).all()
 
 
-def test_a_straight_row_of_poses_stays_straight() -> None:
-    """The chord's length is then that of the curve: x_u has length one, x_uu vanishes."""
-    poses = np.outer([0.0, 0.1, 0.15, 0.4], [1.0, 0, 0])
-    found = ChordSpline(poses).at(np.linspace(0, 0.4, 30))
-    np.testing.assert_allclose(found.first, np.tile([1.0, 0, 0], (30, 1)), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(found.second, 0, atol=1e-12)
+@given(SEEDS, st.integers(2, 6), st.floats(0.01, 1.0))
+def test_a_straight_row_of_poses_stays_straight(seed: int, count: int, scale: float) -> None:
+    """The chords make up the whole length: the curve is the line, u over the length of it."""
+    rng = np.random.default_rng(seed)
+    start, way = rng.uniform(-0.3, 0.3, (2, 3))
+    fraction = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, count - 1))])
+    curve = ChordSpline(start + fraction[:, None] * way, tilt_scale=scale)
+    u = np.linspace(0, curve.length, 30)
+    slope = way * fraction[-1] / curve.length
+    found = curve.at(u)
+    size = np.abs(slope).max()
+    np.testing.assert_allclose(found.pose, start + u[:, None] * slope, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(found.first, np.tile(slope, (30, 1)), rtol=0, atol=1e-12 * size)
+    np.testing.assert_allclose(found.second, 0, atol=1e-10 * size / curve.length)
+
+
+@given(SEEDS, st.floats(1e-3, 1e3))
+def test_tilt_scale_only_weighs_tilts_against_heights(seed: int, factor: float) -> None:
+    """Heights alone do not feel it; of tilts alone it is the unit of u. The motion stays."""
+    _, poses = random_points(seed)
+    t = np.linspace(0, 2.0, 20)
+    for moving in ([1, 0, 0], [0, 1, 1]):
+        one, other = (
+            spline(poses * moving, duration=2.0, tilt_scale=scale) for scale in (0.1, 0.1 * factor)
+        )
+        lengths = [path.curve.length for path in (one, other)]  # type: ignore[attr-defined]
+        longer = 1.0 if moving[0] else factor
+        assert lengths[1] == pytest.approx(longer * lengths[0], rel=1e-13)
+        for a, b in zip(one.sample(t), other.sample(t), strict=True):
+            np.testing.assert_allclose(a, b, rtol=0, atol=1e-11 * np.abs(a).max())
+
+
+def test_tilt_scale_bends_a_curve_of_both() -> None:
+    one, other = (ChordSpline(POSES, tilt_scale=scale) for scale in (0.1, 1.0))
+    middles = [curve.at(curve.knots[:-1] + np.diff(curve.knots) / 2).pose for curve in (one, other)]
+    assert np.abs(middles[0] - middles[1]).max() > 1e-3
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample
 from rps_pin.trajectories.path import Array, PathSample, checked_parameters, checked_times
 from rps_pin.trajectories.poses import finite_number
+from rps_pin.trajectories.time_laws import positive
 
 #: Eq. 29: t_a and t_t of Table 1, the latter unrounded (5.2388 s).
 PAPER_RAMP = 0.5
@@ -211,5 +212,6 @@ def _check(
         )
     if not duration > 0:
         raise InputError(f"duration = {duration}: it must be a positive number of seconds")
+    positive(duration, "duration")
     if branch not in ("+", "-"):
         raise InputError(f"branch = {branch!r}; it must be '+' or '-'")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from numbers import Real
 
 import numpy as np
@@ -14,9 +15,14 @@ from rps_pin.trajectories.path import Array
 _LARGEST = 1e50
 
 
-def is_number(value: object) -> bool:
-    """Return whether a value is a single real number; True and False are none."""
-    return isinstance(value, Real) and not isinstance(value, bool)
+def real(value: object) -> float:
+    """Return a single real number as a float; NaN for all else, such as True."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:  # a whole number of hundreds of digits
+        return math.nan
 
 
 def finite_number(value: float, name: str, unit: str = "") -> float:
@@ -27,10 +33,11 @@ def finite_number(value: float, name: str, unit: str = "") -> float:
     InputError
         If it is none.
     """
-    if not is_number(value) or not abs(value) <= _LARGEST:
+    number = real(value)
+    if not abs(number) <= _LARGEST:
         wanted = f"a finite number{unit and f' of {unit}'}"
         raise InputError(f"{name} = {shown(value)}: it must be {wanted}, at most {_LARGEST}")
-    return float(value)
+    return number
 
 
 def finite_array(value: ArrayLike, ndim: int, name: str) -> Array:

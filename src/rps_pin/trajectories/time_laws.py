@@ -22,7 +22,7 @@ from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.curve import LawSample, TimeLaw
 from rps_pin.trajectories.path import checked_times
 from rps_pin.trajectories.piecewise_law import PiecewiseLaw
-from rps_pin.trajectories.poses import is_number
+from rps_pin.trajectories.poses import real
 
 Profile = Literal["quintic", "trapezoidal", "s-curve"]
 
@@ -253,16 +253,17 @@ def time_law(
 
 def positive(value: float, name: str) -> float:
     """Return a number that is finite and above zero, and within what can be reckoned with."""
-    if not is_number(value) or not 0 < value < math.inf:
+    number = real(value)
+    if not 0 < number < math.inf:
         raise InputError(f"{name} = {shown(value)}: it must be a positive number")
-    if not _SMALLEST <= value <= _LARGEST:
+    if not _SMALLEST <= number <= _LARGEST:
         raise InputError(f"{name} = {shown(value)}: it must be from {_SMALLEST} to {_LARGEST}")
-    return float(value)
+    return number
 
 
 def checked_ramp(ramp: float) -> float:
     """Return a share of the duration above 0 and at most 1/2."""
-    if not is_number(ramp) or not 0 < ramp <= 0.5:
+    if not 0 < real(ramp) <= 0.5:
         raise InputError(f"ramp = {shown(ramp)}: it must be above 0 and at most 0.5")
     return positive(ramp, "ramp")
 
@@ -270,7 +271,7 @@ def checked_ramp(ramp: float) -> float:
 def _limits(speed: float, acceleration: float, jerk: float) -> tuple[float, float, float]:
     """Return limits that are positive; infinity is none."""
     v, a, j = (
-        math.inf if is_number(value) and value == math.inf else positive(value, f"limit of {name}")
+        math.inf if real(value) == math.inf else positive(value, f"limit of {name}")
         for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
     )
     return v, a, j
