@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
 from collections import defaultdict
 from pathlib import Path
+
+from marked import replaced
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "benchmarks.md"
@@ -77,15 +78,6 @@ def chains_table(times: Times) -> str:
         cells = [f"{times[f'{count} four-bars, {kind}'][role]:.3g}" for kind, role in heads]
         lines.append(f"| {count} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
-
-
-def replaced(text: str, name: str, table: str) -> str:
-    """Return the page with a table between the markers of a name."""
-    start, end = f"<!-- made by docs/benchmarks_table.py: {name} -->", "<!-- end -->"
-    pattern = re.escape(start) + r".*?" + re.escape(end)
-    found, count = re.subn(pattern, lambda _: f"{start}\n\n{table}\n\n{end}", text, flags=re.DOTALL)
-    assert count == 1, name
-    return found
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rps_pin.rps.trajectory_file import load_trajectory
+from marked import block, replaced
 
 from rps_pin import RPSRobot, helix
 from rps_pin.dynamics_plots import plot_force_causes
@@ -27,6 +27,7 @@ from rps_pin.plots import STYLE
 from rps_pin.rps import Payload, force_causes, time_optimal
 from rps_pin.rps.motion_run import MotionRun, run_motion
 from rps_pin.rps.three_ways import force_differences
+from rps_pin.rps.trajectory_file import load_trajectory
 from rps_pin.trajectories import Trajectory, circle
 
 ROOT = Path(__file__).parent.parent
@@ -171,20 +172,6 @@ def rps_pin(arguments: list[str], folder: str) -> subprocess.CompletedProcess[st
 def wrapped(line: str, width: int = 96) -> list[str]:
     """Return a long line as several."""
     return re.findall(rf".{{1,{width}}}(?:\s+|$)", line.strip())
-
-
-def block(lines: list[str]) -> str:
-    """Return lines as preformatted text."""
-    return "\n".join(f"    {line}".rstrip() for line in lines)
-
-
-def replaced(text: str, name: str, table: str) -> str:
-    """Return the page with new text between the markers of a name."""
-    start, end = f"<!-- made by docs/dynamics_tables.py: {name} -->", "<!-- end -->"
-    pattern = re.escape(start) + r".*?" + re.escape(end)
-    found, count = re.subn(pattern, lambda _: f"{start}\n\n{table}\n\n{end}", text, flags=re.DOTALL)
-    assert count == 1, name
-    return found
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 from lxml import etree
+from marked import replaced
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, JointEffects, RPSParameters, RPSRobot
@@ -65,10 +66,10 @@ def main() -> None:
         "|---|---|---|---|---|",
         *(row(result, unit) for result in [*ours, *theirs]),
     ]
-    text = replaced(text, "comparison", lines)
+    text = replaced(text, "comparison", "\n".join(lines))
     lines = ["| springs (N/m) | rk4, 1 ms | rk4, 0.25 ms | adaptive |", "|---|---|---|---|"]
     lines += [stiffer(robot, stiffness) for stiffness in (80, 400, 2000)]
-    PAGE.write_text(replaced(text, "stiffness", lines), "utf-8")
+    PAGE.write_text(replaced(text, "stiffness", "\n".join(lines)), "utf-8")
 
 
 # The robot ----------------------------------------------------------------------------------------
@@ -228,16 +229,6 @@ def row(result: Result, unit: float) -> str:
         f"| {result.name} | {result.step * 1e3:g} | {result.gap:.0e} | {result.drift:.0e} | "
         f"{result.seconds / unit:.2g} |"
     )
-
-
-def replaced(text: str, name: str, lines: list[str]) -> str:
-    """Return the page with lines between the markers of a name."""
-    start, end = f"<!-- made by docs/simulation_table.py: {name} -->\n", "<!-- end -->"
-    before, found, rest = text.partition(start)
-    _, closed, after = rest.partition(end)
-    if not (found and closed):
-        raise ValueError(f"{PAGE} has no place for {name!r}")
-    return f"{before}{start}\n" + "\n".join(lines) + f"\n\n{end}{after}"
 
 
 if __name__ == "__main__":

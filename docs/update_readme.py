@@ -15,6 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from marked import block, replaced
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).parent.parent
@@ -29,7 +30,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", "from rps_pin.cli import main; main()", "helix"]
         shown = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
-        text = replaced(text, "rps-pin helix", shown.stdout.split("Written:")[0])
+        text = replaced(text, "rps-pin helix", quoted(shown.stdout.split("Written:")[0]))
         shutil.copy(Path(folder) / "helix" / "figure_9_forces.png", IMAGES / "forces.png")
         photograph(Path(folder) / "helix" / "viewer.html", IMAGES / "robot.png")
     block = re.search(r"```python\n(.*?)```", text, re.DOTALL)
@@ -37,16 +38,12 @@ def main() -> None:
     printed = subprocess.run(
         [sys.executable, "-c", block.group(1)], capture_output=True, text=True, check=True
     )
-    README.write_text(replaced(text, "python", printed.stdout), "utf-8")
+    README.write_text(replaced(text, "python", quoted(printed.stdout)), "utf-8")
 
 
-def replaced(text: str, name: str, output: str) -> str:
-    """Return the README with the output between the markers of a name."""
-    start, end = f"<!-- made by docs/update_readme.py: {name} -->\n", "<!-- end -->"
-    before, _, rest = text.partition(start)
-    _, _, after = rest.partition(end)
-    lines = "".join(f"    {line}".rstrip() + "\n" for line in output.strip("\n").splitlines())
-    return f"{before}{start}\n{lines}\n{end}{after}"
+def quoted(output: str) -> str:
+    """Return what was printed as preformatted text."""
+    return block(output.strip("\n").splitlines())
 
 
 def photograph(page: Path, picture: Path) -> None:
