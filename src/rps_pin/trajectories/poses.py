@@ -81,3 +81,17 @@ def checked_poses(value: ArrayLike, name: str) -> Array:
             "(z, tilt_x, tilt_y) each"
         )
     return poses
+
+
+def times_from_zero(value: ArrayLike, count: int) -> Array:
+    """Return increasing times of so many poses, shifted to begin at 0, shape (count,), s."""
+    given = finite_array(value, 1, "times")
+    if given.shape != (count,):
+        raise InputError(f"{len(given)} times for {count} poses: one each is needed")
+    times: Array = given - given[0]
+    rising = np.diff(times) > 0
+    if not rising.all():
+        i = int(np.argmin(rising))
+        raise InputError(f"times must increase: {given[i]:.9g} s, then {given[i + 1]:.9g} s")
+    times.setflags(write=False)
+    return times

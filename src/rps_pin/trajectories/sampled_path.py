@@ -21,7 +21,7 @@ from scipy.interpolate import BPoly, BSpline, make_interp_spline
 
 from rps_pin.errors import InputError
 from rps_pin.trajectories.path import Array, PathSample, checked_times
-from rps_pin.trajectories.poses import checked_poses, finite_array
+from rps_pin.trajectories.poses import checked_poses, finite_array, times_from_zero
 from rps_pin.trajectories.resampled import ResampledCurve
 
 #: Samples that a quintic spline needs.
@@ -65,15 +65,7 @@ class SampledPath:
         accelerations: ArrayLike | None = None,
     ) -> None:
         self.poses = checked_poses(poses, "poses")
-        given = finite_array(times, 1, "times")
-        if given.shape != (len(self.poses),):
-            raise InputError(f"{len(given)} times for {len(self.poses)} poses: one each is needed")
-        self.times = given - given[0]
-        self.times.setflags(write=False)
-        rising = np.diff(self.times) > 0
-        if not rising.all():
-            i = int(np.argmin(rising))
-            raise InputError(f"times must increase: {given[i]:.9g} s, then {given[i + 1]:.9g} s")
+        self.times = times_from_zero(times, len(self.poses))
         if (rates is None) != (accelerations is None):
             raise InputError("rates and accelerations are given together, or neither is")
         self.rates = self.accelerations = None

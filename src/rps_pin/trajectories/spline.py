@@ -27,7 +27,7 @@ from rps_pin.trajectories.path import (
     checked_parameters,
     checked_times,
 )
-from rps_pin.trajectories.poses import checked_poses, finite_array
+from rps_pin.trajectories.poses import checked_poses, times_from_zero
 from rps_pin.trajectories.resampled import ResampledCurve
 from rps_pin.trajectories.time_laws import Profile, positive, time_law
 
@@ -110,15 +110,7 @@ class TimedSpline:
 
     def __init__(self, times: ArrayLike, poses: ArrayLike) -> None:
         self.poses = checked_poses(poses, "poses")
-        given = finite_array(times, 1, "times")
-        if given.shape != (len(self.poses),):
-            raise InputError(f"{len(given)} times for {len(self.poses)} poses: one each is needed")
-        self.times = given - given[0]
-        self.times.setflags(write=False)
-        rising = np.diff(self.times) > 0
-        if not rising.all():
-            i = int(np.argmin(rising))
-            raise InputError(f"times must increase: {given[i]:.9g} s, then {given[i + 1]:.9g} s")
+        self.times = times_from_zero(times, len(self.poses))
         spline = _at_rest(self.times, self.poses)
         self._derivatives = [spline, spline.derivative(1), spline.derivative(2)]
 
