@@ -4,12 +4,16 @@ rods, and constraint models; and Newton and Euler's, which share no code with an
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from rps_pin import RPSRobot, helix
 from rps_pin.rps.lagrange import lagrange_forces
+from rps_pin.rps.time_optimal import time_optimal
+from rps_pin.rps.trajectory_file import load_trajectory
 from rps_pin.rps.virtual_work import virtual_work_forces
 from tests.reference import newton_euler as ne
 from tests.strategies import Motion, random_motions, random_parameters
@@ -19,6 +23,9 @@ Array = NDArray[np.float64]
 #: Of the largest force of the state.
 AGREEMENT = 1e-9
 WELL_CONDITIONED = 1e4
+
+#: Beside the helices, what docs/dynamics.md shows.
+SHOWN = sorted((Path(__file__).parents[2] / "docs" / "trajectories").glob("*.yaml"))
 
 #: Helices of the presets: radius, pitch and height, m.
 HELICES = {
@@ -91,6 +98,20 @@ def test_three_ways_agree_along_helices(name: str, branch: str) -> None:
     worst, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)))
     print({key: f"{value:.1e}" for key, value in worst.items()}, f"skipped: {skipped}")
     assert skipped <= 5
+    assert {key: value for key, value in worst.items() if not value < AGREEMENT} == {}
+
+
+@pytest.mark.parametrize("fastest", [False, True], ids=["as it is", "fastest"])
+@pytest.mark.parametrize("file", SHOWN, ids=lambda file: file.stem)
+def test_three_ways_agree_along_every_trajectory_the_documentation_shows(
+    file: Path, fastest: bool
+) -> None:
+    robot = RPSRobot.from_preset("micro")
+    path = load_trajectory(file, robot)
+    if fastest:
+        path = time_optimal(robot, path)
+    worst, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)))
+    assert skipped == 0
     assert {key: value for key, value in worst.items() if not value < AGREEMENT} == {}
 
 

@@ -54,17 +54,34 @@ class Peaks(NamedTuple):
     jerk: float
 
 
+def measurable(law: Law) -> list[tuple[float, float]]:
+    """Its pieces but those of rounding, where two cases of a law meet."""
+    return [(begin, end) for begin, end in pieces(law) if end - begin > 1e-9 * law.duration]
+
+
+def largest(polynomial: Polynomial) -> float:
+    """Largest absolute value over [0, 1]: at an end, or where the slope vanishes."""
+    level = np.real(polynomial.deriv().roots()).clip(0, 1)
+    return float(np.abs(polynomial(np.array([0.0, 1.0, *level]))).max())
+
+
 def peaks(law: Law) -> Peaks:
-    """Of the polynomials through values of the speed within each piece: the law's own u' alone."""
+    """Found from values of u' and of u'' within each piece: of the polynomials through them."""
     found = []
-    for begin, end in pieces(law):
-        if end - begin < 1e-9 * law.duration:
-            continue  # where two cases meet: too short to measure, and no more than its neighbours
+    for begin, end in measurable(law):
         s = 0.5 - np.cos(np.pi * (np.arange(5) + 0.5) / 5) / 2
-        speed = Polynomial.fit(s, law.at(begin + (end - begin) * s).rate, 4, domain=[0, 1])
-        dense = np.linspace(0, 1, 1001)
-        found.append([np.abs(speed.deriv(k)(dense)).max() / (end - begin) ** k for k in range(3)])
+        values = law.at(begin + (end - begin) * s)
+        speed = Polynomial.fit(s, values.rate, 4, domain=[0, 1])
+        push = Polynomial.fit(s, values.acceleration, 3, domain=[0, 1])
+        jerk = push.deriv() / (end - begin)
+        found.append([largest(x) for x in (speed, push, jerk)])
     return Peaks(*np.max(found, axis=0).tolist())
+
+
+def uncertainty(law: Law) -> float:
+    """Share by which peaks may be off: times are rounded, which tells in the shortest piece."""
+    shortest = min(end - begin for begin, end in measurable(law))
+    return 1e-12 + 1e-14 * law.duration / shortest
 
 
 def ratio(value: float, limit: float) -> float:

@@ -30,6 +30,7 @@ from tests.trajectories.law_checks import (
     laws,
     peaks,
     ratio,
+    uncertainty,
 )
 
 LIMITS = st.one_of(POSITIVE, st.just(math.inf))
@@ -162,7 +163,7 @@ def test_limits_are_kept_and_one_is_reached(
     top = peaks(law)
     used = [ratio(*pair) for pair in zip(top, (speed, acceleration, jerk), strict=True)]
     assert law.distance == pytest.approx(distance, rel=1e-13)
-    assert 1 - 2e-6 <= max(used) <= 1 + 1e-10  # a grid finds no more than the peak
+    assert max(used) == pytest.approx(1.0, rel=uncertainty(law))
 
 
 def shortest(D: float, v: float, a: float, j: float) -> float:
