@@ -16,6 +16,7 @@ from rps_pin.rps.loads import Payload
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.path_check import check_path
 from rps_pin.rps.path_events import LimitEvent, PathCheck, SingularityEvent
+from rps_pin.rps.path_refusal import require_clear
 from rps_pin.rps.placement import constraint_residuals, pose_from_placement
 from rps_pin.rps.pose import PlatformMotion
 from rps_pin.rps.rates import (
@@ -31,6 +32,7 @@ from rps_pin.rps.singularity import SingularityMeasures, singular_surface, singu
 from rps_pin.rps.sizing import size_motion, size_trajectory
 from rps_pin.rps.sizing_sheet import ActuatorLimits, SizingSheet
 from rps_pin.rps.three_quantities import poses_from
+from rps_pin.rps.time_optimal import time_optimal
 from rps_pin.rps.urdf import build_urdf
 from rps_pin.rps.virtual_work import virtual_work_forces
 
@@ -71,9 +73,11 @@ __all__ = [
     "pose_rate",
     "poses_from",
     "position_from_pose",
+    "require_clear",
     "singular_surface",
     "singularity_measures",
     "size_motion",
     "size_trajectory",
+    "time_optimal",
     "virtual_work_forces",
 ]
