@@ -154,11 +154,11 @@ def test_climbing_is_as_fast_as_integrated(force: float, speed: float, friction:
     assert_shortest(found.duration, expected)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [1, 29])  # without friction, and with
 def test_more_pieces_change_little(seed: int) -> None:
     """A thousandth is promised."""
     case = Case(seed)
-    times = [case.motion(intervals=n).duration for n in (25, 100, 300)]
+    times = [case.motion(intervals=n).duration for n in (20, 60, 180)]
     assert abs(times[0] / times[2] - 1) < 1e-3
     assert abs(times[1] / times[2] - 1) < 1e-4
 
@@ -191,7 +191,7 @@ class Case:
         self.wrench = np.append(3 * rng.normal(size=3), 0.2 * rng.normal(size=3)) * loaded
 
     def motion(self, **options: Any) -> LimitedMotion:
-        options = {"limits": self.limits, "wrench": self.wrench, "intervals": 40} | options
+        options = {"limits": self.limits, "wrench": self.wrench, "intervals": 24} | options
         return time_optimal(self.robot, self.curve, **options)
 
 
@@ -248,7 +248,7 @@ def test_rates_and_accelerations_are_derivatives(seed: int) -> None:
 # What must follow from what -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_weightless_k_squared_of_the_force_takes_one_kth_of_the_time(seed: int) -> None:
     robot = RPSRobot(MICRO.parameters.replace(gravity=[0.0, 0.0, 0.0]))
     curve = Case(seed).curve
@@ -258,7 +258,7 @@ def test_weightless_k_squared_of_the_force_takes_one_kth_of_the_time(seed: int) 
     assert once / four == pytest.approx(4.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [1, 29])  # without friction, and with
 def test_looser_limits_are_never_slower(seed: int) -> None:
     case = Case(seed)
     force, speed = case.limits.force, min(case.limits.speed, 0.5)

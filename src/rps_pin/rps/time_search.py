@@ -24,7 +24,8 @@ from rps_pin.rps.limited_motion import ACTIVE, LimitedMotion
 from rps_pin.rps.speed_profile import SpeedProfile
 from rps_pin.trajectories.path import Array
 
-#: To what part of a limit it is kept.
+#: To what part of a limit it is kept. Half of that is aimed below it, so that a motion is within its
+#: limits wherever it is looked at.
 KEPT = 1e-6
 #: At most this share of the time may no limit be reached to `ACTIVE` before pieces are divided:
 #: first, and once limits have been tightened.
@@ -34,7 +35,7 @@ IDLE, IDLE_TIGHTENED = 2e-3, 8e-3
 # where a rate that starts from rest grows like a root. Within the piece, for a curve may jump in
 # its second derivative where two pieces meet.
 _INSIDE = 1e-9
-_ASKED = np.linspace(_INSIDE, 1 - _INSIDE, 5)
+_ASKED = np.linspace(_INSIDE, 1 - _INSIDE, 4)
 _LOOKED = ((1 - np.cos(np.linspace(0.0, np.pi, 33))) / 2).clip(_INSIDE, 1 - _INSIDE)
 _CHECKED_TIMES = 20_001
 MOST_ROUNDS = 60
@@ -80,7 +81,7 @@ class TimeSearch:
         self._settle(found, u, friction, slope)
         beyond, idle = self._look(found)
         settled = self.mismatch <= _SETTLED
-        if settled and (beyond <= KEPT / 2).all():
+        if settled and (beyond <= 0).all():
             np.maximum(beyond, self._look_at_times(found), out=beyond)
         self.excess, self.idle = float(beyond.max()), float(idle.sum())
         lazy = (idle > 0) & (np.diff(self.knots) > self.narrowest)
@@ -90,7 +91,7 @@ class TimeSearch:
             return False
         if settled:
             self.tightened += np.where(beyond > 0, 1.1 * beyond + _SPARE, 0.0)
-        return settled and self.excess <= KEPT / 2
+        return settled and self.excess <= 0
 
     def motion(self) -> LimitedMotion:
         """Return what was found last."""
@@ -120,7 +121,7 @@ class TimeSearch:
         about = 0.0 if self.linear_about is None else self.linear_about[..., None]
         square = swing + slope
         constant = weight + friction - slope * about
-        kept = 1 - self.tightened[:, None, :]  # of each limit
+        kept = 1 - KEPT / 2 - self.tightened[:, None, :]  # of each limit
         p = np.concatenate([mass, -mass, np.zeros_like(mass)], axis=-1) / force
         q = np.concatenate([square / force, -square / force, (lengths / speed) ** 2], axis=-1)
         still = np.concatenate([constant, -constant], axis=-1) / force
