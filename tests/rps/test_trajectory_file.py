@@ -15,9 +15,11 @@ from numpy.testing import assert_array_equal
 from rps_pin import InputError, RPSPinError, RPSRobot, helix
 from rps_pin.rps.sizing_sheet import ActuatorLimits
 from rps_pin.rps.trajectory_file import load_trajectory
+from rps_pin.rps.trajectory_schema import KINDS
 from rps_pin.trajectories import circle, lissajous, point_to_point, spline
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.path import Trajectory
+from rps_pin.yaml_files import read_yaml
 
 ROBOT = RPSRobot.from_preset("micro")
 STEP = "kind: point_to_point\nstart: [0.215, 0, 0]\nend: [0.225, 0.12, 0]\n"
@@ -28,7 +30,7 @@ SWINGS = "kind: lissajous\nheight: 0.2\nduration: 2\nfrequency: [3, 2]\n"
 HELIX = "kind: helix\nradius: 2e-4\npitch: 5e-3\nheight: 0.22\n"
 
 #: What a file says, and the same trajectory from its function.
-KINDS: list[tuple[str, Trajectory]] = [
+DESCRIBED: list[tuple[str, Trajectory]] = [
     (HELIX, helix(ROBOT, radius=2e-4, pitch=5e-3, height=0.22)),
     (
         HELIX + "branch: '-'\nduration: 3\n",
@@ -87,7 +89,7 @@ def table(path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("text", "expected"), KINDS)
+@pytest.mark.parametrize(("text", "expected"), DESCRIBED)
 def test_a_file_describes_what_its_function_returns(
     tmp_path: Path, text: str, expected: Trajectory
 ) -> None:
@@ -108,11 +110,20 @@ def test_a_csv_is_read_as_such_or_through_a_yaml(tmp_path: Path) -> None:
         load_trajectory(write(tmp_path / "path.yaml", text), ROBOT)
 
 
-def test_the_files_in_the_documents_are_trajectories() -> None:
-    files = sorted((Path(__file__).parents[2] / "docs" / "trajectories").glob("*.yaml"))
-    assert len(files) >= 5
-    for file in files:
-        assert load_trajectory(file, ROBOT).duration > 0
+DOCUMENTED = sorted((Path(__file__).parents[2] / "docs" / "trajectories").glob("*.yaml"))
+
+
+def test_every_kind_of_motion_is_documented() -> None:
+    kinds = {read_yaml(file, "trajectory file").values["kind"] for file in DOCUMENTED}
+    assert kinds == {*KINDS} - {"csv"}
+
+
+@pytest.mark.parametrize("file", DOCUMENTED, ids=lambda file: file.stem)
+def test_the_files_in_the_documents_move_from_rest_to_rest(file: Path) -> None:
+    path = load_trajectory(file, ROBOT)
+    fastest = np.abs(path.sample(np.linspace(0, path.duration, 1001)).rate).max()
+    assert fastest > 1e-3
+    assert np.abs(path.sample([0.0, path.duration]).rate).max() < 1e-12 * fastest
 
 
 @pytest.mark.parametrize(
@@ -123,6 +134,8 @@ def test_the_files_in_the_documents_are_trajectories() -> None:
         ("kind: [circle]\n", r", line 1: kind = \['circle'\]: it must be one of"),
         ("kind: circle\nheight: 1\nduration: 1\n", ", line 1: kind circle needs tilt"),
         (CIRCLE + "speed: 3\n", ", line 5: unknown key 'speed'; those of kind circle are .*tilt"),
+        ("kind: circle\nhight: 1\nduration: 1\n", ", line 2: unknown key 'hight'; .*height, tilt"),
+        (CIRCLE.replace("0.1", "'5.0e-3'"), ", line 3: tilt = '5.0e-3': input should be a valid n"),
         (CIRCLE.replace("0.1", "steep"), ", line 3: tilt = 'steep': input should be a valid num"),
         (CIRCLE.replace("0.1", ".nan"), ", line 3: tilt = nan: input should be a finite number"),
         (CIRCLE.replace("0.1", "yes"), ", line 3: tilt = 'yes': "),
@@ -153,11 +166,16 @@ def test_the_files_in_the_documents_are_trajectories() -> None:
             "kind: spline\nposes: [[1, 0, 0], [2, 0, 0]]\ntimes: [1, 0]\n",
             ", line 3: times must increase: 1 s, then 0 s",
         ),
+        (THROUGH + "times: [0, 1, 2]\nprofile: quintic\n", ", line 7: profile = .*with a duration"),
+        (THROUGH + "tilt_scale: 2\ntimes: [0, 1, 2]\n", ", line 6: tilt_scale = 2.*with a durat"),
         ("kind: helix\nradius: 9\npitch: 0\nheight: 1\n", ", line 2: radius = 9.0 m: .*reaches"),
         ("kind: helix\nradius: 0\npitch: 0\nheight: 1\nbranch: up\n", ", line 5: branch = 'up'"),
         (SWINGS + "amplitude: [0, 0]\n", ", line 5: amplitude and lift are zero: nothing moves"),
         (SWINGS + "amplitude: [1]\n", r", line 5: amplitude = \[1\]: .*at least 2"),
         (SWINGS + "amplitude: [1, 1]\nlift: [1, 1.5]\n", r", line 6: lift\[1\] = 1.5: .*integer"),
+        (SWINGS + "amplitude: [1, 1]\nlift: [1]\n", r", line 6: lift = \[1\]: .*how often"),
+        (SWINGS + "amplitude: [1, 1]\nlift: [1, 2, 3]\n", r", line 6: lift = .*how often"),
+        (SWINGS + "amplitude: [1, 1]\nlift: !!set {0.1, 1}\n", ", line 6: lift = .*how often"),
         (
             SWINGS.replace("3, 2]", "0, 2]") + "amplitude: [1, 1]\n",
             ", line 4: frequency = 0: .*whole",
@@ -243,7 +261,7 @@ def strange(text: str, rng: np.random.Generator) -> bytes:
 @pytest.mark.parametrize(("change", "fewest"), [(damaged, 20), (strange, 60)])
 def test_a_changed_file_is_finite_or_refused(tmp_path: Path, change: Any, fewest: int) -> None:
     table(tmp_path / "samples.csv")
-    texts = [*(text for text, _ in KINDS), "kind: csv\nfile: samples.csv\nmax_step: 1\n"]
+    texts = [*(text for text, _ in DESCRIBED), "kind: csv\nfile: samples.csv\nmax_step: 1\n"]
     outcomes = {True: 0, False: 0}
     for seed in range(400):
         text = change(texts[seed % len(texts)], np.random.default_rng(seed))

@@ -37,17 +37,21 @@ from rps_pin.rps.leg_equations import (
 )
 from rps_pin.rps.legs import leg_angles_and_lengths, tips
 from rps_pin.rps.pose import checked_pose, position, rotation
+from rps_pin.rps.scalar_tracking import (
+    TRUST,
+    Lengths,
+    condition_of,
+    direction_of_legs,
+    follow,
+    pose_of,
+)
 
 #: Largest condition number of Eq. 8's Jacobian through which a pose is followed.
 CONDITION_LIMIT = 1e6
-#: Largest beta L eta of a step: half of what the theorem asks for.
-_TRUST = 0.25
 #: Steps tried before the way counts as ending in a singularity: towards one that ends it, each
 #: covers about a tenth of what is left.
 _MOST_STEPS = 1000
 _MOST_NEWTON = 12
-#: Half a Newton step, rad, after which another would only move rounding errors.
-_LAST_STEP = 1e-8
 #: Tip distances are right to this part of g + h.
 _TOLERANCE = 2.5e-13
 _SQRT3 = math.sqrt(3.0)
@@ -195,21 +199,17 @@ class EncoderTracker:
         tip = tips(position(pose, self._h), rotation(pose), self._h)
         length, angle = leg_angles_and_lengths(tip, self._g)
         (d1, d2, d3), (phi1, phi2, phi3) = length.tolist(), angle.tolist()
-        d = d1, d2, d3
-        way = (
-            *(math.cos(phi1), math.cos(phi2), math.cos(phi3)),
-            *(math.sin(phi1), math.sin(phi2), math.sin(phi3)),
-        )
-        step = _step(d, way, self._g, self._h)
-        if step.condition > self._limit:
+        d, way = (d1, d2, d3), direction_of_legs((phi1, phi2, phi3))
+        condition = condition_of(d, way, self._g, self._h)
+        if condition > self._limit:
             raise SingularityError(
-                f"the pose to start from is singular: condition {step.condition:.3g}, "
+                f"the pose to start from is singular: condition {condition:.3g}, "
                 f"limit {self._limit:.3g}",
-                step.condition,
+                condition,
                 self._limit,
             )
         self._length, self._way = d, way
-        self.condition = step.condition
+        self.condition = condition
         self._pose[:] = pose
 
     def update(self, length: ArrayLike, out: Array | None = None) -> Array:
@@ -231,20 +231,11 @@ class EncoderTracker:
             If the way to the reading meets a singularity, or is too long for `most_steps`.
         """
         goal = _reading(length)
-        begin, way, condition = self._length, self._way, self.condition
-        done, share = 0.0, 1.0
-        for _ in range(self._most):
-            to = min(1.0, done + share)
-            d = goal if to == 1.0 else _between(begin, goal, to)
-            solved = _solved(d, way, self._g, self._h, self._limit)
-            if isinstance(solved, _Solved):
-                done, way, condition = to, solved.way, solved.condition
-                if done == 1.0:
-                    break
-                share *= solved.growth
-            else:
-                share *= solved
-        else:
+        way, condition, done = follow(
+            self._length, self._way, goal, self._g, self._h, self._limit, self._most
+        )
+        if done < 1.0:
+            condition = condition if done > 0.0 else self.condition
             raise SingularityError(
                 f"leg lengths ({goal[0]:.6g}, {goal[1]:.6g}, {goal[2]:.6g}) m cannot be followed "
                 f"in {self._most} steps: {done:.4%} of the way was gone, where the condition is "
@@ -253,7 +244,7 @@ class EncoderTracker:
                 self._limit,
             )
         pose = self._pose
-        pose[0], pose[1], pose[2] = _scalar_pose(goal, way, self._g, self._h)
+        pose[0], pose[1], pose[2] = pose_of(goal, way, self._g, self._h)
         self._length, self._way, self.condition = goal, way, condition
         if out is None:
             return pose
@@ -293,12 +284,12 @@ def _followed(
         right = (error <= _TOLERANCE * (g + h)) & (shift <= 2 * moved[good] + 1e-12)
         right &= (there <= limit) & (same == sign[going[good]])
         accepted = good[right]
-        share[going] *= np.clip(0.8 * _TRUST / np.maximum(kantorovich, 1e-300), 0.02, 0.5)
+        share[going] *= np.clip(0.8 * TRUST / np.maximum(kantorovich, 1e-300), 0.02, 0.5)
         at = going[accepted]
         cosine[:, at], sine[:, at] = w[:, right], z[:, right]
         gained = to[accepted] - done[at]
         done[at], condition[at] = to[accepted], there[right]
-        growth = np.clip(0.8 * _TRUST / np.maximum(kantorovich[accepted], 1e-300), 0.5, 4.0)
+        growth = np.clip(0.8 * TRUST / np.maximum(kantorovich[accepted], 1e-300), 0.5, 4.0)
         share[at] = gained * growth
         ended = (done[going] == 1.0) | (share[going] < 1e-14)
         going = going[~ended]
@@ -318,7 +309,7 @@ def _trusted(
     f = np.stack([f12, f23, f31])
     eta = np.abs((inverse * f).sum(axis=1)).max(axis=0)
     kantorovich = np.where(turned, beta * eta * _bend(d, g), np.inf)
-    return (kantorovich <= _TRUST) & (np.sign(det) == sign), kantorovich, eta
+    return (kantorovich <= TRUST) & (np.sign(det) == sign), kantorovich, eta
 
 
 def _condition_and_sign(d: Array, cosine: Array, sine: Array, g: float) -> tuple[Array, Array]:
@@ -395,135 +386,6 @@ def _refuse(
 
 def _residuals_of(angle: Array, length: Array, g: float, h: float) -> Array:
     return eq.residuals(length, angle, g, h)
-
-
-# One at a time, in plain floats: ten times faster than arrays of three --------------------------
-
-
-Lengths = tuple[float, float, float]
-#: Cosines, then sines, of the three leg angles.
-Way = tuple[float, float, float, float, float, float]
-
-
-class _Step(NamedTuple):
-    """Newton's step of one triple, and what it is worth."""
-
-    t1: float
-    t2: float
-    t3: float
-    det: float
-    condition: float
-    kantorovich: float
-
-
-class _Solved(NamedTuple):
-    """Where a trusted step led, and by how much the next may be longer."""
-
-    way: Way
-    condition: float
-    growth: float
-
-
-def _step(d: Lengths, way: Way, g: float, h: float) -> _Step:
-    """Return half Newton's step of Eq. 8 in each angle; see `rps_pin.rps.leg_equations`."""
-    d1, d2, d3 = d
-    w1, w2, w3 = d1 * way[0], d2 * way[1], d3 * way[2]
-    z1, z2, z3 = d1 * way[3], d2 * way[4], d3 * way[5]
-    m1, m2, m3 = 3 * g - w1, 3 * g - w2, 3 * g - w3
-    rest = 6 * g * g + 3 * h * h
-    f12 = m1 * m2 - 2 * z1 * z2 + d1 * d1 + d2 * d2 - rest
-    f23 = m2 * m3 - 2 * z2 * z3 + d2 * d2 + d3 * d3 - rest
-    f31 = m3 * m1 - 2 * z3 * z1 + d3 * d3 + d1 * d1 - rest
-    a1, a2 = m2 * z1 - 2 * z2 * w1, m1 * z2 - 2 * z1 * w2
-    b2, b3 = m3 * z2 - 2 * z3 * w2, m2 * z3 - 2 * z2 * w3
-    c3, c1 = m1 * z3 - 2 * z1 * w3, m3 * z1 - 2 * z3 * w1
-    det = a1 * b2 * c3 + a2 * b3 * c1
-    if det == 0.0:
-        return _Step(0.0, 0.0, 0.0, 0.0, math.inf, math.inf)
-    b2c3, a2c3, a2b3 = b2 * c3, a2 * c3, a2 * b3
-    b3c1, a1c3, a1b3 = b3 * c1, a1 * c3, a1 * b3
-    b2c1, a2c1, a1b2 = b2 * c1, a2 * c1, a1 * b2
-    half = -0.5 / det
-    t1 = (b2c3 * f12 - a2c3 * f23 + a2b3 * f31) * half
-    t2 = (b3c1 * f12 + a1c3 * f23 - a1b3 * f31) * half
-    t3 = (a2c1 * f23 - b2c1 * f12 + a1b2 * f31) * half
-    beta = max(
-        abs(b2c3) + abs(a2c3) + abs(a2b3),
-        abs(b3c1) + abs(a1c3) + abs(a1b3),
-        abs(b2c1) + abs(a2c1) + abs(a1b2),
-    ) / abs(det)
-    size = max(abs(a1) + abs(a2), abs(b2) + abs(b3), abs(c3) + abs(c1))
-    bend = max(
-        3 * g * (d1 + d2) + 8 * d1 * d2,
-        3 * g * (d2 + d3) + 8 * d2 * d3,
-        3 * g * (d3 + d1) + 8 * d3 * d1,
-    )
-    eta = 2 * max(abs(t1), abs(t2), abs(t3))
-    return _Step(t1, t2, t3, det, size * beta, beta * eta * bend)
-
-
-def _solved(d: Lengths, way: Way, g: float, h: float, limit: float) -> _Solved | float:
-    """Return the solution a trusted step away, or by how much to shorten the step."""
-    step = first = _step(d, way, g, h)
-    if not (first.kantorovich <= _TRUST and first.condition <= limit):
-        return max(0.02, min(0.5, 0.8 * _TRUST / first.kantorovich)) if first.kantorovich else 0.5
-    at = way
-    for _ in range(_MOST_NEWTON):
-        at = _turned(at, step)
-        moved = max(abs(step.t1), abs(step.t2), abs(step.t3))
-        step = _step(d, at, g, h)
-        if moved < _LAST_STEP:
-            # What is left is its square: lost in rounding.
-            if step.condition <= limit and (step.det > 0) == (first.det > 0):
-                growth = 0.8 * _TRUST / max(first.kantorovich, 1e-9)
-                return _Solved(at, step.condition, max(0.5, min(4.0, growth)))
-            return 0.5
-    return 0.5
-
-
-def _turned(way: Way, step: _Step) -> Way:
-    """Return the legs' directions turned by 2 atan(t) each."""
-    c1, c2, c3, s1, s2, s3 = way
-    t1, t2, t3 = step.t1, step.t2, step.t3
-    sine1, sine2, sine3 = 2 * t1 / (1 + t1 * t1), 2 * t2 / (1 + t2 * t2), 2 * t3 / (1 + t3 * t3)
-    c1, s1 = c1 - sine1 * (s1 + t1 * c1), s1 + sine1 * (c1 - t1 * s1)
-    c2, s2 = c2 - sine2 * (s2 + t2 * c2), s2 + sine2 * (c2 - t2 * s2)
-    c3, s3 = c3 - sine3 * (s3 + t3 * c3), s3 + sine3 * (c3 - t3 * s3)
-    # Back to length one: the errors of millions of turns would add up.
-    k1, k2, k3 = (3 - c * c - s * s for c, s in ((c1, s1), (c2, s2), (c3, s3)))
-    return 0.5 * k1 * c1, 0.5 * k2 * c2, 0.5 * k3 * c3, 0.5 * k1 * s1, 0.5 * k2 * s2, 0.5 * k3 * s3
-
-
-def _scalar_pose(d: Lengths, way: Way, g: float, h: float) -> tuple[float, float, float]:
-    """Return the pose: as `placement_from_angles`, where the formulas are explained."""
-    rho_1, rho_2, rho_3 = g - d[0] * way[0], g - d[1] * way[1], g - d[2] * way[2]
-    z1, z2, z3 = d[0] * way[3], d[1] * way[4], d[2] * way[5]
-    z = (z1 + z2 + z3) / 3
-    outwards, across = (rho_2 + rho_3) / 2, (rho_2 - rho_3) / 2
-    u_x, u_y, u_z = (2 * rho_1 + outwards) / (3 * h), -across / (_SQRT3 * h), (z1 - z) / h
-    v_y, v_z = outwards / h, (z2 - z3) / (_SQRT3 * h)
-    q_w = math.sqrt(max(0.0, u_x + v_y) / 2)
-    if u_x + v_y >= 1:
-        q_x, q_y = v_z / (2 * q_w), -u_z / (2 * q_w)
-    elif v_y <= u_x:
-        q_x = math.copysign(math.sqrt((1 - v_y) / 2), v_z)
-        q_y = u_y / (2 * q_x)
-    else:
-        q_y = math.copysign(math.sqrt((1 - u_x) / 2), -u_z)
-        q_x = u_y / (2 * q_y)
-    half_sine = math.hypot(q_x, q_y)
-    if u_x + v_y < 1:
-        q_w = math.hypot(u_z, v_z) / (2 * half_sine)
-    factor = 2 * math.atan2(half_sine, q_w) / half_sine if half_sine > 1e-9 else 2.0
-    return z, q_x * factor, q_y * factor
-
-
-def _between(begin: Lengths, goal: Lengths, part: float) -> Lengths:
-    return (
-        begin[0] + part * (goal[0] - begin[0]),
-        begin[1] + part * (goal[1] - begin[1]),
-        begin[2] + part * (goal[2] - begin[2]),
-    )
 
 
 def _reading(length: ArrayLike) -> Lengths:

@@ -24,8 +24,8 @@ from rps_pin.rps.limited_motion import ACTIVE, LimitedMotion
 from rps_pin.rps.speed_profile import SpeedProfile
 from rps_pin.trajectories.path import Array
 
-#: To what part of a limit it is kept. Half of that is aimed below it, so that a motion is within its
-#: limits wherever it is looked at.
+#: To what part of a limit it is kept. Half of that is aimed below it, so that a motion is within
+#: its limits wherever it is looked at.
 KEPT = 1e-6
 #: At most this share of the time may no limit be reached to `ACTIVE` before pieces are divided:
 #: first, and once limits have been tightened.

@@ -6,7 +6,16 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.time_laws import Profile
@@ -23,10 +32,17 @@ def _one_or_three(value: Any) -> Any:
         raise ValueError("it is too large") from None
 
 
+def _size_and_number(value: Any) -> Any:
+    if value is not None and not (isinstance(value, list) and len(value) == 2):
+        raise ValueError("it must be a list of two: how far, m, and how often")
+    return value and tuple(value)
+
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Pose = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
+Lift = Annotated[tuple[Finite, int] | None, BeforeValidator(_size_and_number)]
 Limit = Annotated[Any, AfterValidator(_one_or_three)]
 
 
@@ -80,6 +96,13 @@ class Spline(_Described):
     profile: Profile | None = None
     tilt_scale: Positive | None = None
 
+    @field_validator("profile", "tilt_scale")
+    @classmethod
+    def _not_with_times(cls, value: Any, info: ValidationInfo) -> Any:
+        if value is not None and info.data.get("times") is not None:
+            raise ValueError("it goes with a duration; here times say when each pose is met")
+        return value
+
 
 class Circle(_Described):
     """See `rps_pin.trajectories.circle`."""
@@ -101,7 +124,7 @@ class Lissajous(_Described):
     amplitude: Pair
     frequency: Annotated[list[int], Field(min_length=2, max_length=2)]
     phase: Pair | None = None
-    lift: tuple[Finite, int] | None = Field(default=None, strict=False)
+    lift: Lift = None
     turns: Positive | None = None
     duration: Positive
     profile: Profile | None = None
@@ -148,7 +171,9 @@ def validated(file: YamlFile) -> Described:
     try:
         return model.model_validate(dict(file.values))
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
+        errors = error.errors(include_url=False)
+    # A key that is misspelt is unknown, and the right one missing: the first says more.
+    first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
     path = _held(file.values, first["loc"])
     if first["type"] == "missing":
         inside = f"{_written(path)}" if path else f"kind {kind}"

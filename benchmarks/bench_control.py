@@ -1,0 +1,77 @@
+"""One tick of the control loop against the same from the library's general functions, same run.
+
+Run with ``make bench``. Percentiles over a million ticks: ``benchmarks/latency.py``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+from benchmarks.bench_inverse_dynamics import plain
+from benchmarks.latency import motion
+from rps_pin import RPSRobot
+from rps_pin.control import RealTimeRobot
+from rps_pin.control.constrained_forces import ConstrainedForces
+from rps_pin.rps.forward import EncoderTracker
+from rps_pin.rps.rates import leg_jacobians, platform_twist, pose_rate
+from rps_pin.rps.singularity import singularity_measures
+
+
+@pytest.fixture(scope="module")
+def robot() -> RPSRobot:
+    return RPSRobot.from_preset("micro")
+
+
+@pytest.mark.benchmark(group="control, two estimates", warmup=True, min_rounds=500)
+@pytest.mark.parametrize("role", ["ours", "tracker and array functions"])
+def bench_estimate(benchmark: BenchmarkFixture, robot: RPSRobot, role: str) -> None:
+    p = robot.parameters
+    pose, rate, _ = motion()
+    legs = leg_jacobians(p, pose)
+    speed = np.einsum("nij,nj->ni", legs.length_jacobian, rate)
+    first, second = (legs.length[0], speed[0]), (legs.length[1], speed[1])
+    loop = RealTimeRobot(robot, pose[0])
+    tracker = EncoderTracker(pose[0], p.base_radius, p.platform_radius)
+
+    def ours() -> None:
+        loop.estimate(*first)
+        loop.estimate(*second)
+
+    def theirs() -> None:
+        for length, legs_speed in (first, second):
+            found = tracker.update(length)
+            twist = platform_twist(p, found, pose_rate(p, found, legs_speed).value)
+            assert twist.total.size == 6
+            singularity_measures(p, found)
+
+    benchmark.extra_info["role"] = role
+    benchmark(ours if role == "ours" else theirs)
+
+
+@pytest.mark.benchmark(group="control, inverse dynamics, state given", warmup=True, min_rounds=2000)
+@pytest.mark.parametrize("role", ["ours", "RPSRobot", "plain Pinocchio and NumPy"])
+def bench_forces(benchmark: BenchmarkFixture, robot: RPSRobot, role: str) -> None:
+    pose, rate, acceleration = motion()
+    state = robot.state(pose[7], rate[7], acceleration[7])
+    ours = ConstrainedForces(robot).solve_state
+    peer = robot.inverse_dynamics if role == "RPSRobot" else plain(robot)
+    found = ours(*state)
+    assert found is not None
+    np.testing.assert_allclose(found[9:], plain(robot)(*state), rtol=1e-10)
+    benchmark.extra_info["role"] = role
+    benchmark(ours if role == "ours" else peer, *state)
+
+
+@pytest.mark.benchmark(group="control, inverse dynamics from a pose", warmup=True, min_rounds=500)
+@pytest.mark.parametrize("role", ["ours", "RPSRobot: state, inverse_dynamics"])
+def bench_forces_of_a_pose(benchmark: BenchmarkFixture, robot: RPSRobot, role: str) -> None:
+    pose, rate, acceleration = motion()
+    loop = RealTimeRobot(robot, pose[7])
+    row = (pose[7], rate[7], acceleration[7])
+    benchmark.extra_info["role"] = role
+    if role == "ours":
+        benchmark(loop.inverse_dynamics, *row)
+    else:
+        benchmark(lambda: robot.inverse_dynamics(*robot.state(*row)))

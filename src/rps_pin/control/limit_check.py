@@ -1,0 +1,99 @@
+"""Whether a tick keeps the robot's limits: plain floats in the loop, words on demand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rps_pin.control.exponential_map import Coefficients
+from rps_pin.rps.legs import RADIAL, cone_angles, violations
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.pose import rotation
+from rps_pin.rps.scalar_tracking import Lengths, Triple, Way
+
+#: Limits are kept to rounding error, m or rad (as in `rps_pin.rps.legs`).
+_ROUNDING = 1e-12
+_RADIAL = [(float(x), float(y)) for x, y, _ in RADIAL]
+
+
+class LimitCheck:
+    """The limits of one robot.
+
+    Parameters
+    ----------
+    parameters
+        The robot's.
+    """
+
+    def __init__(self, parameters: RPSParameters) -> None:
+        self._parameters = parameters
+        low, high = parameters.leg_length_limits
+        self._shortest, self._longest = low - _ROUNDING, high + _ROUNDING
+        low, high = parameters.leg_angle_limits
+        self._least_angle, self._greatest_angle = low - _ROUNDING, high + _ROUNDING
+        self._greatest_speed = parameters.actuator_speed_limit
+        self._greatest_force = parameters.actuator_force_limit
+        self._cones = parameters.spherical_cone_limit < math.pi
+        self._least_cosine = math.cos(min(parameters.spherical_cone_limit + _ROUNDING, math.pi))
+        rest = parameters.spherical_rest_angle
+        self._along, self._across = math.cos(rest), math.sin(rest)
+
+    def broken(
+        self, pose: Triple, d: Lengths, angle: Triple, way: Way, coefficient: Coefficients
+    ) -> bool:
+        """Return whether a leg's length, angle or ball joint is beyond its limits."""
+        if min(d) < self._shortest or max(d) > self._longest:
+            return True
+        if min(angle) < self._least_angle or max(angle) > self._greatest_angle:
+            return True
+        return self._cones and self._cone_broken(pose, way, coefficient)
+
+    def _cone_broken(self, pose: Triple, way: Way, coefficient: Coefficients) -> bool:
+        """Return whether a leg leaves its ball's cone.
+
+        With e and t of `rps_pin.rps.rates` and the leg's direction l = -cos(phi) e_i + sin(phi) z,
+        l . n = C sin(phi) - A t cos(phi) and l . R e_i = -(C + B e^2) cos(phi) - A t sin(phi).
+        """
+        _, wx, wy = pose
+        a, b, c = coefficient[:3]
+        for leg in range(3):
+            ex, ey = _RADIAL[leg]
+            e, at = wx * ex + wy * ey, a * (wy * ex - wx * ey)
+            cosine, sine = way[leg], way[leg + 3]
+            normal, radial = c * sine - at * cosine, -(c + b * e * e) * cosine - at * sine
+            # The rest axis is cos(r) n - sin(r) R e_i.
+            if self._along * normal - self._across * radial < self._least_cosine:
+                return True
+        return False
+
+    def too_fast(self, speed: Triple) -> bool:
+        """Return whether an actuator is beyond its speed limit."""
+        return max(speed) > self._greatest_speed or min(speed) < -self._greatest_speed
+
+    def too_strong(self, force: list[float]) -> bool:
+        """Return whether an actuator is beyond its force limit."""
+        return max(force) > self._greatest_force or min(force) < -self._greatest_force
+
+    def words(self, pose: Triple, d: Lengths, angle: Triple) -> list[str]:
+        """Return a sentence for each limit of length, angle or ball joint that is broken."""
+        p = self._parameters
+        turn = rotation(np.array(pose))
+        cone = cone_angles(np.array(angle), turn, p.spherical_rest_angle)
+        return [str(one) for one in violations(p, np.array(d), np.array(angle), cone)]
+
+    def words_of_speeds(self, speed: Triple) -> list[str]:
+        """Return a sentence for each actuator beyond its speed limit."""
+        return _beyond("speed", speed, self._greatest_speed, "m/s")
+
+    def words_of_forces(self, force: Triple) -> list[str]:
+        """Return a sentence for each actuator beyond its force limit."""
+        return _beyond("force", force, self._greatest_force, "N")
+
+
+def _beyond(quantity: str, values: Triple, limit: float, unit: str) -> list[str]:
+    return [
+        f"leg {leg}: {quantity} is {value:.6g} {unit}; its limit is {limit:.6g} {unit}"
+        for leg, value in enumerate(values, start=1)
+        if abs(value) > limit
+    ]

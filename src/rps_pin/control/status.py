@@ -1,0 +1,37 @@
+"""What a call in a control loop says of its answer, instead of raising."""
+
+from __future__ import annotations
+
+from enum import IntFlag
+
+
+class Status(IntFlag):
+    """Reasons, which can come together; `OK` (zero) if there is none.
+
+    With `BAD_INPUT`, `JUMP` or `NOT_CONVERGED` there is no new answer: the last good one is kept
+    (see `kept`). With the others the answer is new and right, and asks for attention.
+    """
+
+    OK = 0
+    #: An argument is not three numbers, not finite, or beyond all sense.
+    BAD_INPUT = 1
+    #: A leg's reading jumped further than `largest_jump` since the last good one.
+    JUMP = 2
+    #: No answer was found: the lengths cannot be followed, or the forces are not determined.
+    NOT_CONVERGED = 4
+    #: The distance to a singularity is below `near_singular`; of a kept answer, that answer's.
+    NEAR_SINGULAR = 8
+    #: A leg's length, angle, ball joint, speed or force is beyond the robot's limits.
+    BEYOND_LIMIT = 16
+
+    @property
+    def kept(self) -> bool:
+        """Whether the answer is the last good one, kept, and not that of this call."""
+        return bool(self & KEPT)
+
+
+#: The reasons for which there is no new answer.
+KEPT = Status.BAD_INPUT | Status.JUMP | Status.NOT_CONVERGED
+
+#: Every combination, by its number: making one anew takes microseconds.
+STATUSES = tuple(Status(number) for number in range(32))

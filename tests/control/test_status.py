@@ -1,0 +1,20 @@
+"""The statuses: their table, and which of them keep the last answer."""
+
+from __future__ import annotations
+
+import pytest
+
+from rps_pin.control.status import STATUSES, Status
+
+
+def test_table_holds_every_combination_at_its_number() -> None:
+    assert [int(status) for status in STATUSES] == list(range(32))
+    together = Status.BAD_INPUT | Status.JUMP | Status.NOT_CONVERGED
+    together |= Status.NEAR_SINGULAR | Status.BEYOND_LIMIT
+    assert STATUSES[-1] == together
+
+
+@pytest.mark.parametrize("status", STATUSES)
+def test_answers_are_kept_for_three_reasons(status: Status) -> None:
+    reasons = [Status.BAD_INPUT, Status.JUMP, Status.NOT_CONVERGED]
+    assert status.kept == any(reason in status for reason in reasons)
