@@ -109,13 +109,14 @@ def test_a_gap_is_told_with_its_times_and_can_be_allowed(tmp_path: Path) -> None
     refuse(tmp_path, text, 6, words)
     assert len(read(tmp_path, text, max_step=1.21).times) == 9
     refuse(tmp_path, text, 6, "a gap of 1.2 s.*max_step is 1.19 s", max_step=1.19)
+    assert len(read(tmp_path, text, max_step=np.int64(2)).times) == 9
     lines = good_lines(20)
     del lines[5:13]  # nine steps are no gap, unless one says so
     assert len(read(tmp_path, "\n".join(lines)).times) == 12
     refuse(tmp_path, "\n".join(lines), 6, "a gap of 0.9 s", max_step=0.5)
 
 
-@pytest.mark.parametrize("bad", [0, -1.0, math.nan, "1", True])
+@pytest.mark.parametrize("bad", [0, -1.0, math.nan, "1", True, 10**400])
 def test_a_longest_step_is_a_positive_number(tmp_path: Path, bad: Any) -> None:
     with pytest.raises(InputError, match="max_step"):
         read(tmp_path, "\n".join(good_lines()), max_step=bad)

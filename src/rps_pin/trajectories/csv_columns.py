@@ -122,7 +122,9 @@ def _unknown(name: str, position: int) -> str:
     """Say what is wrong with a name, and what it could be."""
     if not name:
         return f"column {position + 1} has no name"
-    near = get_close_matches(name.lower(), READ, n=1, cutoff=0.85)
+    # Of the same unit: who wrote z_cm does not mean z_m.
+    like = [known for known in READ if name.lower().endswith(f"_{_unit(known)}")]
+    near = get_close_matches(name.lower(), like, n=1, cutoff=0.85)
     if name in UNITS:
         return f"column {name!r} has no unit: it can be {', '.join(_names(name))}"
     if near:
@@ -138,6 +140,10 @@ def _unknown(name: str, position: int) -> str:
         f"column {shown(name)} is not known. Those that are read are quantity_unit, with the "
         f"quantities {', '.join(UNITS)}: time_s, z_mm, tilt_x_rate_deg_per_s and the like"
     )
+
+
+def _unit(column: str) -> str:
+    return column.removeprefix(f"{READ[column].quantity}_")
 
 
 def _names(quantity: str) -> list[str]:

@@ -23,6 +23,7 @@ from rps_pin.trajectories.csv_columns import ACCELERATIONS, COORDINATES, RATES, 
 from rps_pin.trajectories.csv_table import Table, read_table
 from rps_pin.trajectories.derivative_check import disagreement
 from rps_pin.trajectories.path import Array
+from rps_pin.trajectories.poses import real
 from rps_pin.trajectories.sampled_path import FEWEST_POSES, SampledPath
 
 #: A step longer than this many times the median step is a gap.
@@ -62,7 +63,7 @@ def read_csv(path: str | os.PathLike[str], *, max_step: float | None = None) -> 
         derivatives of the poses; if a column is unknown, without unit, twice there or missing; if
         rows are too few (6; with accelerations 2); or if it is no such file.
     """
-    if max_step is not None and not (_is_real(max_step) and max_step > 0):
+    if max_step is not None and not real(max_step) > 0:
         raise InputError(f"max_step = {shown(max_step)}: it must be a positive number of seconds")
     columns: dict[str, Column] = {}
 
@@ -85,10 +86,6 @@ def read_csv(path: str | os.PathLike[str], *, max_step: float | None = None) -> 
 
 def _stack(si: Mapping[str, Array], names: Sequence[str]) -> Array:
     return np.stack([si[name] for name in names], axis=-1)
-
-
-def _is_real(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def _refuse_few(table: Table, columns: int) -> None:
@@ -163,5 +160,6 @@ def _refuse_wrong_derivatives(
             raise InputError(
                 f"{table.place(found.row)}: {column.name} = {found.given / column.factor:.6g}, but "
                 f"beside it {columns[quantity].name} changes at {slopes} in the same unit{like}. "
-                "Correct it, sample more densely, or leave out rates and accelerations"
+                "Correct it, sample more densely, write more digits, or leave out rates and "
+                "accelerations"
             )

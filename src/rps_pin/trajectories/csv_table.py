@@ -166,10 +166,11 @@ def _cells(line: str, delimiter: str, place: str) -> list[str]:
 def _refuse(cells: Sequence[str], names: Sequence[str], delimiter: str, place: str) -> NoReturn:
     """Say what is wrong with a row: how many cells it has, or one of them."""
     if len(cells) != len(names):
-        comma = delimiter == "," and len(cells) > len(names)
+        comma = delimiter == "," and len(cells) > len(names) and all(map(_is_number, cells))
         hint = "; numbers are written with a point, 0.5 and not 0,5" if comma else ""
         raise InputError(
-            f"{place}: {len(cells)} cells, where the header names {len(names)} columns{hint}"
+            f"{place}: {len(cells)} cell{'s' if cells[1:] else ''}, where the header names "
+            f"{len(names)} columns{hint}"
         )
     index = next(i for i, cell in enumerate(cells) if not _is_number(cell))
     cell, name = cells[index].strip(), names[index]
