@@ -29,7 +29,7 @@ from rps_pin.trajectories.path import Array
 KEPT = 1e-6
 #: At most this share of the time may no limit be reached to `ACTIVE` before pieces are divided:
 #: first, and once limits have been tightened.
-IDLE, IDLE_TIGHTENED = 2e-3, 8e-3
+IDLE, IDLE_TIGHTENED = 2e-3, 6e-3
 
 # Where limits are asked for in each piece, and where they are looked at: denser towards the ends,
 # where a rate that starts from rest grows like a root. Within the piece, for a curve may jump in
@@ -182,9 +182,9 @@ class TimeSearch:
         beyond = (sides + _missed(sides)).max(axis=1) - 1
         rate = np.sqrt(square)
         steps = np.diff(u, axis=1) / ((rate[:, 1:] + rate[:, :-1]) / 2)
-        most = sides.max(axis=-1)
-        unused = np.maximum(most[:, 1:], most[:, :-1]) < 1 - ACTIVE
-        return beyond, (steps * unused).sum(axis=1) / steps.sum()
+        unused = sides.max(axis=-1) < 1 - ACTIVE
+        unused_steps = steps * (unused[:, 1:].astype(float) + unused[:, :-1]) / 2
+        return beyond, unused_steps.sum(axis=1) / steps.sum()
 
     def _look_at_times(self, found: SpeedProfile) -> Array:
         """Return how far each side is exceeded in each piece at evenly spaced times, (n, 9)."""
