@@ -51,6 +51,7 @@ DESCRIBED: list[tuple[str, Trajectory]] = [
         spline(POSES, duration=2, profile="quintic", tilt_scale=0.2),
     ),
     (CIRCLE, circle(height=0.2, tilt=0.1, duration=2)),
+    (CIRCLE + "turns: null\nprofile:\n", circle(height=0.2, tilt=0.1, duration=2)),
     (
         CIRCLE + "turns: 2\nstart: -1\nprofile: quintic\n",
         circle(height=0.2, tilt=0.1, duration=2, turns=2, start=-1, profile="quintic"),

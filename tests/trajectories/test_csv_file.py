@@ -173,6 +173,24 @@ def test_one_wrong_entry_is_told_with_its_line_and_values(tmp_path: Path, column
         assert f"changes at {slope:.6g} and " in str(caught.value)
 
 
+def test_what_is_wrong_is_told_in_the_units_of_the_file(tmp_path: Path) -> None:
+    lines = good_lines()
+    lines[0] = "time_ms,z_mm,tilt_x_deg,tilt_y_deg"
+    text = "\n".join([lines[0], *(f"{i},200,{i},400" for i in range(12))])
+    refuse(tmp_path, text, 2, r"tilt_y_deg = 400: it cannot be beyond 6\.283 rad$")
+    t = np.arange(30) / 10
+    pose, rate = 200 + 10 * np.sin(t), 10 * np.cos(t)
+    rate[20] = 77.0
+    still = np.zeros((30, 2))
+    names = "time_s,z_mm,tilt_x_rad,tilt_y_rad,"
+    names += "z_rate_mm_per_s,tilt_x_rate_rad_per_s,tilt_y_rate_rad_per_s"
+    file = save(tmp_path / "path.csv", names, np.column_stack([t, pose, still, rate, still]))
+    slopes = [f"{10 * (pose[i + 1] - pose[i]):.6g}" for i in (19, 20)]
+    words = f"line 22: z_rate_mm_per_s = 77, but beside it z_mm changes at {' and '.join(slopes)} "
+    with pytest.raises(InputError, match=words):
+        read_csv(file)
+
+
 @pytest.mark.parametrize("rate", [3.0, 10.0, 100.0, 1000.0])
 def test_a_coarse_helix_is_not_refused(tmp_path: Path, rate: float) -> None:
     """Its acceleration jumps at the ends of its ramps."""

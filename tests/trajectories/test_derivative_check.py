@@ -50,6 +50,22 @@ def test_rounding_of_the_written_numbers_is_allowed_for(
     assert disagreement(t, x, v) is None
 
 
+def test_poses_of_three_digits_are_not_enough() -> None:
+    """At 1 kHz their last place is more than three times the rate."""
+    t = np.arange(2000) / 1000
+    x = np.round(np.sin(3 * t), 2)
+    assert disagreement(t, x, 3 * np.cos(3 * t)) is not None
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.223])
+def test_rounding_of_a_rate_that_should_be_zero_is_no_rate(rest: float) -> None:
+    still = np.full_like(T, rest)
+    for row in (0, 5, -1):
+        rate = np.zeros_like(T)
+        rate[row] = 1e-16
+        assert disagreement(T, still, rate) is None
+
+
 @pytest.mark.parametrize("rest", [0.0, 0.223])
 def test_what_stands_still_has_no_rate(rest: float) -> None:
     still = np.full_like(T, rest)
@@ -95,6 +111,32 @@ def test_one_wrong_entry_is_found_where_it_is(row: int, what: str, off: float) -
     slopes = np.diff(x) / np.diff(T)
     assert found.slopes == tuple(slopes[row - 1 : row + 1])
     assert found.looks_like == "" or off > 10
+
+
+@pytest.mark.parametrize("count", [6, 41])
+@pytest.mark.parametrize("row", [0, -1])
+def test_a_first_or_last_entry_far_beyond_all_else_is_found(row: int, count: int) -> None:
+    t = T[:count]
+    x, v = np.sin(3 * t), 3 * np.cos(3 * t)
+    largest = max(np.abs(v).max(), np.abs(np.diff(x) / np.diff(t)).max())
+    v[row] = 11 * largest
+    found = disagreement(t, x, v)
+    assert found is not None
+    assert found.row == row % count
+    assert found.given == v[row]
+    assert found.slopes == ((np.diff(x) / np.diff(t))[row],)
+
+
+@pytest.mark.parametrize("row", [0, -1])
+def test_a_push_shorter_than_the_first_step_is_right(row: int) -> None:
+    """The acceleration at the end is then seven times the mean of its step."""
+    t = np.arange(12) * 1.4
+    rate = np.minimum(t / 0.2, 1.0)  # a cruise, but for its first moment
+    acceleration = np.where(t < 0.2, 1 / 0.2, 0.0)
+    if row == 0:
+        assert disagreement(t, rate, acceleration) is None
+    else:
+        assert disagreement(-t[::-1], rate[::-1], -acceleration[::-1]) is None
 
 
 def test_two_samples_cannot_be_judged() -> None:

@@ -167,6 +167,10 @@ TIMES = np.arange(8.0)
         ((TIMES, POSES, POSES, POSES * np.inf), "accelerations is not finite"),
         ((TIMES * 5e-324, POSES, POSES, POSES), "no finite motion"),
         ((TIMES * 1e-300, POSES), "no finite motion|too unequal"),
+        (
+            ([0, 1e-301, 1e-197, 1e-181, 1e-162, 1e-5], POSES[:6]),
+            "steps of 1e-301 s to 1e-05 s are too unequal",
+        ),
         ((np.r_[TIMES[:7], 6 + 1e-15] * 1e10, POSES), "increase|finite|unequal"),
     ],
 )

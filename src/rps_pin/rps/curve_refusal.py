@@ -13,6 +13,7 @@ from rps_pin.errors import (
     InfeasibleError,
     InputError,
     LimitExcess,
+    LimitViolation,
     ParameterError,
     SingularityError,
     UnreachableError,
@@ -135,20 +136,20 @@ def _with_lengths(p: RPSParameters, length: tuple[float, float]) -> RPSParameter
 def _unreachable(
     parameters: RPSParameters, curve: Curve, found: PathCheck, event: LimitEvent
 ) -> UnreachableError:
-    """Return the error of the first limit left, with what is broken a little further on."""
+    """Return the error of the first limit left, with what is broken half-way until all is well."""
     back = (e.time for e in found.limits if e.kind == "returns" and e.time > event.time)
-    inside = np.linspace(event.time, next(back, found.duration), 101)
-    poses = curve.at(inside).pose
+    middle = (event.time + next(back, found.duration)) / 2
     robot = RPSRobot(parameters)
-    reachable = robot.inverse_kinematics(poses, errors="mask").reachable
-    beyond = int(np.flatnonzero(~reachable)[len(np.flatnonzero(~reachable)) // 2])
+    violations: tuple[LimitViolation, ...] = ()
     try:
-        robot.inverse_kinematics(poses[beyond])
+        robot.inverse_kinematics(curve.at(middle).pose)
     except UnreachableError as error:
         violations = error.violations
+    further = "; ".join(map(str, violations))
     return UnreachableError(
-        f"at u = {event.time:.9g} of {found.duration:.6g} the curve leaves the workspace; at "
-        f"u = {inside[beyond]:.6g}, {'; '.join(map(str, violations))}",
+        f"at u = {event.time:.9g} of {found.duration:.6g} the curve leaves the workspace: leg "
+        f"{event.leg} breaks its {event.side} limit of {event.quantity}, {event.limit:.6g} "
+        f"{event.unit}{f'. At u = {middle:.6g}, {further}' if further else ''}",
         violations,
     )
 

@@ -76,7 +76,7 @@ def load_trajectory(path: str | os.PathLike[str], robot: RPSRobot) -> Trajectory
 
 def _made(file: YamlFile, described: Described, folder: Path, robot: RPSRobot) -> Trajectory:
     """Return what is described, as it is timed by itself."""
-    keys = described.model_dump(exclude={"kind", "fastest"}, exclude_unset=True, exclude_none=True)
+    keys = described.model_dump(exclude={"kind", "fastest"}, exclude_none=True)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             trajectory = _called(described, keys, folder, robot)

@@ -8,7 +8,8 @@ in a step,
 
 but for what it turns by within the step. Both may be missed by half of the column's largest value,
 and by what rounding of the written numbers can explain. That passes a sine of four samples a period
-and an acceleration that jumps, and finds wrong units and wrong entries.
+and an acceleration that jumps, and finds wrong units and wrong entries. The first and the last
+derivative have one step beside them; they are wrong if far larger than everything else.
 """
 
 from __future__ import annotations
@@ -22,11 +23,16 @@ from rps_pin.trajectories.path import Array
 
 #: How far a slope may miss the derivatives, over the column's largest value.
 _GROSS = 0.5
-#: From so many samples on, every step's slope is judged. Fewer may be meant as far apart.
+#: How far the first or last derivative may exceed all else.
+_AT_END = 10.0
+#: From so many samples on, every step's slope is judged, and both ends are. Fewer may be meant as
+#: far apart.
 _JUDGED = 6
 #: Written numbers are taken to have four digits or more: this part of a column's largest value is
 #: the largest last place that is allowed for.
 _LAST_PLACE = 1e-4
+#: No derivative as small is wrong (m/s, rad/s and the like): what should be zero may be rounding.
+_NEGLIGIBLE = 1e-12
 
 #: What a ratio of given to found derivatives looks like.
 _LOOKS = {
@@ -64,14 +70,18 @@ def disagreement(times: Array, values: Array, derivative: Array) -> Disagreement
     with np.errstate(all="ignore"):  # what overflows disagrees
         steps = np.diff(times)
         slope = np.diff(values) / steps
+        rounding = 2 * _last_place(values) / steps + _NEGLIGIBLE
         largest = max(np.abs(slope).max(), np.abs(derivative).max())
-        allowed = _GROSS * largest + 2 * _last_place(values) / steps + _last_place(derivative)
+        allowed = _GROSS * largest + rounding
         before, after = derivative[:-1], derivative[1:]
         inner = derivative[1:-1]
         wrong = np.zeros(len(times), dtype=bool)
         wrong[1:-1] = ~(_outside(inner, slope[:-1], slope[1:]) <= np.maximum(*_pairs(allowed)))
         if len(times) >= _JUDGED:
             wrong[1:] |= ~(_outside(slope, before, after) <= allowed)
+            for end, others in ((0, after), (-1, before)):
+                all_else = max(np.abs(slope).max(), np.abs(others).max())
+                wrong[end] |= not abs(derivative[end]) <= _AT_END * all_else + rounding[end]
         if not wrong.any():
             return None
         row = int(np.argmax(wrong))
