@@ -20,7 +20,7 @@ from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample
 from rps_pin.trajectories.path import Array, Trajectory, checked_parameters
 
-#: Pieces that the way is divided into: at first, and at most.
+#: Pieces that the way is divided into: at first, and at most (or four to a step between times).
 PIECES, MOST_PIECES = 400, 25_600
 #: How far the curve may be from the way, over its length.
 ON_THE_WAY = 1e-7
@@ -72,10 +72,11 @@ class ResampledCurve:
             if off <= ON_THE_WAY * self.length:
                 return
             pieces *= 2
-            if pieces > MOST_PIECES:
+            if pieces > max(MOST_PIECES, 4 * len(times)):
                 raise InputError(
-                    f"the trajectory turns too sharply at t = {where:.6g} s: a smooth curve is "
-                    f"{off:.3g} m off it there. Where it stops and turns, make it two trajectories"
+                    f"the trajectory turns too sharply at t = {where:.6g} s: a smooth curve of "
+                    f"{pieces // 2} pieces is {off:.3g} m off it there. Where it stops and turns, "
+                    "make it two trajectories"
                 )
 
     def _follow(self, when: Array) -> tuple[float, float]:
