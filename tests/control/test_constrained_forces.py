@@ -7,8 +7,9 @@ import pinocchio as pin
 import pytest
 
 from rps_pin import RPSParameters, RPSRobot
-from rps_pin.control.constrained_forces import ConstrainedForces, turning_determinant
-from rps_pin.control.scalar_state import RobotState, robot_state
+from rps_pin.control.constrained_forces import ConstrainedForces
+from rps_pin.control.place import place_of, turning_determinant
+from rps_pin.control.scalar_state import RobotState, state_at
 from rps_pin.rps import leg_equations as eq
 from rps_pin.rps.loads import Payload
 from tests import strategies
@@ -25,17 +26,18 @@ FRICTION = {
 def scalar_state(robot: RPSRobot, motion: strategies.Motion) -> RobotState:
     p = robot.parameters
     x, dx, ddx = (tuple(one.tolist()) for one in motion)
-    state = robot_state(x, dx, ddx, p.base_radius, p.platform_radius)
-    assert state is not None
-    return state
+    place = place_of(x, p.base_radius, p.platform_radius)
+    assert place is not None
+    return state_at(place, dx, ddx, p.platform_radius)
 
 
 def flat(state: RobotState) -> tuple[strategies.Array, ...]:
-    one, two, three = state.legs
+    angle, length = state.place.angle, state.place.length
+    at = [value for pair in zip(angle, length, strict=True) for value in pair]
     return (
-        np.array([v for leg in (one, two, three) for v in leg[:2]] + list(state.placement)),
-        np.array([v for leg in (one, two, three) for v in leg[2:4]] + list(state.velocity)),
-        np.array([v for leg in (one, two, three) for v in leg[4:6]] + list(state.acceleration)),
+        np.array(at + list(state.placement)),
+        np.array([value for leg in state.legs for value in leg[:2]] + list(state.velocity)),
+        np.array([value for leg in state.legs for value in leg[2:]] + list(state.acceleration)),
     )
 
 
@@ -68,7 +70,7 @@ def test_state_and_forces_are_the_robot_s(robot: RPSRobot) -> None:
             np.testing.assert_allclose(found, array, rtol=0, atol=1e-12 * np.abs(array).max())
         length, angle = expected[0][[1, 3, 5]], expected[0][[0, 2, 4]]
         determinant = eq.determinant(length, angle, p.base_radius, p.platform_radius)
-        turning = turning_determinant(state.legs, p.base_radius, p.platform_radius)
+        turning = turning_determinant(state.place, p.base_radius, p.platform_radius)
         assert turning == pytest.approx(float(determinant), abs=1e-12)
         if abs(turning) < 0.05:
             continue
@@ -102,4 +104,4 @@ def test_virtual_power_of_the_forces_is_that_of_the_tree() -> None:
 
 def test_leg_without_length_has_no_state() -> None:
     """Radii alike, height 0: every tip stands on its revolute joint."""
-    assert robot_state((0.0, 0.0, 0.0), (0.0,) * 3, (0.0,) * 3, 0.3, 0.3) is None
+    assert place_of((0.0, 0.0, 0.0), 0.3, 0.3) is None

@@ -8,8 +8,18 @@ import numpy as np
 import pytest
 
 from rps_pin.control.exponential_map import coefficients
-from rps_pin.control.scalar_rates import LeastGain, leg_gains, platform_twist, pose_rate
+from rps_pin.control.scalar_rates import (
+    LeastGain,
+    force_of_wrench,
+    leg_gains,
+    leg_speed,
+    platform_twist,
+    pose_rate,
+    wrench_of_force,
+)
 from rps_pin.rps import rates
+from rps_pin.rps.legs import RADIAL
+from rps_pin.rps.pose import rotation
 from rps_pin.rps.scalar_tracking import direction_of_legs
 from rps_pin.rps.singularity import singularity_measures
 from tests import strategies
@@ -40,3 +50,14 @@ def test_gains_rates_and_twists_are_the_library_s(largest_tilt: float) -> None:
                 d1, d2, d3 = (legs.length_jacobian[i] @ speeds[i]).tolist()
                 back = pose_rate(gains, (d1, d2, d3))
                 np.testing.assert_allclose(back, rate, rtol=0, atol=1e-10 * np.abs(rate).max())
+            arms = h * RADIAL @ rotation(row).T
+            balls = twists[i, :3] + np.cross(twists[i, 3:], arms)  # v + w x r
+            found = np.array(gains.L).T @ rate
+            assert found @ found == pytest.approx((balls**2).sum(), rel=1e-10)
+            force = rng.normal(size=3)
+            f1, f2, f3 = force.tolist()
+            power = np.dot(wrench_of_force(gains, (f1, f2, f3)), rate)  # K'f . x' = f . K x'
+            assert power == pytest.approx(force @ leg_speed(gains, rate), abs=1e-10)
+            if measures.type_ii[i] > 0.05:
+                again = force_of_wrench(gains, wrench_of_force(gains, (f1, f2, f3)))
+                np.testing.assert_allclose(again, force, rtol=0, atol=1e-10)

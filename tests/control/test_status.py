@@ -8,9 +8,10 @@ from rps_pin.control.status import STATUSES, Status
 
 
 def test_table_holds_every_combination_at_its_number() -> None:
-    assert [int(status) for status in STATUSES] == list(range(32))
+    assert [int(status) for status in STATUSES] == list(range(256))
     together = Status.BAD_INPUT | Status.JUMP | Status.NOT_CONVERGED
     together |= Status.NEAR_SINGULAR | Status.BEYOND_LIMIT
+    together |= Status.SATURATED | Status.TARGET_HELD | Status.STOPPED
     assert STATUSES[-1] == together
 
 

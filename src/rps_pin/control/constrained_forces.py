@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pinocchio import computeJointJacobians, getConstraintsJacobian, rnea
 
 from rps_pin.closed_loop import LoopClosure
-from rps_pin.control.scalar_state import LegState, RobotState
+from rps_pin.control.scalar_state import RobotState
 from rps_pin.rps.friction import has_friction
 from rps_pin.rps.robot import RPSRobot
 
@@ -75,18 +75,17 @@ class ConstrainedForces:
         Reactions are those of `RPSRobot.inverse_dynamics`: the force of each leg on the platform,
         in base axes.
         """
-        one, two, three = state.legs
+        (phi1, phi2, phi3), (d1, d2, d3) = state.place.angle, state.place.length
+        (w1, s1, dw1, ds1), (w2, s2, dw2, ds2), (w3, s3, dw3, ds3) = state.legs
         # The tree's order: revolute and prismatic joint of each leg, then the platform.
         _STATE.pack_into(
             self._memory,
             0,
-            *(one.angle, one.length, two.angle, two.length, three.angle, three.length),
+            *(phi1, d1, phi2, d2, phi3, d3),
             *state.placement,
-            *(one.angle_rate, one.speed, two.angle_rate, two.speed, three.angle_rate, three.speed),
+            *(w1, s1, w2, s2, w3, s3),
             *state.velocity,
-            *(one.angle_acceleration, one.acceleration),
-            *(two.angle_acceleration, two.acceleration),
-            *(three.angle_acceleration, three.acceleration),
+            *(dw1, ds1, dw2, ds2, dw3, ds3),
             *state.acceleration,
         )
         return self.solve_state(self._q, self._v, self._a)
@@ -114,26 +113,3 @@ class ConstrainedForces:
             damping, dry = self._prismatic if index % 2 else self._revolute
             speed = speeds[index]
             force[index] += damping * speed + dry * math.tanh(speed / self._friction_speed)
-
-
-def turning_determinant(legs: tuple[LegState, LegState, LegState], g: float, h: float) -> float:
-    """Return Eq. 8's determinant without unit, at least -1 and at most 1.
-
-    The cosines' determinant of `leg_equations.determinant`: 0 at type II and constraint
-    singularities.
-    """
-    one, two, three = legs
-    reach, side = 3.0 * g, 2.0 * math.sqrt(3.0) * h
-    m1, m2, m3 = (
-        reach - one.length * one.cosine,
-        reach - two.length * two.cosine,
-        reach - three.length * three.cosine,
-    )
-    z1, z2, z3 = one.length * one.sine, two.length * two.sine, three.length * three.sine
-    a1 = m2 * one.sine - 2.0 * z2 * one.cosine
-    a2 = m1 * two.sine - 2.0 * z1 * two.cosine
-    b2 = m3 * two.sine - 2.0 * z3 * two.cosine
-    b3 = m2 * three.sine - 2.0 * z2 * three.cosine
-    c3 = m1 * three.sine - 2.0 * z1 * three.cosine
-    c1 = m3 * one.sine - 2.0 * z3 * one.cosine
-    return (a1 * b2 * c3 + a2 * b3 * c1) / (side * side * side)

@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 
-from rps_pin.control.exponential_map import Coefficients
+from rps_pin.control.place import Place
 from rps_pin.rps.legs import RADIAL, cone_angles, violations
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.pose import rotation
-from rps_pin.rps.scalar_tracking import Lengths, Triple, Way
+from rps_pin.rps.scalar_tracking import Triple
 
 #: Limits are kept to rounding error, m or rad (as in `rps_pin.rps.legs`).
 _ROUNDING = 1e-12
-_RADIAL = [(float(x), float(y)) for x, y, _ in RADIAL]
+(_E1, _E2, _E3) = ((float(x), float(y)) for x, y, _ in RADIAL)
 
 
 class LimitCheck:
@@ -39,31 +39,30 @@ class LimitCheck:
         rest = parameters.spherical_rest_angle
         self._along, self._across = math.cos(rest), math.sin(rest)
 
-    def broken(
-        self, pose: Triple, d: Lengths, angle: Triple, way: Way, coefficient: Coefficients
-    ) -> bool:
+    def broken(self, place: Place) -> bool:
         """Return whether a leg's length, angle or ball joint is beyond its limits."""
+        _, d, angle, _, _ = place
         if min(d) < self._shortest or max(d) > self._longest:
             return True
         if min(angle) < self._least_angle or max(angle) > self._greatest_angle:
             return True
-        return self._cones and self._cone_broken(pose, way, coefficient)
+        return self._cones and self._cone_broken(place)
 
-    def _cone_broken(self, pose: Triple, way: Way, coefficient: Coefficients) -> bool:
+    def _cone_broken(self, place: Place) -> bool:
         """Return whether a leg leaves its ball's cone.
 
         With e and t of `rps_pin.rps.rates` and the leg's direction l = -cos(phi) e_i + sin(phi) z,
         l . n = C sin(phi) - A t cos(phi) and l . R e_i = -(C + B e^2) cos(phi) - A t sin(phi).
         """
-        _, wx, wy = pose
+        (_, wx, wy), _, _, way, coefficient = place
         a, b, c = coefficient[:3]
-        for leg in range(3):
-            ex, ey = _RADIAL[leg]
+        c1, c2, c3, s1, s2, s3 = way
+        along, across, least = self._along, self._across, self._least_cosine
+        for (ex, ey), cosine, sine in ((_E1, c1, s1), (_E2, c2, s2), (_E3, c3, s3)):
             e, at = wx * ex + wy * ey, a * (wy * ex - wx * ey)
-            cosine, sine = way[leg], way[leg + 3]
             normal, radial = c * sine - at * cosine, -(c + b * e * e) * cosine - at * sine
             # The rest axis is cos(r) n - sin(r) R e_i.
-            if self._along * normal - self._across * radial < self._least_cosine:
+            if along * normal - across * radial < least:
                 return True
         return False
 
@@ -75,12 +74,12 @@ class LimitCheck:
         """Return whether an actuator is beyond its force limit."""
         return max(force) > self._greatest_force or min(force) < -self._greatest_force
 
-    def words(self, pose: Triple, d: Lengths, angle: Triple) -> list[str]:
+    def words(self, place: Place) -> list[str]:
         """Return a sentence for each limit of length, angle or ball joint that is broken."""
         p = self._parameters
-        turn = rotation(np.array(pose))
-        cone = cone_angles(np.array(angle), turn, p.spherical_rest_angle)
-        return [str(one) for one in violations(p, np.array(d), np.array(angle), cone)]
+        length, angle = np.array(place.length), np.array(place.angle)
+        cone = cone_angles(angle, rotation(np.array(place.pose)), p.spherical_rest_angle)
+        return [str(one) for one in violations(p, length, angle, cone)]
 
     def words_of_speeds(self, speed: Triple) -> list[str]:
         """Return a sentence for each actuator beyond its speed limit."""

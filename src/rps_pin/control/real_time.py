@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.control.answers import Answers
-from rps_pin.control.constrained_forces import ConstrainedForces, turning_determinant
+from rps_pin.control.constrained_forces import ConstrainedForces
 from rps_pin.control.exponential_map import coefficients
 from rps_pin.control.limit_check import LimitCheck
-from rps_pin.control.scalar_rates import LeastGain, Twist, leg_gains, platform_twist, pose_rate
-from rps_pin.control.scalar_state import robot_state
+from rps_pin.control.numbers import Numbers, elapsed_time, three_floats
+from rps_pin.control.place import Place, place_of, turning_determinant
+from rps_pin.control.scalar_rates import (
+    LeastGain,
+    LegGains,
+    Twist,
+    leg_gains,
+    platform_twist,
+    pose_rate,
+)
+from rps_pin.control.scalar_state import RobotState, state_at
 from rps_pin.control.speed_filter import SpeedFilter
 from rps_pin.control.status import STATUSES, Status
 from rps_pin.errors import InputError, SingularityError
@@ -44,14 +53,15 @@ _NO_FORCES = 1e-8
 _LARGEST_TILT_SQUARED = (2 * math.pi * (1 - 1e-6)) ** 2
 
 
-class _Known(NamedTuple):
+class Known(NamedTuple):
     """What the last good reading said."""
 
-    length: Triple
-    way: Way
-    pose: Triple
-    angle: Triple
+    place: Place
+    rate: Triple
+    """Of the pose."""
     speed: Triple
+    """Of the legs."""
+    gains: LegGains
 
 
 class RealTimeRobot:
@@ -88,12 +98,13 @@ class RealTimeRobot:
         The last good answers.
     status, force_status : Status
         Of the last `estimate` and the last `inverse_dynamics`.
+    elapsed : float
+        Time since the last good estimate, s.
     age, force_age : int
         Ticks since the last good answer of each: 0 if the last call gave one.
-    distance : float
-        Of the last good pose to a type II singularity: `SingularityMeasures.type_ii`, 0 to 1.
     determinant : float
-        The same with sign and smooth: `SingularityMeasures.determinant`.
+        Of the last good pose, 0 at a type II singularity: `SingularityMeasures.determinant`, -1 to
+        1. `distance` is never less than its size.
     force_determinant : float
         Of the last good `inverse_dynamics`: `leg_equations.determinant`, -1 to 1, which vanishes at
         type II and constraint singularities.
@@ -124,7 +135,7 @@ class RealTimeRobot:
         self._g, self._h = p.base_radius, p.platform_radius
         self._longest = _BEYOND_SENSE * (self._g + self._h)
         self._limits = LimitCheck(p)
-        self._forces, self._least = ConstrainedForces(robot), LeastGain()
+        self.dynamics, self._least = ConstrainedForces(robot), LeastGain()
         self._period = checked_positive(period, "period")
         self._filter = SpeedFilter(_positive(cut_off, "cut_off"))
         self._near = checked_positive(near_singular, "near_singular")
@@ -150,9 +161,11 @@ class RealTimeRobot:
                 condition,
                 CONDITION_LIMIT,
             )
-        self.age, self._elapsed, self._fraction = 0, 0.0, 1.0
-        self.distance, self.determinant = 0.0, 0.0
+        self.age, self.elapsed, self._fraction = 0, 0.0, 1.0
+        self._distance: float | None = None
+        self.determinant = 0.0
         self._asked: Triple | None = d
+        self._place_number = 0
         self.status = self._accept(d, way, (0.0, 0.0, 0.0))
         self._filter.reset()
         self.force_status, self.force_age, self.force_determinant = Status.OK, 0, 0.0
@@ -162,7 +175,7 @@ class RealTimeRobot:
     # Each tick ------------------------------------------------------------------------------------
 
     def estimate(
-        self, length: ArrayLike, speed: ArrayLike | None = None, *, dt: float | None = None
+        self, length: Numbers, speed: Numbers | None = None, *, dt: float | None = None
     ) -> Status:
         """Take a reading of the encoders; put pose, rate, twist, angles and speeds in `answers`.
 
@@ -177,28 +190,28 @@ class RealTimeRobot:
         dt
             Time since the last call, s, if not the period.
         """
-        elapsed = self._elapsed + (self._period if dt is None else dt)
-        if not self._elapsed < elapsed < math.inf:
+        elapsed = self.elapsed + (self._period if dt is None else elapsed_time(dt))
+        if not self.elapsed < elapsed < math.inf:
             return self._keep(_BAD_INPUT)
-        self._elapsed = elapsed
-        self._asked = d = _three_floats(length)
+        self.elapsed = elapsed
+        self._asked = d = three_floats(length)
         if d is None or not (min(d) > 0.0 and max(d) < self._longest):
             return self._keep(_BAD_INPUT)
-        last = self._known.length
+        last = self.known.place.length
         jump = max(abs(d[0] - last[0]), abs(d[1] - last[1]), abs(d[2] - last[2]))
         if jump > self._jump * (self.age + 1):
             return self._keep(_JUMP)
-        rates = self._filter.after(d, elapsed) if speed is None else _three_floats(speed)
+        rates = self._filter.after(d, elapsed) if speed is None else three_floats(speed)
         if rates is None:
             return self._keep(_BAD_INPUT)
         way, _, self._fraction = follow(
-            last, self._known.way, d, self._g, self._h, CONDITION_LIMIT, self._most
+            last, self.known.place.way, d, self._g, self._h, CONDITION_LIMIT, self._most
         )
         if self._fraction < 1.0:
             return self._keep(_NOT_CONVERGED)
         return self._accept(d, way, rates)
 
-    def inverse_dynamics(self, pose: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Status:
+    def inverse_dynamics(self, pose: Numbers, rate: Numbers, acceleration: Numbers) -> Status:
         """Put the forces and reactions of a motion, `answers.pose` or any other, in `answers`.
 
         They are those of `RPSRobot.inverse_dynamics`, through the constraint models, with payload
@@ -209,45 +222,49 @@ class RealTimeRobot:
         pose, rate, acceleration
             Pose (m, rad, rad) and its first and second time derivatives, shape (3,) each.
         """
-        x, dx, ddx = _three_floats(pose), _three_floats(rate), _three_floats(acceleration)
+        x, dx, ddx = three_floats(pose), three_floats(rate), three_floats(acceleration)
         self._wanted = x
         if x is None or dx is None or ddx is None:
             return self._keep_forces(_BAD_INPUT)
         if not (x[1] * x[1] + x[2] * x[2] < _LARGEST_TILT_SQUARED and abs(x[0]) < self._longest):
             return self._keep_forces(_BAD_INPUT)
-        state = robot_state(x, dx, ddx, self._g, self._h)
-        if state is None:
+        place = place_of(x, self._g, self._h)
+        if place is None:
             return self._keep_forces(_NOT_CONVERGED | _BEYOND_LIMIT)
-        determinant = turning_determinant(state.legs, self._g, self._h)
-        number = 0 if abs(determinant) >= self._near else _NEAR_SINGULAR
-        if abs(determinant) < _NO_FORCES:
-            return self._keep_forces(number | _NOT_CONVERGED)
-        solved = self._forces.solve(state)
-        if solved is None:  # rates so large that forces overflow
+        number = _BEYOND_LIMIT if self._limits.broken(place) else 0
+        return self._answer(state_at(place, dx, ddx, self._h), number)
+
+    def forces_for(self, acceleration: Numbers) -> Status:
+        """Put the forces that give the last good estimate an acceleration in `answers`.
+
+        The same as `inverse_dynamics` of `answers.pose`, `answers.rate` and this acceleration, to
+        rounding error, in less time.
+
+        Parameters
+        ----------
+        acceleration
+            The pose's second time derivative, shape (3,).
+        """
+        place, rate, _, _ = self.known
+        self._wanted = place.pose
+        ddx = three_floats(acceleration)
+        if ddx is None:
             return self._keep_forces(_BAD_INPUT)
-        forces = solved[9:]
-        one, two, three = state.legs
-        if self._limits.too_strong(forces) or self._limits.broken(
-            x,
-            (one.length, two.length, three.length),
-            (one.angle, two.angle, three.angle),
-            (one.cosine, two.cosine, three.cosine, one.sine, two.sine, three.sine),
-            state.coefficient,
-        ):
-            number |= _BEYOND_LIMIT
-        out = self.answers.forces
-        out[0], out[1], out[2] = forces
-        self.answers.reactions[:] = solved[:9]
-        self.force_age, self.force_determinant = 0, determinant
-        self.force_status = status = STATUSES[number]
-        return status
+        return self._answer(state_at(place, rate, ddx, self._h), self._place_number)
 
     # On demand ------------------------------------------------------------------------------------
 
     @property
+    def distance(self) -> float:
+        """Of the last good pose to a type II singularity: `SingularityMeasures.type_ii`, 0 to 1."""
+        if self._distance is None:
+            self._distance = self._least.of(self.known.gains)
+        return self._distance
+
+    @property
     def status_text(self) -> str:
         """The reasons of `status`, in words."""
-        status, known = self.status, self._known
+        status, known = self.status, self.known
         words = []
         if status & Status.BAD_INPUT:
             words.append(
@@ -257,7 +274,7 @@ class RealTimeRobot:
         if status & Status.JUMP:
             words.append(
                 f"lengths {_shown(self._asked)} m are more than {self._jump:.6g} m a tick from the "
-                f"last good ones, {_shown(known.length)} m"
+                f"last good ones, {_shown(known.place.length)} m"
             )
         if status & Status.NOT_CONVERGED:
             words.append(
@@ -272,7 +289,7 @@ class RealTimeRobot:
                 f"{self._near:.3g} is asked for"
             )
         if status & Status.BEYOND_LIMIT:
-            words += self._limits.words(known.pose, known.length, known.angle)
+            words += self._limits.words(known.place)
             words += self._limits.words_of_speeds(known.speed)
         return "; ".join(words) or "ok"
 
@@ -320,15 +337,39 @@ class RealTimeRobot:
             math.atan2(way[4], way[1]),
             math.atan2(way[5], way[2]),
         )
-        self.distance, self.determinant = self._least.of(gains), gains.determinant
-        number = _NEAR_SINGULAR if self.distance < self._near else 0
-        if self._limits.broken(pose, d, angle, way, coefficient) or self._limits.too_fast(speed):
-            number |= _BEYOND_LIMIT
-        self._known = _Known(d, way, pose, angle, speed)
+        place = Place(pose, d, angle, way, coefficient)
+        self._distance, self.determinant = None, gains.determinant
+        number = self._place_number = _BEYOND_LIMIT if self._limits.broken(place) else 0
+        if self._limits.too_fast(speed):
+            number = _BEYOND_LIMIT
+        self.known = Known(place, rate, speed, gains)
+        # No singular value of M is above 1: none is below the determinant's size.
+        if not abs(gains.determinant) >= self._near and self.distance < self._near:
+            number |= _NEAR_SINGULAR
         self._filter.follow(d, speed)
         self._write(pose, rate, twist, angle, speed)
-        self.age, self._elapsed = 0, 0.0
+        self.age, self.elapsed = 0, 0.0
         self.status = status = STATUSES[number]
+        return status
+
+    def _answer(self, state: RobotState, number: int) -> Status:
+        """Put the forces of a motion in the answers, if they are determined."""
+        determinant = turning_determinant(state.place, self._g, self._h)
+        if not abs(determinant) >= self._near:
+            number |= _NEAR_SINGULAR
+            if not abs(determinant) >= _NO_FORCES:
+                return self._keep_forces(number & ~_BEYOND_LIMIT | _NOT_CONVERGED)
+        solved = self.dynamics.solve(state)
+        if solved is None:  # rates so large that forces overflow
+            return self._keep_forces(_BAD_INPUT)
+        forces = solved[9:]
+        if self._limits.too_strong(forces):
+            number |= _BEYOND_LIMIT
+        out = self.answers.forces
+        out[0], out[1], out[2] = forces
+        self.answers.reactions[:] = solved[:9]
+        self.force_age, self.force_determinant = 0, determinant
+        self.force_status = status = STATUSES[number]
         return status
 
     def _write(
@@ -343,14 +384,10 @@ class RealTimeRobot:
         to_speed[0], to_speed[1], to_speed[2] = speed
 
     def _words_of_motion(self, pose: Triple) -> list[str]:
-        still = (0.0, 0.0, 0.0)
-        state = robot_state(pose, still, still, self._g, self._h)
-        if state is None:
+        place = place_of(pose, self._g, self._h)
+        if place is None:
             return ["a leg has no length, and so no direction"]
-        one, two, three = state.legs
-        words = self._limits.words(
-            pose, (one.length, two.length, three.length), (one.angle, two.angle, three.angle)
-        )
+        words = self._limits.words(place)
         f1, f2, f3 = self.answers.forces.tolist()
         return words + self._limits.words_of_forces((f1, f2, f3))
 
@@ -367,17 +404,6 @@ class RealTimeRobot:
         self.force_age += 1
         self.force_status = status = STATUSES[number]
         return status
-
-
-def _three_floats(values: ArrayLike) -> Triple | None:
-    """Return three finite floats, or None if these are not."""
-    try:
-        three: Any = values.tolist() if isinstance(values, np.ndarray) else values
-        a, b, c = three
-        a, b, c = float(a), float(b), float(c)
-    except (TypeError, ValueError, OverflowError):
-        return None
-    return (a, b, c) if math.isfinite(a + b + c) else None
 
 
 def _positive(value: float, name: str) -> float:

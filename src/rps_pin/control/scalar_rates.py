@@ -24,20 +24,22 @@ Twist = tuple[float, float, float, float, float, float]
 
 
 class LegGains(NamedTuple):
-    """K and M, row by row (legs), and det M."""
+    """K row by row (legs), L, and det M of M = K L^-T."""
 
     K: tuple[Triple, Triple, Triple]
     """d' = K pose': 1, m/rad, m/rad."""
-    M: tuple[Triple, Triple, Triple]
-    """Leg speed by platform speed; the least singular value is the distance to type II."""
+    L: tuple[Triple, Triple, Triple]
+    """|L' pose'|^2 is the sum of the balls' squared speeds; lower, m and m/rad."""
     determinant: float
     """Of M, -1 to 1: `SingularityMeasures.determinant`."""
+    by_legs: float
+    """Of K, m^2/rad^2."""
 
 
 def leg_gains(pose: Triple, way: Way, coefficient: Coefficients, h: float) -> LegGains:
     """Return the gains of a pose whose legs point along `way`.
 
-    With U and W the tips' Jacobians, 3 Q = U'U + W'W = L L' (L lower) and M = K L^-T.
+    With U and W the tips' Jacobians, U'U + W'W = L L' (L lower) and M = K L^-T.
     """
     _, wx, wy = pose
     c1, c2, c3, s1, s2, s3 = way
@@ -54,15 +56,11 @@ def leg_gains(pose: Triple, way: Way, coefficient: Coefficients, h: float) -> Le
     l11 = math.sqrt(q11 - l10 * l10)
     l21 = (q12 - l10 * l20) / l11
     l22 = math.sqrt(q22 - l20 * l20 - l21 * l21)
-    a1, a2, a3 = s1 / _SQRT3, s2 / _SQRT3, s3 / _SQRT3
-    b1, b2, b3 = (kx1 - l10 * a1) / l11, (kx2 - l10 * a2) / l11, (kx3 - l10 * a3) / l11
-    d1 = (ky1 - l20 * a1 - l21 * b1) / l22
-    d2 = (ky2 - l20 * a2 - l21 * b2) / l22
-    d3 = (ky3 - l20 * a3 - l21 * b3) / l22
-    det = a1 * (b2 * d3 - b3 * d2) + a2 * (b3 * d1 - b1 * d3) + a3 * (b1 * d2 - b2 * d1)
+    det = s1 * (kx2 * ky3 - kx3 * ky2) + s2 * (kx3 * ky1 - kx1 * ky3) + s3 * (kx1 * ky2 - kx2 * ky1)
     return LegGains(
         ((s1, kx1, ky1), (s2, kx2, ky2), (s3, kx3, ky3)),
-        ((a1, b1, d1), (a2, b2, d2), (a3, b3, d3)),
+        ((_SQRT3, 0.0, 0.0), (l10, l11, 0.0), (l20, l21, l22)),
+        det / (_SQRT3 * l11 * l22),
         det,
     )
 
@@ -77,8 +75,13 @@ class LeastGain:
 
     def of(self, gains: LegGains) -> float:
         """Return the distance to type II, `SingularityMeasures.type_ii`."""
-        one, two, three = gains.M
-        _NINE.pack_into(self._memory, 0, *one, *two, *three)
+        _, (l10, l11, _), (l20, l21, l22) = gains.L
+        rows: list[float] = []
+        for s, kx, ky in gains.K:  # K L^-T: forwards through L
+            a = s / _SQRT3
+            b = (kx - l10 * a) / l11
+            rows += (a, b, (ky - l20 * a - l21 * b) / l22)
+        _NINE.pack_into(self._memory, 0, *rows)
         self._svd.compute(self._matrix)
         least: float = self._svd.singularValues().item(2)
         return least
@@ -89,11 +92,48 @@ def pose_rate(gains: LegGains, speed: Triple) -> Triple:
     (k11, k12, k13), (k21, k22, k23), (k31, k32, k33) = gains.K
     d1, d2, d3 = speed
     i11, i21, i31 = k22 * k33 - k23 * k32, k23 * k31 - k21 * k33, k21 * k32 - k22 * k31
-    det = k11 * i11 + k12 * i21 + k13 * i31
+    det = gains.by_legs
     return (
         (i11 * d1 + (k13 * k32 - k12 * k33) * d2 + (k12 * k23 - k13 * k22) * d3) / det,
         (i21 * d1 + (k11 * k33 - k13 * k31) * d2 + (k13 * k21 - k11 * k23) * d3) / det,
         (i31 * d1 + (k12 * k31 - k11 * k32) * d2 + (k11 * k22 - k12 * k21) * d3) / det,
+    )
+
+
+def force_of_wrench(gains: LegGains, wrench: Triple) -> Triple:
+    """Return f with K' f = wrench on the pose: Cramer's rule. The determinant must not be zero."""
+    (k11, k12, k13), (k21, k22, k23), (k31, k32, k33) = gains.K
+    w1, w2, w3 = wrench
+    i11, i21, i31 = k22 * k33 - k23 * k32, k23 * k31 - k21 * k33, k21 * k32 - k22 * k31
+    det = gains.by_legs
+    return (
+        (i11 * w1 + i21 * w2 + i31 * w3) / det,
+        ((k13 * k32 - k12 * k33) * w1 + (k11 * k33 - k13 * k31) * w2 + (k12 * k31 - k11 * k32) * w3)
+        / det,
+        ((k12 * k23 - k13 * k22) * w1 + (k13 * k21 - k11 * k23) * w2 + (k11 * k22 - k12 * k21) * w3)
+        / det,
+    )
+
+
+def wrench_of_force(gains: LegGains, force: Triple) -> Triple:
+    """Return K' f: N, N m, N m."""
+    (k11, k12, k13), (k21, k22, k23), (k31, k32, k33) = gains.K
+    f1, f2, f3 = force
+    return (
+        k11 * f1 + k21 * f2 + k31 * f3,
+        k12 * f1 + k22 * f2 + k32 * f3,
+        k13 * f1 + k23 * f2 + k33 * f3,
+    )
+
+
+def leg_speed(gains: LegGains, rate: Triple) -> Triple:
+    """Return K pose', m/s; or K pose'', m/s^2, the legs' accelerations without their drift."""
+    (k11, k12, k13), (k21, k22, k23), (k31, k32, k33) = gains.K
+    x1, x2, x3 = rate
+    return (
+        k11 * x1 + k12 * x2 + k13 * x3,
+        k21 * x1 + k22 * x2 + k23 * x3,
+        k31 * x1 + k32 * x2 + k33 * x3,
     )
 
 

@@ -1,7 +1,6 @@
 """The whole Pinocchio state of a motion of the platform, in plain floats: `RPSRobot.state`.
 
-A leg's tip stands at rho_i = h (1 + B f / 2), f = e^2 - 3 t^2, and z_i = z - h A t in its plane
-(see `rps_pin.rps.rates`). Both are differentiated twice, and made polar coordinates.
+The tips of `rps_pin.control.place` are differentiated twice, and made polar coordinates.
 """
 
 from __future__ import annotations
@@ -9,64 +8,51 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rps_pin.control.exponential_map import Coefficients, coefficients
+from rps_pin.control.place import Place
 from rps_pin.rps.legs import RADIAL
 from rps_pin.rps.scalar_tracking import Triple
 
 (_E1, _E2, _E3) = ((float(x), float(y)) for x, y, _ in RADIAL)
 
+#: How a leg moves: phi', d', phi'', d''. A plain tuple: it is made thrice a tick.
+LegMotion = tuple[float, float, float, float]
 #: A, A', A'', B, B', B'', D, D' along the motion.
 _Changing = tuple[float, float, float, float, float, float, float, float]
-
-
-class LegState(NamedTuple):
-    """One leg's angle and length with their derivatives, and its direction."""
-
-    angle: float
-    length: float
-    angle_rate: float
-    speed: float
-    angle_acceleration: float
-    acceleration: float
-    cosine: float
-    sine: float
 
 
 class RobotState(NamedTuple):
     """Legs 1, 2, 3, and the platform as Pinocchio's free-flyer has it."""
 
-    legs: tuple[LegState, LegState, LegState]
+    place: Place
+    legs: tuple[LegMotion, LegMotion, LegMotion]
     placement: tuple[float, ...]
     """Centre and quaternion (x, y, z, w), seven numbers."""
     velocity: tuple[float, ...]
     """In platform axes: linear, then angular, six numbers."""
     acceleration: tuple[float, ...]
     """Spatial, in platform axes, six numbers."""
-    coefficient: Coefficients
-    """Of the exponential map, at the pose."""
 
 
-def robot_state(
-    pose: Triple, rate: Triple, acceleration: Triple, g: float, h: float
-) -> RobotState | None:
-    """Return the state, or None where a leg has no length; the tilt below a whole turn."""
+def state_at(place: Place, rate: Triple, acceleration: Triple, h: float) -> RobotState:
+    """Return the state at a place, of the pose's first and second derivative."""
+    pose, _, _, _, coefficient = place
     _, wx, wy = pose
     _, dwx, dwy = rate
     _, ddwx, ddwy = acceleration
-    coefficient = coefficients(wx * wx + wy * wy)
     a, b, _, d, a_s, b_s, d_s, a_ss, b_ss = coefficient
     ds = 2.0 * (wx * dwx + wy * dwy)
     dds = 2.0 * (dwx * dwx + dwy * dwy + wx * ddwx + wy * ddwy)
     da, dda = a_s * ds, a_ss * ds * ds + a_s * dds
     db, ddb = b_s * ds, b_ss * ds * ds + b_s * dds
     changing = (a, da, dda, b, db, ddb, d, d_s * ds)
-    leg_1 = _leg(_E1, pose, rate, acceleration, changing, g, h)
-    leg_2 = _leg(_E2, pose, rate, acceleration, changing, g, h)
-    leg_3 = _leg(_E3, pose, rate, acceleration, changing, g, h)
-    if leg_1 is None or leg_2 is None or leg_3 is None:
-        return None
-    placement, velocity, pull = _platform(pose, rate, acceleration, changing, coefficient[2], h)
-    return RobotState((leg_1, leg_2, leg_3), placement, velocity, pull, coefficient)
+    legs = (
+        _leg(0, _E1, place, rate, acceleration, changing, h),
+        _leg(1, _E2, place, rate, acceleration, changing, h),
+        _leg(2, _E3, place, rate, acceleration, changing, h),
+    )
+    return RobotState(
+        place, legs, *_platform(pose, rate, acceleration, changing, coefficient[2], h)
+    )
 
 
 def _platform(
@@ -114,17 +100,17 @@ def _platform(
 
 
 def _leg(
+    number: int,
     radial: tuple[float, float],
-    pose: Triple,
+    place: Place,
     rate: Triple,
     acceleration: Triple,
     changing: _Changing,
-    g: float,
     h: float,
-) -> LegState | None:
-    """Return a leg's state, or None if it has no length."""
+) -> LegMotion:
+    """Return how a leg moves."""
     ex, ey = radial
-    z, wx, wy = pose
+    _, wx, wy = place.pose
     dz, dwx, dwy = rate
     ddz, ddwx, ddwy = acceleration
     a, da, dda, b, db, ddb, _, _ = changing
@@ -133,25 +119,16 @@ def _leg(
     dde, ddt = ddwx * ex + ddwy * ey, ddwy * ex - ddwx * ey
     f, df = e * e - 3.0 * t * t, 2.0 * (e * de - 3.0 * t * dt)
     ddf = 2.0 * (de * de - 3.0 * dt * dt + e * dde - 3.0 * t * ddt)
-
-    inwards, up = g - h * (1.0 + b * f / 2.0), z - h * a * t
-    d = math.hypot(inwards, up)
-    if d < 1e-9 * g:
-        return None
-    cosine, sine = inwards / d, up / d
     d_in, d_up = -h / 2.0 * (db * f + b * df), dz - h * (da * t + a * dt)
     dd_in = -h / 2.0 * (ddb * f + 2.0 * db * df + b * ddf)
     dd_up = ddz - h * (dda * t + 2.0 * da * dt + a * ddt)
     # Polar coordinates: radial d'' - d phi'^2, across d phi'' + 2 d' phi'.
+    d, cosine, sine = place.length[number], place.way[number], place.way[number + 3]
     speed = cosine * d_in + sine * d_up
     angle_rate = (cosine * d_up - sine * d_in) / d
-    return LegState(
-        math.atan2(up, inwards),
-        d,
+    return (
         angle_rate,
         speed,
         (cosine * dd_up - sine * dd_in - 2.0 * speed * angle_rate) / d,
         cosine * dd_in + sine * dd_up + d * angle_rate * angle_rate,
-        cosine,
-        sine,
     )

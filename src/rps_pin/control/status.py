@@ -9,7 +9,8 @@ class Status(IntFlag):
     """Reasons, which can come together; `OK` (zero) if there is none.
 
     With `BAD_INPUT`, `JUMP` or `NOT_CONVERGED` there is no new answer: the last good one is kept
-    (see `kept`). With the others the answer is new and right, and asks for attention.
+    (see `kept`). With the others the answer is new and right, and asks for attention. The last
+    three are a controller's own.
     """
 
     OK = 0
@@ -23,6 +24,12 @@ class Status(IntFlag):
     NEAR_SINGULAR = 8
     #: A leg's length, angle, ball joint, speed or force is beyond the robot's limits.
     BEYOND_LIMIT = 16
+    #: The law's forces are beyond a limit: those nearest in effect are sent.
+    SATURATED = 32
+    #: The target was refused: not finite, beyond the robot's limits, or too near a singularity.
+    TARGET_HELD = 64
+    #: The controller has given up: it brakes, or holds the weight, until it is reset.
+    STOPPED = 128
 
     @property
     def kept(self) -> bool:
@@ -34,4 +41,4 @@ class Status(IntFlag):
 KEPT = Status.BAD_INPUT | Status.JUMP | Status.NOT_CONVERGED
 
 #: Every combination, by its number: making one anew takes microseconds.
-STATUSES = tuple(Status(number) for number in range(32))
+STATUSES = tuple(Status(number) for number in range(256))

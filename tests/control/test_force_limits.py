@@ -1,0 +1,103 @@
+"""Forces within limits: optimal by SciPy's own solver, exact at the limits, and in no doubt."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from rps_pin import RPSRobot
+from rps_pin.control.force_limits import ForceLimits
+from rps_pin.control.place import place_of
+from rps_pin.control.reduced_mass import ReducedMass
+from rps_pin.control.scalar_rates import LegGains, leg_gains
+from tests import strategies
+
+Array = NDArray[np.float64]
+ALONG = 0.01
+
+
+def places(count: int, seed: int) -> list[tuple[Array, LegGains]]:
+    rng = np.random.default_rng(seed)
+    found = []
+    while len(found) < count:
+        p = strategies.random_parameters(rng)
+        reduced = ReducedMass(RPSRobot(p))
+        for x, y, z in strategies.random_motions(rng, p, 20)[0].tolist():
+            place = place_of((x, y, z), p.base_radius, p.platform_radius)
+            assert place is not None
+            gains = leg_gains(place.pose, place.way, place.coefficient, p.platform_radius)
+            if abs(gains.determinant) > 0.05:
+                found.append((reduced.of(place), gains))
+    return found
+
+
+def cost_matrix(mass: Array, gains: LegGains, path: Array) -> Array:
+    """A matrix whose squared norm, applied to a change of forces, is what is to be least.
+
+    By the balls' accelerations: the part along the path's own, and the rest, apart.
+    """
+    effect = np.linalg.inv(mass) @ np.array(gains.K).T
+    balls, along = np.array(gains.L).T @ effect, np.array(gains.L).T @ path
+    if not along.any():
+        return balls
+    n = along / np.linalg.norm(along)
+    part = np.outer(n, n) @ balls
+    return np.vstack([balls - part, math.sqrt(ALONG) * part])
+
+
+@pytest.mark.parametrize("size", [1.01, 3.0, 100.0, 1e6])
+def test_forces_are_the_optimum(size: float) -> None:
+    rng = np.random.default_rng(1)
+    moved = 0
+    for mass, gains in places(300, 2):
+        limit = rng.uniform(1.0, 50.0, 3)
+        wanted = limit * rng.uniform(-size, size, 3)
+        path = rng.normal(size=3) * rng.integers(0, 2)
+        l1, l2, l3 = limit.tolist()
+        f1, f2, f3 = wanted.tolist()
+        x1, x2, x3 = path.tolist()
+        limits = ForceLimits((l1, l2, l3), ALONG)
+        found = limits.nearest((f1, f2, f3), mass, gains, (x1, x2, x3))
+        assert found.solved
+        force = np.array(found.force)
+        assert (np.abs(force) <= limit).all()
+        matrix = cost_matrix(mass, gains, path)
+        best = lsq_linear(
+            matrix * limit, matrix @ wanted, (-np.ones(3), np.ones(3)), method="bvls", tol=1e-14
+        )
+        cost = float(np.sum((matrix @ (force - wanted)) ** 2)) / 2
+        scale = max(best.cost, float(np.sum((matrix * limit) ** 2)))
+        assert cost - best.cost <= 1e-7 * scale
+        missing = np.linalg.solve(mass, np.array(gains.K).T @ (force - wanted))
+        np.testing.assert_allclose(
+            found.missing, missing, rtol=0, atol=1e-9 * np.abs(missing).max()
+        )
+        cut = np.clip(wanted, -limit, limit)
+        moved += not np.allclose(force, cut, rtol=0, atol=1e-3 * limit.max())
+    assert moved > 30 or size < 2  # cutting off one by one is another thing
+
+
+def test_one_problem_for_many_ticks_gives_what_a_new_one_gives() -> None:
+    """Warm starts, among them good ones that are not the solution, change nothing."""
+    rng = np.random.default_rng(3)
+    kept = ForceLimits((10.0, 10.0, 10.0), ALONG)
+    for mass, gains in places(200, 4):
+        f1, f2, f3 = rng.uniform(-40, 40, 3).tolist()
+        found = kept.nearest((f1, f2, f3), mass, gains, (0.1, 0.0, 0.2))
+        new = ForceLimits((10.0, 10.0, 10.0), ALONG).nearest(
+            (f1, f2, f3), mass, gains, (0.1, 0.0, 0.2)
+        )
+        matrix = cost_matrix(mass, gains, np.array([0.1, 0.0, 0.2]))
+        gap = matrix @ (np.array(found.force) - np.array(new.force))
+        assert np.abs(gap).max() <= 1e-5 * np.abs(matrix).max() * 10
+
+
+def test_within_and_cut_know_unlimited_actuators() -> None:
+    limits = ForceLimits((1.0, math.inf, 2.0), ALONG)
+    assert limits.within((1.0, 1e300, -2.0))
+    assert not limits.within((1.0, 0.0, -2.0000001))
+    assert limits.cut((3.0, -1e9, -5.0)) == (1.0, -1e9, -2.0)
