@@ -1,17 +1,20 @@
 """Latency of the control loop's stages: median, p99, p99.9 and maximum; and whether memory grows.
 
-    OPENBLAS_NUM_THREADS=1 .venv/bin/python -m benchmarks.latency [--ticks 1000000]
+    OPENBLAS_NUM_THREADS=1 .venv/bin/python -m benchmarks.latency [--ticks 1000000] [--json FILE]
 
 One thread, one tick after the other, no waiting between them. Python's garbage collector is frozen
-and switched off during the loop, as a control program would do. Each stage's time includes reading
-the clock. Peers, in the same run: the inverse dynamics as Pinocchio's examples would have one write
-it, and the bare Pinocchio calls without any algebra. Linux only (it reads /proc/self/statm).
+and switched off during the loop, as a control program would do (`LoopClock` does). Each stage's
+time includes reading the clock. Peers do a tenth of the ticks, in the same run: the same law
+written with Pinocchio and NumPy, with a quadratic program built at each tick, and with MuJoCo, all
+of which must give our forces to 1e-8 N before anything is measured. Linux only (it reads
+/proc/self/statm).
 """
 
 from __future__ import annotations
 
 import argparse
 import gc
+import json
 import os
 import platform
 import time
@@ -26,15 +29,21 @@ from rich.progress import track
 from rich.table import Table
 
 from benchmarks.bench_inverse_dynamics import plain
+from benchmarks.tick_peers import MujocoTick, PlainTick, QPTick
 from rps_pin import LoopClosure, RPSRobot
-from rps_pin.control import RealTimeRobot
+from rps_pin.control import ComputedTorque, Gains, RealTimeRobot, Status
 from rps_pin.control.constrained_forces import ConstrainedForces
+from rps_pin.control.force_limits import ForceLimits
+from rps_pin.control.place import place_of
+from rps_pin.control.reduced_mass import ReducedMass
+from rps_pin.control.scalar_rates import leg_gains
+from rps_pin.control.scalar_state import state_at
 from rps_pin.rps.rates import leg_jacobians
 
 Array = NDArray[np.float64]
 
 PERIOD = 1e-3
-GAIN, DAMPING = 400.0, 40.0
+GAINS = Gains(400.0, 40.0)
 STATES = 1000
 """The motion is repeated after so many ticks."""
 
@@ -42,7 +51,7 @@ STATES = 1000
 def motion() -> tuple[Array, Array, Array]:
     """Return one second of a motion through the micro robot's workspace, (STATES, 3) each."""
     w = 2 * np.pi * np.array([2.0, 3.0, 5.0])
-    size = np.array([0.006, 0.06, 0.05])
+    size = np.array([0.004, 0.05, 0.04])
     phase = w * PERIOD * np.arange(STATES)[:, None]
     pose = np.array([0.225, 0.0, 0.0]) + size * np.sin(phase)
     return pose, size * w * np.cos(phase), -size * w**2 * np.sin(phase)
@@ -50,43 +59,72 @@ def motion() -> tuple[Array, Array, Array]:
 
 def stages(robot: RPSRobot) -> dict[str, Callable[[int], object]]:
     """Return what a tick of each stage calls, by its number."""
-    pose, rate, acceleration = motion()
-    legs = leg_jacobians(robot.parameters, pose)
+    rows = motion()
+    pose, rate = rows[:2]
+    p = robot.parameters
+    legs = leg_jacobians(p, pose)
     speed = np.einsum("nij,nj->ni", legs.length_jacobian, rate)
-    length = legs.length
+    length, targets = legs.length, list(zip(*rows, strict=True))
     loop = RealTimeRobot(robot, pose[0], period=PERIOD)
-    bare_loop = RealTimeRobot(robot, pose[0], period=PERIOD)
-    states = [robot.state(*row) for row in zip(pose, rate, acceleration, strict=True)]
-    peer = plain(robot)
-    answers = loop.answers
-    wanted = np.stack([pose, rate, acceleration], axis=1).tolist()
+    states = [robot.state(*row) for row in targets]
+    triples = [tuple(tuple(one.tolist()) for one in row) for row in targets]
+    places = [place_of(row[0], p.base_radius, p.platform_radius) for row in triples]
+    solve, peer = ConstrainedForces(robot).solve_state, plain(robot)
 
-    def computed_torque(i: int) -> None:
-        loop.estimate(length[i], speed[i])
-        z, tilt_x, tilt_y = answers.pose.tolist()
-        dz, dtilt_x, dtilt_y = answers.rate.tolist()
-        (x1, x2, x3), (v1, v2, v3), (a1, a2, a3) = wanted[i]
-        # x'' + Kd (x' - x_now') + Kp (x - x_now)
-        command = (
-            a1 + DAMPING * (v1 - dz) + GAIN * (x1 - z),
-            a2 + DAMPING * (v2 - dtilt_x) + GAIN * (x2 - tilt_x),
-            a3 + DAMPING * (v3 - dtilt_y) + GAIN * (x3 - tilt_y),
-        )
-        loop.inverse_dynamics(answers.pose, answers.rate, command)
+    def controller(force_limit: float | None = None, **settings: str) -> ComputedTorque:
+        return ComputedTorque(robot, pose[0], GAINS, force_limit=force_limit, **settings)
 
-    solve = ConstrainedForces(robot).solve_state
+    by_pose, by_legs = controller(), controller(space="actuator")
+    weak = controller(force_limit=4.0)  # the weight alone takes more
     return {
         "clock alone": lambda i: None,
-        "estimate, speeds given": lambda i: loop.estimate(length[i], speed[i]),
-        "estimate, speeds filtered": lambda i: bare_loop.estimate(length[i]),
+        "direct kinematics: estimate": lambda i: loop.estimate(length[i]),
+        "state completion": lambda i: state_at(places[i], *triples[i][1:], p.platform_radius),
         "inverse dynamics, state given": lambda i: solve(*states[i]),
-        "inverse dynamics, from the pose": lambda i: loop.inverse_dynamics(
-            pose[i], rate[i], acceleration[i]
-        ),
-        "computed-torque tick, whole": computed_torque,
-        "peer: RPSRobot.inverse_dynamics": lambda i: robot.inverse_dynamics(*states[i]),
-        "peer: plain Pinocchio and NumPy": lambda i: peer(*states[i]),
-        "peer: bare Pinocchio calls": bare_calls(robot, states),
+        "inverse dynamics, from a pose": lambda i: loop.inverse_dynamics(*targets[i]),
+        "QP: force limits": limited(robot, places),
+        "whole tick, computed torque": lambda i: by_pose.tick(length[i], targets[i]),
+        "the same in actuator space": lambda i: by_legs.tick(length[i], targets[i]),
+        "the same, always saturated": lambda i: weak.tick(length[i], targets[i]),
+        "peer, dynamics: plain Pinocchio": lambda i: peer(*states[i]),
+        "peer, dynamics: bare Pinocchio calls": bare_calls(robot, states),
+        **whole_peers(robot, length, speed, states, targets),
+    }
+
+
+def limited(robot: RPSRobot, places: list) -> Callable[[int], object]:
+    """Return what limits forces that are half as much again as the actuators allow."""
+    reduced, limits = ReducedMass(robot), ForceLimits((4.0, 4.0, 4.0), 0.01)
+    h = robot.parameters.platform_radius
+    cases = [(reduced.of(one), leg_gains(one.pose, one.way, one.coefficient, h)) for one in places]
+    path = (0.01, 0.1, 0.1)
+    return lambda i: limits.nearest((6.0, -3.0 + 0.006 * i, 1.0), *cases[i], path)
+
+
+def whole_peers(
+    robot: RPSRobot, length: Array, speed: Array, states: list, targets: list
+) -> dict[str, Callable[[int], object]]:
+    """Return the peers' whole ticks, having shown that they are ours."""
+    rows = [
+        (q[[1, 3, 5]], v[[1, 3, 5]], a[[1, 3, 5]])  # the legs' target, from the pose's
+        for q, v, a in states
+    ]
+    kp, kd = float(GAINS.rows[0][0]), float(GAINS.rows[1][0])
+    ours = ComputedTorque(robot, targets[0][0], GAINS, space="actuator")
+    peers = {
+        "peer, whole tick: plain Pinocchio": PlainTick(robot, targets[0][0], kp, kd),
+        "peer, whole tick: QP at each tick": QPTick(robot, targets[0][0], kp, kd),
+        "peer, whole tick: MuJoCo": MujocoTick(robot, targets[0][0], kp, kd),
+    }
+    for i in range(STATES):
+        ahead = (i + 3) % STATES  # so that there are errors to feed back
+        assert ours.tick(length[i], targets[ahead], speed[i]) & ~Status.BEYOND_LIMIT == Status.OK
+        for peer in peers.values():
+            found = peer(length[i], speed[i], rows[ahead])
+            np.testing.assert_allclose(found, ours.forces, rtol=0, atol=1e-8)
+    return {
+        name: lambda i, call=call: call(length[i], speed[i], rows[i])
+        for name, call in peers.items()
     }
 
 
@@ -139,31 +177,53 @@ def measured(call: Callable[[int], object], ticks: int, times: Array) -> None:
     times[:ticks] *= 1e-3
 
 
+def measure_all(ticks: int, console: Console) -> dict[str, dict[str, float]]:
+    """Return each stage's percentiles, us, and the memory by which the process grew, kB."""
+    times = np.ones(ticks)  # touched now, so that it does not grow later
+    robot, found = RPSRobot.from_preset("micro"), {}
+    for name, call in track(stages(robot).items(), console=console, transient=True):
+        count = max(ticks // 10, 1) if name.startswith("peer") else ticks
+        measured(call, min(count, 20_000), times)
+        before = resident()
+        measured(call, count, times)
+        median, p99, p999 = np.percentile(times[:count], [50, 99, 99.9]).tolist()
+        found[name] = {
+            "ticks": count,
+            "median": median,
+            "p99": p99,
+            "p99.9": p999,
+            "maximum": float(times[:count].max()),
+            "grew_kB": (resident() - before) / 1024,
+        }
+    return found
+
+
+def machine() -> str:
+    """Return where this was measured."""
+    return (
+        f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; "
+        f"Python {platform.python_version()}, Pinocchio {pin.__version__}, NumPy {np.__version__}"
+    )
+
+
 def main() -> None:
     """Measure all stages and print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--ticks", type=int, default=1_000_000, help="of each stage")
-    ticks = parser.parse_args().ticks
+    parser.add_argument("--json", type=Path, help="write the figures into this file too")
+    asked = parser.parse_args()
     console = Console()
-    table = Table(title=f"us a tick, {ticks:,} ticks a stage, garbage collector off")
-    table.add_column("stage")
-    for column in ("median", "p99", "p99.9", "maximum", "memory grew, kB"):
+    found = measure_all(asked.ticks, console)
+    table = Table("stage", title=f"us a tick, {asked.ticks:,} ticks a stage, peers a tenth")
+    for column in ("median", "p99", "p99.9", "maximum", "grew, kB"):
         table.add_column(column, justify="right")
-    robot = RPSRobot.from_preset("micro")
-    times = np.ones(ticks)  # touched now, so that it does not grow later
-    for name, call in track(stages(robot).items(), console=console, transient=True):
-        measured(call, min(ticks, 20_000), times)
-        before = resident()
-        measured(call, ticks, times)
-        grown = (resident() - before) / 1024
-        row = [*np.percentile(times, [50, 99, 99.9]), times.max()]
-        table.add_row(name, *(f"{value:.2f}" for value in row), f"{grown:.0f}")
+    for name, row in found.items():
+        figures = [row[key] for key in ("median", "p99", "p99.9", "maximum")]
+        table.add_row(name, *(f"{value:.2f}" for value in figures), f"{row['grew_kB']:.0f}")
     console.print(table)
-    load = os.getloadavg()[0]
-    console.print(
-        f"{platform.machine()}, {os.cpu_count()} cores, load {load:.1f}; "
-        f"Python {platform.python_version()}, Pinocchio {pin.__version__}, NumPy {np.__version__}"
-    )
+    console.print(machine(), highlight=False)
+    if asked.json:
+        asked.json.write_text(json.dumps({"machine": machine(), "stages": found}, indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import eigenpy
 import numpy as np
 import proxsuite
 from numpy.typing import NDArray
@@ -62,6 +63,7 @@ class ForceLimits:
         self.limit = limit
         self._along = along
         self._size = np.minimum(limit, 1e12)  # shares of no limit are none
+        self._factors = eigenpy.LDLT(3)
         proxqp = proxsuite.proxqp
         self._solved = proxqp.QPSolverOutput.PROXQP_SOLVED
         self._problem = problem = proxqp.dense.QP(3, 0, 0, True)  # True: bounds on variables
@@ -102,28 +104,41 @@ class ForceLimits:
         path
             The target's rate: m/s, rad/s, rad/s.
         """
-        effect = np.linalg.solve(mass, np.array(gains.K).T)  # B
+        self._factors.compute(mass)
+        effect = self._factors.solve(np.array(gains.K).T)  # B
         goal = np.array(wanted)
-        weighted = self._weighted(np.array(gains.L), effect, path) * self._size
+        weighted = (self._weights(gains.L, path) @ effect) * self._size
         hessian = weighted.T @ weighted
         share = goal / self._size
-        scale = float(hessian.trace()) * max(1.0, float(np.abs(share).max()))
-        hessian /= scale
-        self._problem.update(H=hessian, g=-(hessian @ share))
+        a, b, c = share.tolist()
+        size = float(weighted.ravel().dot(weighted.ravel()))  # the trace
+        hessian /= size * max(1.0, abs(a), abs(b), abs(c))
+        self._problem.update(H=hessian, g=-hessian.dot(share))
         self._problem.solve()
         results = self._problem.results
         found = results.x
-        solved = results.info.status == self._solved and math.isfinite(float(found.sum()))
-        force = self.cut(tuple((found * self._size).tolist()) if solved else wanted)
-        one, two, three = (effect @ (np.array(force) - goal)).tolist()
+        solved = results.info.status == self._solved and math.isfinite(found.sum())
+        f1, f2, f3 = (found * self._size).tolist() if solved else wanted
+        force = self.cut((f1, f2, f3))
+        one, two, three = effect.dot(np.array(force) - goal).tolist()
         return Allowed(force, (one, two, three), solved)
 
-    def _weighted(self, factor: Array, effect: Array, path: Triple) -> Array:
-        """Return W B, for one of the W that there are."""
-        balls = factor.T @ effect
-        along = factor.T @ np.array(path)
-        speed = math.sqrt(float(along @ along))
+    def _weights(self, factor: tuple[Triple, Triple, Triple], path: Triple) -> Array:
+        """Return W = (1 - (1 - sqrt(along)) n n') L', one of those that there are."""
+        (l00, _, _), (l10, l11, _), (l20, l21, l22) = factor
+        p1, p2, p3 = path
+        t1, t2, t3 = l00 * p1 + l10 * p2 + l20 * p3, l11 * p2 + l21 * p3, l22 * p3
+        speed = math.sqrt(t1 * t1 + t2 * t2 + t3 * t3)
         if not speed > _STANDING:
-            return balls
-        n = along / speed
-        return balls - (1.0 - math.sqrt(self._along)) * np.outer(n, n @ balls)
+            return np.array(((l00, l10, l20), (0.0, l11, l21), (0.0, 0.0, l22)))
+        n1, n2, n3 = t1 / speed, t2 / speed, t3 / speed
+        less = 1.0 - math.sqrt(self._along)
+        m1, m2, m3 = n1 * l00, n1 * l10 + n2 * l11, n1 * l20 + n2 * l21 + n3 * l22  # n' L'
+        k1, k2, k3 = less * n1, less * n2, less * n3
+        return np.array(
+            (
+                (l00 - k1 * m1, l10 - k1 * m2, l20 - k1 * m3),
+                (-k2 * m1, l11 - k2 * m2, l21 - k2 * m3),
+                (-k3 * m1, -k3 * m2, l22 - k3 * m3),
+            )
+        )

@@ -9,6 +9,8 @@ and the inertia that the actuators see, with d' = K x', is K^-T M_x K^-1.
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +26,8 @@ Array = NDArray[np.float64]
 
 _UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _STILL = (0.0, 0.0, 0.0)
+#: T (12, 3), column by column, and q (13), one after the other: packed at once.
+_NUMBERS = struct.Struct("49d")
 
 
 class ReducedMass:
@@ -39,21 +43,25 @@ class ReducedMass:
         self._model = robot.mechanism.model
         self._data = self._model.createData()
         self._h = robot.parameters.platform_radius
-        self._q = np.zeros(self._model.nq)
-        self._basis = np.zeros((self._model.nv, 3), order="F")
+        self._memory = bytearray(_NUMBERS.size)
+        numbers = np.frombuffer(self._memory)
+        self._basis, self._q = numbers[:36].reshape(12, 3, order="F"), numbers[36:]
+        self._half = np.triu(np.ones((12, 12)), 1) + np.eye(12) / 2
 
     def of(self, place: Place) -> Array:
         """Return M_x at a place, shape (3, 3): kg, kg m and kg m^2."""
-        for column, unit in enumerate(_UNITS):
+        numbers: list[float] = []
+        for unit in _UNITS:
             state = state_at(place, unit, _STILL, self._h)
             (w1, s1, _, _), (w2, s2, _, _), (w3, s3, _, _) = state.legs
-            self._basis[:, column] = (w1, s1, w2, s2, w3, s3, *state.velocity)
+            numbers += (w1, s1, w2, s2, w3, s3, *state.velocity)
         (phi1, phi2, phi3), (d1, d2, d3) = place.angle, place.length
-        self._q[:] = (phi1, d1, phi2, d2, phi3, d3, *state.placement)
-        mass = np.triu(pin.crba(self._model, self._data, self._q))
-        mass += np.triu(mass, 1).T  # crba fills the upper triangle only
-        reduced: Array = self._basis.T @ mass @ self._basis
-        return reduced
+        numbers += (phi1, d1, phi2, d2, phi3, d3, *state.placement)
+        _NUMBERS.pack_into(self._memory, 0, *numbers)
+        # crba fills the upper triangle only: M = U + U', U with half of the diagonal.
+        upper = pin.crba(self._model, self._data, self._q) * self._half
+        reduced: Array = self._basis.T @ upper @ self._basis
+        return reduced + reduced.T
 
 
 def effective_inertia(robot: RPSRobot, pose: ArrayLike, *, space: str = "actuator") -> Array:
