@@ -12,6 +12,7 @@ from rps_pin.closed_loop.mobility import MechanismDescription
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulated_motion import JointLimitPassed, Simulation
 from rps_pin.closed_loop.simulation import simulate
+from rps_pin.closed_loop.stepping import Stepper
 
 __all__ = [
     "ClosedLoopModel",
@@ -28,6 +29,7 @@ __all__ = [
     "MechanismDescription",
     "Part",
     "Simulation",
+    "Stepper",
     "body",
     "compose",
     "friction_pyramid",

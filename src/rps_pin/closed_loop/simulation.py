@@ -17,24 +17,24 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rps_pin.closed_loop.closed_manifold import ClosedManifold
+from rps_pin.closed_loop.driven_motion import (
+    Controller,
+    Drive,
+    Motion,
+    State,
+    WrenchesInTime,
+    closed_start,
+)
 from rps_pin.closed_loop.integrators import AdaptiveStepper, rk4_step, times
 from rps_pin.closed_loop.simulated_motion import Recorder, Sample, Simulation
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.closed_loop.wrenches import Wrenches
-from rps_pin.errors import ClosureError, InputError, RPSPinError, SingularityError
+from rps_pin.errors import InputError, RPSPinError
 
 if TYPE_CHECKING:
     from rps_pin.closed_loop.model import ClosedLoopModel
 
 Array = NDArray[np.float64]
-State = tuple[Array, Array]
-Controller = Callable[[float, Array, Array], ArrayLike]
-WrenchesInTime = Callable[[float, Array, Array], Wrenches]
 
-#: Gap of an initial configuration, m, and opening rate per speed, above which it is refused.
-OPEN = 1e-9
-_OPENING = 1e-8
 #: How often `progress` is called, about.
 _PROGRESS_CALLS = 200
 
@@ -130,9 +130,9 @@ def simulate(
             raise InputError(f"{name} = {number}: it must be positive and finite")
     if record_every < 1:
         raise InputError(f"record_every = {record_every}: it must be at least 1")
-    drive = _Drive(mechanism, controller, tau, wrenches)
-    start = _closed_start(mechanism, q, v)
-    motion = _Motion(mechanism, start, drive, baumgarte_gain if closing == "baumgarte" else 0.0)
+    drive = Drive(mechanism, controller, tau, wrenches)
+    start = closed_start(mechanism, q, v)
+    motion = Motion(mechanism, start, drive, baumgarte_gain if closing == "baumgarte" else 0.0)
     advance: _Advance = _Fixed(motion)
     if method == "adaptive":
         stepper = AdaptiveStepper(mechanism.model, tolerance, min(step, duration))
@@ -165,87 +165,6 @@ def simulate(
     return recorder.simulation()
 
 
-# What drives it -----------------------------------------------------------------------------------
-
-
-class _Drive:
-    """Actuator forces, held from one command to the next, and wrenches."""
-
-    def __init__(
-        self,
-        mechanism: ClosedLoopModel,
-        controller: Controller | None,
-        tau: ArrayLike | None,
-        wrenches: Wrenches | WrenchesInTime | None,
-    ) -> None:
-        if controller is not None and tau is not None:
-            raise InputError("give a controller or constant forces tau, not both")
-        self._controller, self._size = controller, mechanism.actuated_indices.size
-        given = np.zeros(self._size) if tau is None else tau
-        self.tau = checked_vector(given, self._size, "tau").copy()
-        self._wrenches = wrenches
-
-    def command(self, time: float, q: Array, v: Array) -> None:
-        """Ask the controller, which gets copies of the state."""
-        if self._controller is not None:
-            answer = self._controller(time, q.copy(), v.copy())
-            self.tau = checked_vector(answer, self._size, "the controller's tau").copy()
-
-    def wrenches(self, time: float, q: Array, v: Array) -> Wrenches | None:
-        """Return the wrenches that act now."""
-        given = self._wrenches
-        return given(time, q, v) if callable(given) else given
-
-
-class _Motion:
-    """The dynamics under a drive, on a manifold that each finished step returns to."""
-
-    def __init__(
-        self, mechanism: ClosedLoopModel, start: State, drive: _Drive, gain: float
-    ) -> None:
-        self.model, self._drive, self._gain = mechanism.model, drive, gain
-        self._manifold = ClosedManifold(mechanism, start[0])
-        self.gap = self._manifold.gap
-
-    def acceleration(self, t: float, q: Array, v: Array) -> Array:
-        """Return a, shape (nv,).
-
-        Raises
-        ------
-        SingularityError
-            If the state is not finite, or the motion not determined.
-        """
-        _refuse_infinite(q, v)
-        wrenches = self._drive.wrenches(t, q, v)
-        return self._manifold.acceleration(q, v, self._drive.tau, wrenches, self._gain)
-
-    def finish(self, state: State) -> tuple[State, float]:
-        """Return the state projected, unless Baumgarte's way was chosen, and its largest gap.
-
-        Raises
-        ------
-        SingularityError
-            If the state is not finite, or has lost rows.
-        """
-        q, v = state
-        _refuse_infinite(q, v)
-        if self._gain:
-            gap = self.gap(q)
-        else:
-            q, v, gap = self._manifold.project(q, v)
-        self._manifold.renew(q)
-        return (q, v), gap
-
-
-def _refuse_infinite(q: Array, v: Array) -> None:
-    if not math.isfinite(q.dot(q) + v.dot(v)):
-        raise SingularityError(
-            "the motion grows beyond all numbers (unstable control, or too long a step)",
-            np.inf,
-            np.inf,
-        )
-
-
 # From one time to the next ------------------------------------------------------------------------
 
 
@@ -258,7 +177,7 @@ class _Advance(Protocol):
 class _Fixed:
     """One step of the fixed kind."""
 
-    def __init__(self, motion: _Motion) -> None:
+    def __init__(self, motion: Motion) -> None:
         self._motion = motion
 
     def __call__(
@@ -277,7 +196,7 @@ class _Adaptive:
     """
 
     def __init__(
-        self, motion: _Motion, stepper: AdaptiveStepper, start: State, horizon: float | None
+        self, motion: Motion, stepper: AdaptiveStepper, start: State, horizon: float | None
     ) -> None:
         self._motion, self._stepper, self._horizon = motion, stepper, horizon
         self._time, self._state, self._gap = 0.0, start, 0.0
@@ -319,31 +238,9 @@ def _check_choices(method: str, closing: str) -> None:
             raise InputError(f"{name} = {given!r}; it must be {' or '.join(map(repr, choices))}")
 
 
-def _closed_start(mechanism: ClosedLoopModel, q: ArrayLike, v: ArrayLike | None) -> State:
-    """Return the initial state closed to rounding error, or say how far open it is."""
-    nv = mechanism.model.nv
-    q_ = checked_vector(q, mechanism.model.nq, "q")
-    v_ = np.zeros(nv) if v is None else checked_vector(v, nv, "v")
-    gap = mechanism.loop_gap(q_)
-    if not gap <= OPEN * max(1.0, mechanism.characteristic_length):
-        raise ClosureError(
-            f"the loops are open by {gap:.3g} m at the start; close them with close() first", gap
-        )
-    rates = mechanism.jacobian(q_) @ v_
-    opening = float(np.abs(rates).max(initial=0.0))
-    if opening > _OPENING * max(1.0, float(np.abs(v_).max(initial=0.0))):
-        raise ClosureError(
-            f"v opens the loops at {opening:.3g} m/s (or rad/s) at the start; make it with "
-            "velocity() first",
-            opening,
-        )
-    q_, v_, _ = ClosedManifold(mechanism, q_).project(q_, v_)
-    return q_.copy(), v_.copy()
-
-
 def _sample(
     mechanism: ClosedLoopModel,
-    drive: _Drive,
+    drive: Drive,
     time: float,
     state: State,
     a: Array,

@@ -87,6 +87,8 @@ class Controller(ABC):
     forces : (3,) array
         What to send to the actuators, N: of the last tick. Before the first, those that hold the
         robot still.
+    robot : RPSRobot
+        As given.
     estimate : RealTimeRobot
         What is known of the robot: pose, rate, distance to a singularity.
     status : Status
@@ -112,7 +114,7 @@ class Controller(ABC):
         *,
         space: Space,
         period: float = 1e-3,
-        cut_off: float = 50.0,
+        cut_off: float = 100.0,
         force_limit: ArrayLike | None = None,
         near_singular: float = 0.05,
         stop_singular: float = 0.01,
@@ -135,6 +137,7 @@ class Controller(ABC):
         if not (isinstance(most_lost, int) and most_lost >= 0):
             raise InputError(f"most_lost = {most_lost!r}: it must be a number of ticks, 0 or more")
         jump = 2 * p.actuator_speed_limit * period if largest_jump is None else largest_jump
+        self.robot = robot
         self.estimate = RealTimeRobot(
             robot,
             near,
