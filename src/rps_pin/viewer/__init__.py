@@ -1,6 +1,7 @@
 """Robots in the browser, with Meshcat: a page on disk, or a server on this machine only."""
 
 from rps_pin.viewer.html import write_html
+from rps_pin.viewer.live_view import LiveView
 from rps_pin.viewer.motion import FRAME_RATE, Motion
 from rps_pin.viewer.playback import play
 from rps_pin.viewer.recorder import Recorder
@@ -11,6 +12,7 @@ from rps_pin.viewer.window import Command, RawCommand, Window
 __all__ = [
     "FRAME_RATE",
     "Command",
+    "LiveView",
     "LocalViewer",
     "Motion",
     "RawCommand",

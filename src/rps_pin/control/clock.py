@@ -1,0 +1,201 @@
+"""A clock for control loops: ticks at multiples of a period, and what became of them.
+
+Deadlines are absolute, t_k = t_0 + k T, so that no lateness adds up. (`loop-rate-limiters`, which
+would be the library for this, counts each period from when the last sleep returned: 5000 ticks of
+1 ms took 5.46 s here; and it keeps no count of what is late.) A tick whose body ends
+after the next deadline is an overrun: the deadlines that have passed are skipped and counted, never
+made up for by a burst of short ticks. Tick k is always at time k T, whatever was skipped.
+"""
+
+from __future__ import annotations
+
+import gc
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rich.table import Table
+
+from rps_pin.errors import InputError
+from rps_pin.rps.leg_equations import checked_positive
+
+#: Resolution of the percentiles, s, and the longest time that has one; maxima are exact.
+RESOLUTION = 1e-6
+_BINS = 20_000
+
+
+@dataclass(frozen=True)
+class ClockReport:
+    """What became of a loop's ticks; times in s, percentiles to 1 us (above 20 ms: at least that).
+
+    Attributes
+    ----------
+    period
+        As asked for.
+    ticks
+        That were run.
+    overruns
+        Whose body ended after the next deadline.
+    skipped
+        Deadlines that passed meanwhile, and were not run.
+    late_median, late_p99, late_p999, late_max
+        From a deadline until its tick began.
+    busy_median, busy_p99, busy_p999, busy_max
+        From there until its body ended.
+    """
+
+    period: float
+    ticks: int
+    overruns: int
+    skipped: int
+    late_median: float
+    late_p99: float
+    late_p999: float
+    late_max: float
+    busy_median: float
+    busy_p99: float
+    busy_p999: float
+    busy_max: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data."""
+        return asdict(self)
+
+    def table(self) -> Table:
+        """Return the figures for a terminal."""
+        title = (
+            f"{self.ticks} ticks of {1e3 * self.period:.6g} ms: {self.overruns} overruns, "
+            f"{self.skipped} deadlines skipped"
+        )
+        table = Table("us", "median", "p99", "p99.9", "maximum", title=title)
+        for column in table.columns[1:]:
+            column.justify = "right"
+        for name, kind in (("late", "late"), ("busy", "busy")):
+            row = [getattr(self, f"{kind}_{which}") for which in ("median", "p99", "p999", "max")]
+            table.add_row(name, *(f"{1e6 * value:.0f}" for value in row))
+        return table
+
+
+class LoopClock:
+    """Keeps a loop's rate: ``with LoopClock(1e-3) as clock: for k in clock.ticks(1000): ...``.
+
+    While its ``with`` block lasts, the garbage collector is frozen and switched off, unless told
+    otherwise: a collection takes milliseconds. It is as it was afterwards, whatever happened.
+
+    Parameters
+    ----------
+    period
+        T, s; positive.
+    spin
+        For how long before a deadline to wait without sleeping, s: less lateness, more heat.
+    pause_gc
+        Whether to switch off the garbage collector.
+    now, sleep
+        Where time comes from, for tests.
+
+    Raises
+    ------
+    InputError
+        If a time is negative or not finite.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        *,
+        spin: float = 0.0,
+        pause_gc: bool = True,
+        now: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.period = checked_positive(period, "period")
+        if not 0.0 <= spin < math.inf:
+            raise InputError(f"spin = {spin}: it must be a time, zero or more")
+        self._spin, self._pause_gc = spin, pause_gc
+        self._now, self._sleep = now, sleep
+        self._collecting = False
+        self._late, self._busy = _Times(), _Times()
+        self._overruns = self._skipped = 0
+
+    def __enter__(self) -> LoopClock:
+        self._collecting = self._pause_gc and gc.isenabled()
+        if self._collecting:
+            gc.collect()
+            gc.freeze()
+            gc.disable()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._collecting:
+            gc.enable()
+            gc.unfreeze()
+
+    def ticks(self, count: int | None = None) -> Iterator[int]:
+        """Yield 0, 1, 2, ... at their times, the first at once; some are skipped by overruns.
+
+        Parameters
+        ----------
+        count
+            How many deadlines there are: the last tick is number count - 1 or, if that was skipped,
+            one before. For ever if left out.
+        """
+        now, period = self._now, self.period
+        start, k = now(), 0
+        while count is None or k < count:
+            begin = self._wait(start + k * period)
+            self._late.add(begin - (start + k * period))
+            yield k
+            end = now()
+            self._busy.add(end - begin)
+            k += 1
+            behind = end - (start + k * period)
+            if behind > 0.0:
+                passed = math.floor(behind / period) + 1
+                self._overruns += 1
+                self._skipped += passed if count is None else min(passed, count - k)
+                k += passed
+
+    def report(self) -> ClockReport:
+        """Return what became of the ticks so far."""
+        late, busy = self._late, self._busy
+        return ClockReport(
+            self.period,
+            busy.count,
+            self._overruns,
+            self._skipped,
+            *(*(late.percentile(share) for share in (0.5, 0.99, 0.999)), late.most),
+            *(*(busy.percentile(share) for share in (0.5, 0.99, 0.999)), busy.most),
+        )
+
+    def _wait(self, deadline: float) -> float:
+        """Return the time once a deadline has come."""
+        time_left = deadline - self._now()
+        if time_left > self._spin:
+            self._sleep(time_left - self._spin)
+        while (at := self._now()) < deadline:  # spin, and what a sleep was short of
+            pass
+        return at
+
+
+class _Times:
+    """A histogram of times: memory is allocated once, however many there are."""
+
+    def __init__(self) -> None:
+        self._bins = [0] * (_BINS + 1)
+        self.count, self.most = 0, 0.0
+
+    def add(self, value: float) -> None:
+        self._bins[min(int(value / RESOLUTION), _BINS)] += 1
+        self.count += 1
+        self.most = max(self.most, value)
+
+    def percentile(self, share: float) -> float:
+        """Return a time that so many are not above, to the resolution, s."""
+        wanted, found = share * self.count, 0
+        for place, count in enumerate(self._bins):
+            found += count
+            if found >= wanted and found:
+                return min((place + 1) * RESOLUTION, self.most)
+        return 0.0
