@@ -53,6 +53,13 @@ class YamlFile:
             node, line = child
         return f"{self.origin}, line {line + 1}" if line or path else self.origin
 
+    def part(self, key: str) -> YamlFile:
+        """Return a mapping that stands at a key, as a file of its own; lines stay the file's."""
+        child = _child(self._root, key)
+        if child is None:
+            raise KeyError(key)
+        return YamlFile(self.values[key], self.origin, child[0])
+
 
 def read_yaml(path: str | os.PathLike[str], what: str) -> YamlFile:
     """Read a YAML file that holds one mapping.

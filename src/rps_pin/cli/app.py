@@ -11,6 +11,7 @@ import typer
 from rps_pin import __version__
 from rps_pin.cli.check import check_command
 from rps_pin.cli.console import complain
+from rps_pin.cli.control import control_command
 from rps_pin.cli.describe import describe_command
 from rps_pin.cli.dynamics import dynamics_command
 from rps_pin.cli.fk import fk_command
@@ -32,6 +33,7 @@ app = typer.Typer(
 )
 app.command("helix")(helix_command)
 app.command("dynamics")(dynamics_command)
+app.command("control")(control_command)
 app.command("view")(view_command)
 app.command("ik")(ik_command)
 app.command("fk")(fk_command)

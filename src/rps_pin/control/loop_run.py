@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,10 +77,6 @@ class LoopRun:
     texts: dict[int, str]
 
 
-class _Progress(Protocol):
-    def __call__(self, done: float) -> object: ...
-
-
 def run_loop(
     controller: Controller,
     plant: Plant,
@@ -90,7 +86,7 @@ def run_loop(
     duration: float | None = None,
     settle: float = 0.0,
     speeds: Speeds = "filtered",
-    progress: _Progress | None = None,
+    progress: Callable[[float], object] | None = None,
 ) -> LoopRun:
     """Return what a controller makes of a plant along a trajectory.
 

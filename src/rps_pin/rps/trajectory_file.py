@@ -66,9 +66,28 @@ def load_trajectory(path: str | os.PathLike[str], robot: RPSRobot) -> Trajectory
         return read_csv(path)
     if suffix not in (".yaml", ".yml"):
         raise InputError(f"trajectory file {path}: its name must end in .csv, .yaml or .yml")
-    file = read_yaml(path, "trajectory file")
+    return described_trajectory(read_yaml(path, "trajectory file"), Path(path).parent, robot)
+
+
+def described_trajectory(file: YamlFile, folder: Path, robot: RPSRobot) -> Trajectory:
+    """Return the trajectory that a YAML file, or a part of one, describes.
+
+    Parameters
+    ----------
+    file
+        What it holds.
+    folder
+        From where the names of files in it count.
+    robot
+        As for `load_trajectory`.
+
+    Raises
+    ------
+    RPSPinError
+        As `load_trajectory`.
+    """
     described = validated(file)
-    trajectory = _made(file, described, Path(path).parent, robot)
+    trajectory = _made(file, described, folder, robot)
     if described.fastest is None:
         return trajectory
     return _fastest(file, robot, trajectory, described.fastest)

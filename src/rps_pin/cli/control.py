@@ -1,0 +1,122 @@
+"""``rps-pin control``: a controller against a simulated plant, from a scenario file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+from rps_pin.cli.motion_report import print_files
+
+if TYPE_CHECKING:
+    from rps_pin.control.loop_run import LoopRun
+    from rps_pin.control.loop_summary import LoopSummary
+    from rps_pin.control.scenario import Scenario
+
+
+def control_command(
+    scenario: Annotated[
+        Path, typer.Argument(metavar="SCENARIO", help="A YAML file; see docs/control.md.")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for the results; named after SCENARIO."),
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")
+    ] = False,
+) -> None:
+    """Run a control loop against a simulated 3-RPS that is not quite what its controller believes.
+
+    The file says which robot, trajectory, controller, plant (wrong masses, friction, encoders,
+    delay) and faults. Written to the output folder: **report.md** with gains, margins, errors in
+    micrometres and microradians and statuses, **loop.csv** (every tick), figures, **summary.json**,
+    and **viewer.html**, the motion in 3D.
+
+    Exit status: 0 done, whatever the controller said; 1 it cannot be run (why is said); 2 wrong
+    usage.
+
+    Examples:
+
+    - `rps-pin control docs/scenarios/micro_helix.yaml`
+    """
+    from rps_pin.control.loop_summary import LoopSummary, status_name
+    from rps_pin.control.scenario import load_scenario
+
+    loaded = load_scenario(scenario)
+    console = Console(quiet=as_json)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("control loop", total=1.0)
+        run = loaded.run(lambda done: bar.update(task, completed=done))
+    window = loaded.entry.settle if run.time[-1] > loaded.entry.settle else 0.0
+    summary = LoopSummary.of(run, begin=window)
+    folder = output or Path(f"{scenario.stem}-control")
+    folder.mkdir(parents=True, exist_ok=True)
+    with console.status("writing the results"):
+        files = _write(folder, scenario.name, loaded, run, summary)
+    if as_json:
+        answer = {
+            "scenario": str(scenario),
+            **summary.as_dict(),
+            "files": [str(file) for file in files],
+        }
+        typer.echo(json.dumps(answer, indent=2))
+        return
+    console.print(
+        f"3-RPS [bold]{loaded.model.parameters.name}[/], {scenario}, from {window:g} s on",
+        highlight=False,
+    )
+    console.print(summary.table())
+    for number, text in run.texts.items():
+        if number:
+            words = f"{status_name(number)}: {text}"
+            console.print(words, highlight=False, markup=False)
+    print_files(console, files)
+
+
+def _write(
+    folder: Path, name: str, scenario: Scenario, run: LoopRun, summary: LoopSummary
+) -> list[Path]:
+    """Write everything into a folder; return the files."""
+    from rps_pin.control.loop_run import write_loop_csv
+    from rps_pin.control.report import report
+    from rps_pin.control_plots import plot_loop_forces, plot_tracking
+    from rps_pin.files import whole_file
+    from rps_pin.plots import save_figure
+    from rps_pin.viewer import write_html
+
+    title = f"3-RPS {scenario.model.parameters.name}, {name}"
+    files = save_figure(plot_tracking(run), folder, "tracking")
+    files += save_figure(plot_loop_forces(run), folder, "forces")
+    texts = {
+        "summary.json": json.dumps(summary.as_dict(), indent=2) + "\n",
+        "report.md": report(
+            title,
+            scenario,
+            run,
+            summary,
+            {
+                "tracking.png": "Errors against the target over time",
+                "forces.png": "Forces, distance to a singularity and statuses over time",
+            },
+        ),
+    }
+    table, page = folder / "loop.csv", folder / "viewer.html"
+    write_loop_csv(table, run)
+    for text_name, text in texts.items():
+        with whole_file(folder / text_name) as scratch:
+            scratch.write_text(text, "utf-8")
+    machine = scenario.machine
+    write_html(
+        page,
+        machine.mechanism.model,
+        machine.visual_model(),
+        run.time,
+        run.configuration,
+        title=title,
+    )
+    return [folder / "report.md", table, folder / "summary.json", *files, page]

@@ -1,0 +1,128 @@
+"""Figures of a controlled motion: errors in micrometres and microradians, forces, statuses.
+
+Each function draws on axes of your own, or makes a figure. Nothing here opens a window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from rps_pin.control.loop_run import LoopRun
+from rps_pin.control.loop_summary import TrackingErrors, status_name
+from rps_pin.control.status import Status
+from rps_pin.errors import InputError
+from rps_pin.plots import LEG_COLOURS, STYLE
+
+_STYLES = ("-", "--", "-.")
+
+
+def plot_tracking(run: LoopRun, axes: Sequence[Axes] | None = None) -> Figure:
+    """Draw the errors over time: of the centre (um), of the orientation (urad), of the legs (um).
+
+    Parameters
+    ----------
+    run
+        The run.
+    axes
+        Three axes to draw on; a new figure's if left out.
+
+    Raises
+    ------
+    InputError
+        If there are not three axes.
+    """
+    errors = TrackingErrors.of(run)
+    with matplotlib.rc_context(STYLE):
+        figure, (centre, turn, legs) = _three(axes, "Errors against the target")
+        for part, (name, colour) in enumerate(zip("xyz", LEG_COLOURS, strict=True)):
+            style = _STYLES[part]
+            shown = 1e6 * errors.centre[:, part]
+            centre.plot(run.time, shown, style, color=colour, label=f"$p_{name}$")
+            shown = 1e6 * errors.length[:, part]
+            legs.plot(run.time, shown, style, color=colour, label=f"$d_{part + 1}$")
+        turn.plot(run.time, 1e6 * errors.turn, color="black")
+        centre.set_ylabel("centre (µm)")
+        turn.set_ylabel("orientation (µrad)")
+        legs.set_ylabel("leg length (µm)")
+        for own in (centre, legs):
+            own.legend(loc="upper right", ncols=3)
+        _finish((centre, turn, legs), run)
+    return figure
+
+
+def plot_loop_forces(run: LoopRun, axes: Sequence[Axes] | None = None) -> Figure:
+    """Draw the actuators' forces over time (N), the distance to a singularity, and the statuses.
+
+    Parameters
+    ----------
+    run
+        The run.
+    axes
+        Three axes to draw on; a new figure's if left out.
+
+    Raises
+    ------
+    InputError
+        If there are not three axes.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure, (forces, distance, statuses) = _three(axes, "Forces and what the controller said")
+        limit = run.parameters.actuator_force_limit
+        for leg, colour in enumerate(LEG_COLOURS):
+            forces.plot(
+                run.time,
+                run.applied[:, leg],
+                _STYLES[leg],
+                color=colour,
+                label=f"$F_{leg + 1}$",
+                drawstyle="steps-post",
+            )
+        if np.abs(run.applied).max() > 0.5 * limit:
+            for side in (-limit, limit):
+                forces.axhline(side, color="black", linewidth=0.8, linestyle=":")
+        forces.set_ylabel("force (N)")
+        forces.legend(loc="upper right", ncols=3)
+        distance.plot(run.time, run.distance, color="black")
+        distance.set_ylim(0, None)
+        distance.set_ylabel("distance to\na singularity (1)")
+        _draw_statuses(statuses, run)
+        _finish((forces, distance, statuses), run)
+    return figure
+
+
+def _draw_statuses(axes: Axes, run: LoopRun) -> None:
+    """Draw a row of marks for each status that came up."""
+    flags = [flag for flag in Status if flag and (run.status & int(flag)).any()]
+    for row, flag in enumerate(flags):
+        when = run.time[(run.status & int(flag)) != 0]
+        axes.plot(when, np.full(when.size, row), "|", color="black", markersize=9)
+    names = [status_name(int(flag)) for flag in flags]
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(-0.6, max(len(names), 1) - 0.4)
+    if not flags:
+        axes.text(0.5, 0.5, "ok throughout", transform=axes.transAxes, ha="center", va="center")
+    axes.set_ylabel("status")
+
+
+def _three(axes: Sequence[Axes] | None, title: str) -> tuple[Figure, Sequence[Axes]]:
+    if axes is None:
+        figure = Figure(figsize=(6.4, 7.2), layout="constrained")
+        axes = list(figure.subplots(3, 1, sharex=True))
+        figure.suptitle(title)
+        return figure, axes
+    if len(axes) != 3:
+        raise InputError(f"axes: {len(axes)} given; three are needed")
+    figure_ = axes[0].get_figure(root=True)
+    assert isinstance(figure_, Figure)
+    return figure_, axes
+
+
+def _finish(axes: Sequence[Axes], run: LoopRun) -> None:
+    for own in axes:
+        own.set_xlim(run.time[0], run.time[-1])
+    axes[-1].set_xlabel("time (s)")
