@@ -6,11 +6,13 @@ Each function draws on axes of your own, or makes a figure. Nothing here opens a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from rps_pin.control.loop_run import LoopRun
 from rps_pin.control.loop_summary import TrackingErrors, status_name
@@ -19,10 +21,22 @@ from rps_pin.errors import InputError
 from rps_pin.plots import LEG_COLOURS, STYLE
 
 _STYLES = ("-", "--", "-.")
+#: Above the axes, where it hides nothing.
+_LEGEND: Any = {
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 1.0),
+    "ncols": 3,
+    "frameon": False,
+    "borderaxespad": 0.1,
+}
+
+Array = NDArray[np.float64]
 
 
-def plot_tracking(run: LoopRun, axes: Sequence[Axes] | None = None) -> Figure:
-    """Draw the errors over time: of the centre (um), of the orientation (urad), of the legs (um).
+def plot_tracking(
+    run: LoopRun, axes: Sequence[Axes] | None = None, *, begin: float = 0.0
+) -> Figure:
+    """Draw the errors (is less target): of centre (um), orientation (urad) and legs (um).
 
     Parameters
     ----------
@@ -30,32 +44,37 @@ def plot_tracking(run: LoopRun, axes: Sequence[Axes] | None = None) -> Figure:
         The run.
     axes
         Three axes to draw on; a new figure's if left out.
+    begin
+        From when on, s.
 
     Raises
     ------
     InputError
         If there are not three axes.
     """
-    errors = TrackingErrors.of(run)
+    errors, here = TrackingErrors.of(run), run.time >= begin
+    time = run.time[here]
     with matplotlib.rc_context(STYLE):
-        figure, (centre, turn, legs) = _three(axes, "Errors against the target")
+        figure, (centre, turn, legs) = _three(axes, "Errors: actual minus target")
         for part, (name, colour) in enumerate(zip("xyz", LEG_COLOURS, strict=True)):
             style = _STYLES[part]
-            shown = 1e6 * errors.centre[:, part]
-            centre.plot(run.time, shown, style, color=colour, label=f"$p_{name}$")
-            shown = 1e6 * errors.length[:, part]
-            legs.plot(run.time, shown, style, color=colour, label=f"$d_{part + 1}$")
-        turn.plot(run.time, 1e6 * errors.turn, color="black")
+            shown = 1e6 * errors.centre[here, part]
+            centre.plot(time, shown, style, color=colour, label=f"$p_{name}$")
+            shown = 1e6 * errors.length[here, part]
+            legs.plot(time, shown, style, color=colour, label=f"$d_{part + 1}$")
+        turn.plot(time, 1e6 * errors.turn[here], color="black")
         centre.set_ylabel("centre (µm)")
         turn.set_ylabel("orientation (µrad)")
         legs.set_ylabel("leg length (µm)")
         for own in (centre, legs):
-            own.legend(loc="upper right", ncols=3)
-        _finish((centre, turn, legs), run)
+            own.legend(**_LEGEND)
+        _finish((centre, turn, legs), time)
     return figure
 
 
-def plot_loop_forces(run: LoopRun, axes: Sequence[Axes] | None = None) -> Figure:
+def plot_loop_forces(
+    run: LoopRun, axes: Sequence[Axes] | None = None, *, begin: float = 0.0
+) -> Figure:
     """Draw the actuators' forces over time (N), the distance to a singularity, and the statuses.
 
     Parameters
@@ -64,19 +83,23 @@ def plot_loop_forces(run: LoopRun, axes: Sequence[Axes] | None = None) -> Figure
         The run.
     axes
         Three axes to draw on; a new figure's if left out.
+    begin
+        From when on, s.
 
     Raises
     ------
     InputError
         If there are not three axes.
     """
+    here = run.time >= begin
+    time = run.time[here]
     with matplotlib.rc_context(STYLE):
         figure, (forces, distance, statuses) = _three(axes, "Forces and what the controller said")
         limit = run.parameters.actuator_force_limit
         for leg, colour in enumerate(LEG_COLOURS):
             forces.plot(
-                run.time,
-                run.applied[:, leg],
+                time,
+                run.applied[here, leg],
                 _STYLES[leg],
                 color=colour,
                 label=f"$F_{leg + 1}$",
@@ -86,12 +109,12 @@ def plot_loop_forces(run: LoopRun, axes: Sequence[Axes] | None = None) -> Figure
             for side in (-limit, limit):
                 forces.axhline(side, color="black", linewidth=0.8, linestyle=":")
         forces.set_ylabel("force (N)")
-        forces.legend(loc="upper right", ncols=3)
-        distance.plot(run.time, run.distance, color="black")
-        distance.set_ylim(0, None)
+        forces.legend(**_LEGEND)
+        distance.plot(time, run.distance[here], color="black")
+        distance.set_ylim(0.0, 1.1 * float(run.distance[here].max(initial=0.1)))
         distance.set_ylabel("distance to\na singularity (1)")
         _draw_statuses(statuses, run)
-        _finish((forces, distance, statuses), run)
+        _finish((forces, distance, statuses), time)
     return figure
 
 
@@ -122,7 +145,7 @@ def _three(axes: Sequence[Axes] | None, title: str) -> tuple[Figure, Sequence[Ax
     return figure_, axes
 
 
-def _finish(axes: Sequence[Axes], run: LoopRun) -> None:
+def _finish(axes: Sequence[Axes], time: Array) -> None:
     for own in axes:
-        own.set_xlim(run.time[0], run.time[-1])
+        own.set_xlim(time[0], time[-1] if time.size > 1 else None)
     axes[-1].set_xlabel("time (s)")

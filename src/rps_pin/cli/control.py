@@ -57,7 +57,7 @@ def control_command(
     folder = output or Path(f"{scenario.stem}-control")
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
-        files = _write(folder, scenario.name, loaded, run, summary)
+        files = _write(folder, scenario.name, loaded, run, summary, window)
     if as_json:
         answer = {
             "scenario": str(scenario),
@@ -79,7 +79,12 @@ def control_command(
 
 
 def _write(
-    folder: Path, name: str, scenario: Scenario, run: LoopRun, summary: LoopSummary
+    folder: Path,
+    name: str,
+    scenario: Scenario,
+    run: LoopRun,
+    summary: LoopSummary,
+    window: float,
 ) -> list[Path]:
     """Write everything into a folder; return the files."""
     from rps_pin.control.loop_run import write_loop_csv
@@ -90,8 +95,8 @@ def _write(
     from rps_pin.viewer import write_html
 
     title = f"3-RPS {scenario.model.parameters.name}, {name}"
-    files = save_figure(plot_tracking(run), folder, "tracking")
-    files += save_figure(plot_loop_forces(run), folder, "forces")
+    files = save_figure(plot_tracking(run, begin=window), folder, "tracking")
+    files += save_figure(plot_loop_forces(run, begin=window), folder, "forces")
     texts = {
         "summary.json": json.dumps(summary.as_dict(), indent=2) + "\n",
         "report.md": report(

@@ -27,11 +27,15 @@ def report(
     """
     entry = scenario.entry
     lines = [f"# {title}", ""]
-    lines += [f"Robot {scenario.model.parameters.name}, {entry.controller.law}, ", ""]
-    lines += _rows("controller", scenario.entry.controller.model_dump(exclude_none=True))
-    lines += _rows("plant", scenario.entry.plant.model_dump(exclude_none=True))
-    lines += ["## Gains and margins", "", *_gains(scenario), "", _margins(scenario), ""]
-    lines += [f"## Errors, from {entry.settle:g} s on", "", *_errors(summary), ""]
+    lines += [
+        f"Robot {scenario.model.parameters.name}; {run.time.size} ticks of "
+        f"{1e3 * entry.period:g} ms, the first {entry.settle:g} s at rest.",
+        "",
+    ]
+    lines += _rows("controller", entry.controller.model_dump(exclude_none=True))
+    lines += _rows("plant", entry.plant.model_dump(exclude_none=True))
+    lines += ["", "## Gains and margins", "", *_gains(scenario), "", _margins(scenario), ""]
+    lines += [f"## Errors, over {summary.ticks} ticks", "", *_errors(summary), ""]
     lines += ["## Statuses", "", *_statuses(run, summary), ""]
     if scenario.faults:
         lines += ["Faults:", "", *(f"- {fault}" for fault in scenario.faults), ""]
