@@ -41,10 +41,12 @@ class LimitCheck:
 
     def broken(self, place: Place) -> bool:
         """Return whether a leg's length, angle or ball joint is beyond its limits."""
-        _, d, angle, _, _ = place
-        if min(d) < self._shortest or max(d) > self._longest:
+        _, (d1, d2, d3), (phi1, phi2, phi3), _, _ = place
+        low, high = self._shortest, self._longest
+        if not (low <= d1 <= high and low <= d2 <= high and low <= d3 <= high):
             return True
-        if min(angle) < self._least_angle or max(angle) > self._greatest_angle:
+        low, high = self._least_angle, self._greatest_angle
+        if not (low <= phi1 <= high and low <= phi2 <= high and low <= phi3 <= high):
             return True
         return self._cones and self._cone_broken(place)
 
@@ -58,7 +60,7 @@ class LimitCheck:
         a, b, c = coefficient[:3]
         c1, c2, c3, s1, s2, s3 = way
         along, across, least = self._along, self._across, self._least_cosine
-        for (ex, ey), cosine, sine in ((_E1, c1, s1), (_E2, c2, s2), (_E3, c3, s3)):
+        for ex, ey, cosine, sine in ((*_E1, c1, s1), (*_E2, c2, s2), (*_E3, c3, s3)):
             e, at = wx * ex + wy * ey, a * (wy * ex - wx * ey)
             normal, radial = c * sine - at * cosine, -(c + b * e * e) * cosine - at * sine
             # The rest axis is cos(r) n - sin(r) R e_i.

@@ -330,7 +330,7 @@ class RealTimeRobot:
             return self._keep(_NOT_CONVERGED | _NEAR_SINGULAR)
         rate = pose_rate(gains, speed)
         twist = platform_twist(pose, rate, coefficient, h)
-        if not math.isfinite(sum(rate) + sum(twist)):
+        if not math.isfinite(sum(twist)):  # the rate is in it
             return self._keep(_BAD_INPUT)
         angle = (
             math.atan2(way[3], way[0]),
