@@ -94,7 +94,7 @@ def stages(robot: RPSRobot) -> dict[str, Callable[[int], object]]:
 
 def limited(robot: RPSRobot, places: list) -> Callable[[int], object]:
     """Return what limits forces that are half as much again as the actuators allow."""
-    reduced, limits = ReducedMass(robot), ForceLimits((4.0, 4.0, 4.0), 0.01)
+    reduced, limits = ReducedMass(robot), ForceLimits((4.0, 4.0, 4.0))
     h = robot.parameters.platform_radius
     cases = [(reduced.of(one), leg_gains(one.pose, one.way, one.coefficient, h)) for one in places]
     path = (0.01, 0.1, 0.1)

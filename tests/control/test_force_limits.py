@@ -17,7 +17,6 @@ from rps_pin.control.scalar_rates import LegGains, leg_gains
 from tests import strategies
 
 Array = NDArray[np.float64]
-ALONG = 0.01
 
 
 def places(count: int, seed: int) -> list[tuple[Array, LegGains]]:
@@ -35,18 +34,10 @@ def places(count: int, seed: int) -> list[tuple[Array, LegGains]]:
     return found
 
 
-def cost_matrix(mass: Array, gains: LegGains, path: Array) -> Array:
-    """A matrix whose squared norm, applied to a change of forces, is what is to be least.
-
-    By the balls' accelerations: the part along the path's own, and the rest, apart.
-    """
-    effect = np.linalg.inv(mass) @ np.array(gains.K).T
-    balls, along = np.array(gains.L).T @ effect, np.array(gains.L).T @ path
-    if not along.any():
-        return balls
-    n = along / np.linalg.norm(along)
-    part = np.outer(n, n) @ balls
-    return np.vstack([balls - part, math.sqrt(ALONG) * part])
+def cost_matrix(mass: Array, gains: LegGains) -> Array:
+    """A matrix whose squared norm is what is to be least: M^(1/2) times the acceleration missed."""
+    root = np.linalg.cholesky(mass).T
+    return root @ np.linalg.inv(mass) @ np.array(gains.K).T
 
 
 @pytest.mark.parametrize("size", [1.01, 3.0, 100.0, 1e6])
@@ -60,12 +51,12 @@ def test_forces_are_the_optimum(size: float) -> None:
         l1, l2, l3 = limit.tolist()
         f1, f2, f3 = wanted.tolist()
         x1, x2, x3 = path.tolist()
-        limits = ForceLimits((l1, l2, l3), ALONG)
+        limits = ForceLimits((l1, l2, l3))
         found = limits.nearest((f1, f2, f3), mass, gains, (x1, x2, x3))
         assert found.solved
         force = np.array(found.force)
         assert (np.abs(force) <= limit).all()
-        matrix = cost_matrix(mass, gains, path)
+        matrix = cost_matrix(mass, gains)
         best = lsq_linear(
             matrix * limit, matrix @ wanted, (-np.ones(3), np.ones(3)), method="bvls", tol=1e-14
         )
@@ -76,6 +67,10 @@ def test_forces_are_the_optimum(size: float) -> None:
         np.testing.assert_allclose(
             found.missing, missing, rtol=0, atol=1e-9 * np.abs(missing).max()
         )
+        # Of the target's rate s x the best second derivative, in the same norm, by least squares.
+        root = np.linalg.cholesky(mass).T
+        hurry = np.linalg.lstsq((root @ path)[:, None], root @ missing, rcond=None)[0][0]
+        assert found.hurry == pytest.approx(hurry, rel=1e-7, abs=1e-7 * abs(hurry) + 1e-12)
         cut = np.clip(wanted, -limit, limit)
         moved += not np.allclose(force, cut, rtol=0, atol=1e-3 * limit.max())
     assert moved > 30 or size < 2  # cutting off one by one is another thing
@@ -84,20 +79,18 @@ def test_forces_are_the_optimum(size: float) -> None:
 def test_one_problem_for_many_ticks_gives_what_a_new_one_gives() -> None:
     """Warm starts, among them good ones that are not the solution, change nothing."""
     rng = np.random.default_rng(3)
-    kept = ForceLimits((10.0, 10.0, 10.0), ALONG)
+    kept = ForceLimits((10.0, 10.0, 10.0))
     for mass, gains in places(200, 4):
         f1, f2, f3 = rng.uniform(-40, 40, 3).tolist()
         found = kept.nearest((f1, f2, f3), mass, gains, (0.1, 0.0, 0.2))
-        new = ForceLimits((10.0, 10.0, 10.0), ALONG).nearest(
-            (f1, f2, f3), mass, gains, (0.1, 0.0, 0.2)
-        )
-        matrix = cost_matrix(mass, gains, np.array([0.1, 0.0, 0.2]))
+        new = ForceLimits((10.0, 10.0, 10.0)).nearest((f1, f2, f3), mass, gains, (0.1, 0.0, 0.2))
+        matrix = cost_matrix(mass, gains)
         gap = matrix @ (np.array(found.force) - np.array(new.force))
         assert np.abs(gap).max() <= 1e-5 * np.abs(matrix).max() * 10
 
 
 def test_within_and_cut_know_unlimited_actuators() -> None:
-    limits = ForceLimits((1.0, math.inf, 2.0), ALONG)
+    limits = ForceLimits((1.0, math.inf, 2.0))
     assert limits.within((1.0, 1e300, -2.0))
     assert not limits.within((1.0, 0.0, -2.0000001))
     assert limits.cut((3.0, -1e9, -5.0)) == (1.0, -1e9, -2.0)

@@ -48,6 +48,8 @@ Space = Literal["actuator", "task"]
 _NOT_CONVERGED, _NEAR_SINGULAR, _BEYOND_LIMIT = 4, 8, 16
 _SATURATED, _TARGET_HELD, _STOPPED, _KEPT = 32, 64, 128, 1 | 2 | 4
 _STILL = (0.0, 0.0, 0.0)
+#: Least pace, and the time in which it comes back to 1, s.
+_SLOWEST, _RECOVERY = 0.05, 0.2
 
 
 class Controller(ABC):
@@ -78,9 +80,6 @@ class Controller(ABC):
         what the actuators' speed limit allows.
     most_lost
         Readings in a row that may be lost before the controller stops.
-    along
-        How much an error along the path counts beside one across it where forces are limited, 0 to
-        1 (see `rps_pin.control.force_limits`).
 
     Attributes
     ----------
@@ -91,6 +90,10 @@ class Controller(ABC):
         As given.
     estimate : RealTimeRobot
         What is known of the robot: pose, rate, distance to a singularity.
+    pace : float
+        How fast the target should go on, 0.05 to 1 of its own speed: less than 1 while and shortly
+        after actuators are at their limits. `PacedTrajectory` follows it; without, the robot falls
+        behind and cuts corners.
     status : Status
         Of the last tick.
     period : float
@@ -120,15 +123,12 @@ class Controller(ABC):
         stop_singular: float = 0.01,
         largest_jump: float | None = None,
         most_lost: int = 3,
-        along: float = 0.01,
     ) -> None:
         p = robot.parameters
         if not isinstance(gains, Gains):
             raise InputError(f"gains must be Gains, not {type(gains).__name__}")
         if space not in ("actuator", "task"):
             raise InputError(f"space = {space!r}; it must be 'actuator' or 'task'")
-        if not 0.0 <= along <= 1.0:
-            raise InputError(f"along = {along}: it must be between 0 and 1")
         if not 0.0 < stop_singular < near_singular:
             raise InputError(
                 f"stop_singular = {stop_singular}: it must be positive and less than "
@@ -153,7 +153,7 @@ class Controller(ABC):
         self._targets = Targets(
             LimitCheck(p), self._g, self._h, near_singular, 1e6 * (self._g + self._h)
         )
-        self._limits = ForceLimits(_limit(robot, force_limit), along)
+        self._limits = ForceLimits(_limit(robot, force_limit))
         self._mass = ReducedMass(robot)
         self._matched = MatchedRate(cut_off)
         self._near, self._stop, self._most_lost = near_singular, stop_singular, most_lost
@@ -178,6 +178,7 @@ class Controller(ABC):
         self._matched.reset()
         self._measured = False
         self._why = ""
+        self.pace = 1.0
         self.status = Status.OK
         self._wanted: Triple = _STILL
         self._send(self._limits.cut(self._weight()))
@@ -237,6 +238,8 @@ class Controller(ABC):
         if not self._limits.within(force):
             number |= _SATURATED
             force = self._limited(force, known, elapsed)
+        elif self.pace < 1.0:
+            self.pace += (1.0 - self.pace) * min(1.0, elapsed / _RECOVERY)
         self._send(force)
         self.status = status = STATUSES[number]
         return status
@@ -294,6 +297,8 @@ class Controller(ABC):
         mass = self._mass.of(known.place)
         allowed = self._limits.nearest(force, mass, known.gains, self._targets.goal.rate)
         given = allowed.force
+        self.pace *= 1.0 + elapsed * allowed.hurry
+        self.pace = max(_SLOWEST, min(1.0, self.pace))
         short = (given[0] - force[0], given[1] - force[1], given[2] - force[2])
         (i1, i2, i3), (w1, w2, w3) = self._integral, self._give
         m1, m2, m3 = self._missed(known, short, allowed.missing)

@@ -3,16 +3,19 @@
 With f* the forces wanted and B = M_x^-1 K' the platform's acceleration by the actuators' forces,
 forces f miss the acceleration wanted by B (f - f*). They are those of the quadratic program
 
-    min |W B (f - f*)|^2,    |f_i| <= limit_i,
+    min (f - f*)' B' M_x B (f - f*),    |f_i| <= limit_i,
 
-solved by ProxQP. W makes accelerations of the pose ones of the platform's balls: with the Cholesky
-factor L of `LegGains`, |L' x''|^2 / 3 is their mean square, in m^2/s^4, however z and tilts are
-mixed. Across the path an error counts more than along it: with t the direction of the target's
-rate,
+solved by ProxQP: the motion nearest to the one wanted in the sense of Gauss's principle of least
+constraint, by which constraints of any kind change a motion. B' M_x B = K M_x^-1 K' is the inverse
+of the inertia that the actuators see.
 
-    W' W = L (1 - (1 - along) n n') L',    n = L' t / |L' t|:
+**Pace.** A target that goes on by the clock runs away from a robot that is too weak for it, and no
+choice of forces mends that. So along the target's rate t, what is missing asks for another time
+along the trajectory (Dahl and Nielsen 1990): its rate should change by
 
-a robot that is too weak for its target then falls behind on its path, rather than leave it.
+    t' M_x (missing) / (t' M_x t),
+
+per second and of itself; see `Controller.pace`.
 """
 
 from __future__ import annotations
@@ -33,8 +36,8 @@ Array = NDArray[np.float64]
 #: Of ProxQP, on a problem whose variables are shares of the limits.
 _TOLERANCE = 1e-9
 _MOST_ITERATIONS = 100
-#: Slower than this, m/s of the balls, a target has no direction.
-_STANDING = 1e-9
+#: With less kinetic energy than this, J, a target has no direction.
+_STANDING = 1e-18
 
 
 class Allowed(NamedTuple):
@@ -44,6 +47,8 @@ class Allowed(NamedTuple):
     """N; within the limits, exactly."""
     missing: Triple
     """B (f - f*): what the pose's acceleration will differ by, m/s^2, rad/s^2."""
+    hurry: float
+    """By how much the target's rate should change a second, of itself, 1/s; negative: slow down."""
     solved: bool
     """Whether the program was solved; else the wanted forces are cut off one by one."""
 
@@ -55,13 +60,10 @@ class ForceLimits:
     ----------
     limit
         Of each actuator, N; positive, infinite for none.
-    along
-        How much the square of an error along the path counts, 0 to 1, beside one across it.
     """
 
-    def __init__(self, limit: Triple, along: float) -> None:
+    def __init__(self, limit: Triple) -> None:
         self.limit = limit
-        self._along = along
         self._size = np.minimum(limit, 1e12)  # shares of no limit are none
         self._factors = eigenpy.LDLT(3)
         proxqp = proxsuite.proxqp
@@ -90,7 +92,7 @@ class ForceLimits:
         )
         return one, two, three
 
-    def nearest(self, wanted: Triple, mass: Array, gains: LegGains, path: Triple) -> Allowed:
+    def nearest(self, wanted: Triple, mass: Array, gains: LegGains, rate: Triple) -> Allowed:
         """Return the forces nearest in effect to finite ones that break the limits.
 
         Parameters
@@ -100,19 +102,17 @@ class ForceLimits:
         mass
             M_x, shape (3, 3).
         gains
-            K and L at the pose.
-        path
-            The target's rate: m/s, rad/s, rad/s.
+            K at the pose.
+        rate
+            The target's: m/s, rad/s, rad/s.
         """
+        by_pose, goal = np.array(gains.K), np.array(wanted)
         self._factors.compute(mass)
-        effect = self._factors.solve(np.array(gains.K).T)  # B
-        goal = np.array(wanted)
-        weighted = (self._weights(gains.L, path) @ effect) * self._size
-        hessian = weighted.T @ weighted
+        effect = self._factors.solve(by_pose.T)  # B
+        hessian = self._size * (by_pose @ effect) * self._size[:, None]
         share = goal / self._size
-        a, b, c = share.tolist()
-        size = float(weighted.ravel().dot(weighted.ravel()))  # the trace
-        hessian /= size * max(1.0, abs(a), abs(b), abs(c))
+        (d1, d2, d3), (a, b, c) = hessian.diagonal().tolist(), share.tolist()
+        hessian /= (d1 + d2 + d3) * max(1.0, abs(a), abs(b), abs(c))
         self._problem.update(H=hessian, g=-hessian.dot(share))
         self._problem.solve()
         results = self._problem.results
@@ -120,25 +120,10 @@ class ForceLimits:
         solved = results.info.status == self._solved and math.isfinite(found.sum())
         f1, f2, f3 = (found * self._size).tolist() if solved else wanted
         force = self.cut((f1, f2, f3))
-        one, two, three = effect.dot(np.array(force) - goal).tolist()
-        return Allowed(force, (one, two, three), solved)
-
-    def _weights(self, factor: tuple[Triple, Triple, Triple], path: Triple) -> Array:
-        """Return W = (1 - (1 - sqrt(along)) n n') L', one of those that there are."""
-        (l00, _, _), (l10, l11, _), (l20, l21, l22) = factor
-        p1, p2, p3 = path
-        t1, t2, t3 = l00 * p1 + l10 * p2 + l20 * p3, l11 * p2 + l21 * p3, l22 * p3
-        speed = math.sqrt(t1 * t1 + t2 * t2 + t3 * t3)
-        if not speed > _STANDING:
-            return np.array(((l00, l10, l20), (0.0, l11, l21), (0.0, 0.0, l22)))
-        n1, n2, n3 = t1 / speed, t2 / speed, t3 / speed
-        less = 1.0 - math.sqrt(self._along)
-        m1, m2, m3 = n1 * l00, n1 * l10 + n2 * l11, n1 * l20 + n2 * l21 + n3 * l22  # n' L'
-        k1, k2, k3 = less * n1, less * n2, less * n3
-        return np.array(
-            (
-                (l00 - k1 * m1, l10 - k1 * m2, l20 - k1 * m3),
-                (-k2 * m1, l11 - k2 * m2, l21 - k2 * m3),
-                (-k3 * m1, -k3 * m2, l22 - k3 * m3),
-            )
-        )
+        missing = effect.dot(np.array(force) - goal)
+        along = np.array(rate)
+        momentum = mass.dot(along)
+        energy = float(momentum.dot(along))
+        hurry = float(momentum.dot(missing)) / energy if energy > _STANDING else 0.0
+        one, two, three = missing.tolist()
+        return Allowed(force, (one, two, three), hurry, solved)

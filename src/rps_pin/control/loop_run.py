@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rps_pin.control.controller import Controller
 from rps_pin.control.faults import Fault, Faults
+from rps_pin.control.paced import PacedTrajectory
 from rps_pin.control.plant import Plant
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
@@ -36,7 +37,10 @@ class LoopRun:
     time : (n,) array
         Of each tick, s.
     target, target_rate : (n, 3) arrays
-        The trajectory's pose and rate (not what faults made of them): m, rad, rad and per second.
+        The trajectory's pose and rate (not what faults made of them), at its pace: m, rad, rad and
+        per second.
+    pace : (n,) array
+        Of the target after each tick: `Controller.pace`.
     pose, rate : (n, 3) arrays
         The plant's true ones.
     configuration : (n, 13) array
@@ -73,6 +77,7 @@ class LoopRun:
     applied: Array
     status: NDArray[np.int64]
     distance: Array
+    pace: Array
     gap: Array
     texts: dict[int, str]
 
@@ -86,6 +91,7 @@ def run_loop(
     duration: float | None = None,
     settle: float = 0.0,
     speeds: Speeds = "filtered",
+    paced: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> LoopRun:
     """Return what a controller makes of a plant along a trajectory.
@@ -107,6 +113,9 @@ def run_loop(
         For how long the trajectory's start is held, at rest, before it begins, s.
     speeds
         ``"filtered"``: the controller has lengths alone. ``"measured"``: it has true speeds too.
+    paced
+        Whether targets go on at the controller's pace (see `PacedTrajectory`); the run then ends
+        `duration` after its start all the same.
     progress
         Called with the fraction done, 0 to 1, about two hundred times.
 
@@ -129,25 +138,24 @@ def run_loop(
         )
     if speeds not in ("filtered", "measured"):
         raise InputError(f"speeds = {speeds!r}; it must be 'filtered' or 'measured'")
-    if not 0.0 <= settle < np.inf:
-        raise InputError(f"settle = {settle}: it must be a time, zero or more")
     whole = settle + trajectory.duration if duration is None else duration
     if not 0.0 < whole < np.inf:
         raise InputError(f"duration = {whole}: it must be positive and finite")
     ticks = max(1, round(whole / plant.period))
     record = _Record(controller, ticks)
-    targets = _targets(trajectory, plant.period, ticks, settle)
+    targets = PacedTrajectory(trajectory, plant.period, settle=settle)
     spoilt, done = Faults(faults), 0
     try:
         for k in range(ticks):
             time = k * plant.period
             reading = spoilt.reading(time, plant.reading())
-            target = (targets[0][k], targets[1][k], targets[2][k])
+            target = targets.target()
             speed = plant.speed if speeds == "measured" and reading is not None else None
             controller.tick(reading, spoilt.target(time, target), speed)
             record.before(k, time, target, reading, plant)
             plant.step(controller.forces)
             record.applied[k] = plant.applied
+            targets.advance(controller.pace if paced else 1.0)
             done = k + 1
             if progress and (done * _PROGRESS_CALLS) % ticks < _PROGRESS_CALLS:
                 progress(done / ticks)
@@ -155,19 +163,6 @@ def run_loop(
         vars(error)["partial"] = record.run(done)
         raise
     return record.run(done)
-
-
-def _targets(
-    trajectory: Trajectory, period: float, ticks: int, settle: float
-) -> tuple[Array, Array, Array]:
-    """Return pose, rate and acceleration of every tick; at rest before and after."""
-    time = period * np.arange(ticks) - settle
-    within = np.clip(time, 0.0, trajectory.duration)
-    pose, rate, acceleration = (np.array(one) for one in trajectory.sample(within))
-    # Rounding makes no rest of a trajectory's own first and last moment.
-    outside = (time < -1e-9 * period) | (time > trajectory.duration * (1 + 1e-12))
-    rate[outside], acceleration[outside] = 0.0, 0.0
-    return pose, rate, acceleration
 
 
 class _Record:
@@ -183,7 +178,7 @@ class _Record:
                 *(("command", 3), ("applied", 3)),
             )
         }
-        self._numbers = {name: np.zeros(ticks) for name in ("time", "distance", "gap")}
+        self._numbers = {name: np.zeros(ticks) for name in ("time", "distance", "pace", "gap")}
         self._status = np.zeros(ticks, dtype=np.int64)
         self._texts: dict[int, str] = {}
         self.applied = self._rows["applied"]
@@ -206,6 +201,7 @@ class _Record:
         rows["command"][k] = controller.forces
         numbers["time"][k], numbers["gap"][k] = time, plant.gap
         numbers["distance"][k] = controller.estimate.distance
+        numbers["pace"][k] = controller.pace
         self._status[k] = status = int(controller.status)
         if status not in self._texts:
             self._texts[status] = controller.status_text

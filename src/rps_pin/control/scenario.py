@@ -40,7 +40,7 @@ from rps_pin.rps.trajectory_file import described_trajectory, load_trajectory
 from rps_pin.trajectories.path import Trajectory
 from rps_pin.yaml_files import YamlFile, read_yaml
 
-_OF_LAW = {"law", "bandwidth", "damping", "integral", "gains", "model", "speeds"}
+_OF_LAW = {"law", "bandwidth", "damping", "integral", "gains", "model", "speeds", "paced"}
 _OF_PLANT = {"payload", "delay", "substeps", "encoder_resolution", "encoder_noise", "seed"}
 
 
@@ -102,6 +102,7 @@ class Scenario:
             duration=self.entry.duration,
             settle=self.entry.settle,
             speeds=self.entry.controller.speeds,
+            paced=self.entry.controller.paced,
             progress=progress,
         )
 

@@ -85,7 +85,7 @@ class ControllerEntry(_Entry):
     stop_singular: Share | None = None
     largest_jump: Positive | None = None
     most_lost: Count | None = None
-    along: Annotated[float, Field(ge=0, le=1)] | None = None
+    paced: bool = False
 
     @model_validator(mode="after")
     def _gains_once(self) -> ControllerEntry:
