@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from rps_pin.control.scenario import Scenario
 
 
+#: Changes of the status that are printed.
+_MOST_SHOWN = 20
+
+
 def control_command(
     scenario: Annotated[
         Path, typer.Argument(metavar="SCENARIO", help="A YAML file; see docs/control.md.")
@@ -71,10 +75,11 @@ def control_command(
         highlight=False,
     )
     console.print(summary.table())
-    for number, text in run.texts.items():
-        if number:
-            words = f"{status_name(number)}: {text}"
-            console.print(words, highlight=False, markup=False)
+    for event in run.events[:_MOST_SHOWN]:
+        words = f"{event.time:.6g} s, {status_name(event.status)}: {event.text}"
+        console.print(words, highlight=False, markup=False)
+    if len(run.events) > _MOST_SHOWN:
+        console.print(f"... and {len(run.events) - _MOST_SHOWN} further changes of the status")
     print_files(console, files)
 
 

@@ -76,10 +76,12 @@ class Controller(ABC):
     stop_singular
         Distance below which the controller stops; less than `near_singular`.
     largest_jump
-        By how much a leg's reading may differ from the last good one, m a tick; if left out, twice
-        what the actuators' speed limit allows.
+        By how much a leg's reading may differ from the last good one, m a tick since; if left out,
+        1.2 times what the actuators' speed limit allows. An encoder that is off by more than
+        most_lost + 1 times this, and stays so, stops the controller; one that is off by less is
+        believed in the end, after `Status.JUMP`.
     most_lost
-        Readings in a row that may be lost before the controller stops.
+        Readings in a row that may be lost, or jump, before the controller stops.
 
     Attributes
     ----------
@@ -136,7 +138,7 @@ class Controller(ABC):
             )
         if not (isinstance(most_lost, int) and most_lost >= 0):
             raise InputError(f"most_lost = {most_lost!r}: it must be a number of ticks, 0 or more")
-        jump = 2 * p.actuator_speed_limit * period if largest_jump is None else largest_jump
+        jump = 1.2 * p.actuator_speed_limit * period if largest_jump is None else largest_jump
         self.robot = robot
         self.estimate = RealTimeRobot(
             robot,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,10 +39,10 @@ class Encoders:
     def __post_init__(self) -> None:
         for name in ("resolution", "noise"):
             value = getattr(self, name)
-            if not 0.0 <= value < np.inf:
+            if not (isinstance(value, Real) and 0.0 <= float(value) < np.inf):
                 raise InputError(f"encoder {name} = {value}: it must be zero or more, and finite")
-        if self.seed < 0:
-            raise InputError(f"encoder seed = {self.seed}: it must be zero or more")
+        if not (isinstance(self.seed, Integral) and self.seed >= 0):
+            raise InputError(f"encoder seed = {self.seed}: it must be zero or more, a whole number")
 
     def generator(self) -> np.random.Generator:
         """Return where the noise comes from."""

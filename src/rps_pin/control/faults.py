@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +16,9 @@ from rps_pin.errors import InputError
 Array = NDArray[np.float64]
 Kind = Literal["lost", "nan", "jump", "stuck", "target", "target_nan"]
 _KINDS = ("lost", "nan", "jump", "stuck", "target", "target_nan")
+_OF_A_LEG = ("nan", "jump", "stuck")
+#: Times are compared to this, s: 0.3 is 300 ticks of 1 ms, though 300 * 0.001 is not 0.1 + 0.2.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -54,12 +58,28 @@ class Fault:
     def __post_init__(self) -> None:
         if self.kind not in _KINDS:
             raise InputError(f"fault kind {self.kind!r}; there are: {', '.join(_KINDS)}")
+        for name in ("start", "duration", "size"):
+            value = getattr(self, name)
+            if not isinstance(value, Real) or isinstance(value, bool):
+                raise InputError(f"fault {name} = {value!r}: it must be a number")
+        try:
+            offset = tuple(float(entry) for entry in self.offset)
+        except (TypeError, ValueError):
+            raise InputError(
+                f"fault offset = {self.offset!r}: it must be three finite numbers"
+            ) from None
+        object.__setattr__(self, "offset", offset)
         if not 0.0 <= self.start < math.inf:
             raise InputError(f"fault start = {self.start}: it must be a time, zero or more")
         if not self.duration > 0.0:
             raise InputError(f"fault duration = {self.duration}: it must be positive")
-        if self.leg not in (None, 1, 2, 3):
+        if self.leg is not None and not (isinstance(self.leg, Integral) and self.leg in (1, 2, 3)):
             raise InputError(f"fault leg = {self.leg}; legs are 1, 2 and 3")
+        if self.leg is not None and self.kind not in _OF_A_LEG:
+            raise InputError(
+                f"fault leg = {self.leg}: a fault {self.kind!r} has none; of one leg are: "
+                f"{', '.join(_OF_A_LEG)}"
+            )
         if not math.isfinite(self.size) or (self.kind == "jump") != (self.size != 0.0):
             raise InputError(f"fault size = {self.size}: a jump, and no other, has a size, in m")
         if len(self.offset) != 3 or not all(map(math.isfinite, self.offset)):
@@ -71,7 +91,7 @@ class Fault:
 
     def on(self, time: float) -> bool:
         """Return whether it is there at a time, s."""
-        return self.start <= time < self.start + self.duration
+        return -_ROUNDING <= time - self.start < self.duration - _ROUNDING
 
     @property
     def _of_reading(self) -> slice:
@@ -100,22 +120,21 @@ class Faults:
 
     def reading(self, time: float, true: Array) -> Array | None:
         """Return what arrives of a reading (3,), m; None if it is lost."""
-        reading = np.array(true, dtype=np.float64)
+        reading, lost = np.array(true, dtype=np.float64), False
         for fault in self.faults:
-            if fault.kind == "stuck" and not fault.on(time):
-                self._stuck[fault] = np.array(true)
             if not fault.on(time):
+                if fault.kind == "stuck":
+                    self._stuck[fault] = np.array(true)
                 continue
             legs = fault._of_reading
-            if fault.kind == "lost":
-                return None
+            lost |= fault.kind == "lost"
             if fault.kind == "nan":
                 reading[legs] = np.nan
             elif fault.kind == "jump":
                 reading[legs] += fault.size
             elif fault.kind == "stuck":
                 reading[legs] = self._stuck.setdefault(fault, np.array(true))[legs]
-        return reading
+        return None if lost else reading
 
     def target(self, time: float, true: tuple[Array, Array, Array]) -> tuple[Any, Any, Any]:
         """Return what arrives of a target: pose, rate and acceleration."""

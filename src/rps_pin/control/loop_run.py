@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,18 @@ Speeds = Literal["filtered", "measured"]
 
 #: How often `progress` is called, about.
 _PROGRESS_CALLS = 200
+_MOST_EVENTS = 1000
+
+
+class LoopEvent(NamedTuple):
+    """A status that is another than a tick before."""
+
+    time: float
+    """s."""
+    status: int
+    """A `Status`."""
+    text: str
+    """`Controller.status_text`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +71,8 @@ class LoopRun:
         To a singularity as the controller knew it: `RealTimeRobot.distance`.
     gap : (n,) array
         Largest gap of the plant's loops, m.
-    texts : dict
-        The first status text of each status that came up.
+    events : tuple of LoopEvent
+        The changes of the status, in words; the first thousand.
     """
 
     parameters: RPSParameters
@@ -79,7 +91,7 @@ class LoopRun:
     distance: Array
     pace: Array
     gap: Array
-    texts: dict[int, str]
+    events: tuple[LoopEvent, ...]
 
 
 def run_loop(
@@ -180,7 +192,8 @@ class _Record:
         }
         self._numbers = {name: np.zeros(ticks) for name in ("time", "distance", "pace", "gap")}
         self._status = np.zeros(ticks, dtype=np.int64)
-        self._texts: dict[int, str] = {}
+        self._events: list[LoopEvent] = []
+        self._last = 0
         self.applied = self._rows["applied"]
 
     def before(
@@ -203,15 +216,16 @@ class _Record:
         numbers["distance"][k] = controller.estimate.distance
         numbers["pace"][k] = controller.pace
         self._status[k] = status = int(controller.status)
-        if status not in self._texts:
-            self._texts[status] = controller.status_text
+        if status != self._last and len(self._events) < _MOST_EVENTS:
+            self._events.append(LoopEvent(time, status, controller.status_text))
+        self._last = status
 
     def run(self, ticks: int) -> LoopRun:
         """Return the first ticks."""
         return LoopRun(
             parameters=self._controller.robot.parameters,
             status=self._status[:ticks],
-            texts=dict(self._texts),
+            events=tuple(self._events),
             **{name: rows[:ticks] for name, rows in (self._rows | self._numbers).items()},
         )
 

@@ -16,6 +16,9 @@ from rps_pin.rps.pose import position, rotation
 
 Array = NDArray[np.float64]
 
+#: Of a window's ends, s.
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class TrackingErrors:
@@ -111,7 +114,7 @@ class LoopSummary:
         InputError
             If there is no tick in the window.
         """
-        here = (run.time >= begin - 1e-12) & (run.time < end)
+        here = (run.time >= begin - _ROUNDING) & (run.time < end - _ROUNDING)
         if not here.any():
             raise InputError(f"no tick between {begin} and {end} s; the run has {run.time.size}")
         errors = TrackingErrors.of(run)

@@ -10,6 +10,9 @@ from rps_pin.control.loop_summary import LoopSummary, status_name
 from rps_pin.control.scenario import Scenario
 from rps_pin.errors import InputError
 
+#: Changes of the status that are written out.
+_MOST_SHOWN = 50
+
 
 def report(
     title: str, scenario: Scenario, run: LoopRun, summary: LoopSummary, figures: Mapping[str, str]
@@ -90,5 +93,12 @@ def _statuses(run: LoopRun, summary: LoopSummary) -> list[str]:
         f"- {name}: {count} ticks, first at {summary.first[name]:.6g} s"
         for name, count in summary.statuses.items()
     ]
-    lines += [f"- ({status_name(number)}) {text}" for number, text in run.texts.items() if number]
-    return lines or ["ok throughout."]
+    if not run.events:
+        return ["ok throughout."]
+    lines += ["", "| t (s) | status | in words |", "|---:|---|---|"]
+    lines += [
+        f"| {event.time:.6g} | {status_name(event.status)} | {event.text} |"
+        for event in run.events[:_MOST_SHOWN]
+    ]
+    more = len(run.events) - _MOST_SHOWN
+    return [*lines, "", f"... and {more} further changes."] if more > 0 else lines

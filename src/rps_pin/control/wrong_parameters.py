@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from rps_pin.errors import InputError
 from rps_pin.rps.leg_equations import checked_positive
 from rps_pin.rps.parameters import RPSParameters
+
+_FRICTION = (
+    *("prismatic_damping", "prismatic_friction", "revolute_damping"),
+    *("revolute_friction", "friction_speed"),
+)
 
 
 def wrong_parameters(
@@ -34,6 +40,9 @@ def wrong_parameters(
     InputError
         If a factor is not positive, or friction negative.
     """
+    for name in friction:
+        if name in RPSParameters.model_fields and name not in _FRICTION:
+            raise InputError(f"{name} is no friction; that is: {', '.join(_FRICTION)}")
     factors = {"masses": masses, "platform": platform, "legs": legs, "rods": rods}
     for name, factor in factors.items():
         checked_positive(factor, name)

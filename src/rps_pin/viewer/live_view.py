@@ -1,20 +1,27 @@
 """The newest pose of a running loop in the browser, without disturbing the loop.
 
 The viewer is a process of its own. Between it and the loop lies a small shared memory: the loop
-writes a pose there, which takes a microsecond and never waits; the viewer looks at its own rate,
-and shows what is new. (A thread would not do: it holds Python's interpreter lock for up to 5 ms at
-a time, and a loop at 1 kHz waits for it.) Whatever happens to the viewer, the loop goes on.
+writes a pose there, which takes about a microsecond and never waits; the viewer looks at its own
+rate, and shows what is new. (A thread would not do: it holds Python's interpreter lock for up to
+5 ms at a time, and a loop at 1 kHz waits for it.) Whatever happens to the viewer, the loop goes on.
+
+A pose that is read while it is written must not be shown. Its checksum tells, in whatever order a
+processor makes the writes visible; the viewer then looks again at its next picture.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 import multiprocessing
+import os
 import signal
 import struct
+import zlib
+from collections.abc import Iterator
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
@@ -23,8 +30,9 @@ from rps_pin.errors import InputError, RPSPinError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.viewer.motion import FRAME_RATE, check_frame_rate
 
-#: Number of the write, pose, and the number once more: unequal numbers mark a pose being written.
-_SLOT = struct.Struct("5d")
+#: Number of the write, and the pose; its CRC-32 follows.
+_RECORD = struct.Struct("4d")
+_CHECKSUM = 4
 _START_SECONDS = 60.0
 _END_SECONDS = 5.0
 
@@ -57,6 +65,11 @@ class LiveView:
     RPSPinError
         If the viewer does not start; says why.
 
+    Notes
+    -----
+    As for every process that Python spawns, a script that makes a live view must have its work
+    below ``if __name__ == "__main__":``, or the new process would do it once more.
+
     Examples
     --------
     >>> with LiveView(robot, pose) as view:  # doctest: +SKIP
@@ -73,14 +86,16 @@ class LiveView:
         port: int | None = None,
         title: str = "Robot",
     ) -> None:
+        if not isinstance(robot, RPSRobot):
+            raise InputError(f"robot is a {type(robot).__name__}; it must be an RPSRobot")
         check_frame_rate(rate)
         start = np.asarray(pose, dtype=np.float64)
         if start.shape != (3,) or not np.isfinite(start).all():
             raise InputError(f"pose = {pose!r}: it must be three finite numbers")
-        self._asked = (robot, rate, port, title)
+        self._asked = (robot, start, rate, port, title)
         # Not forked: Meshcat's server, and OpenBLAS, have threads.
         self._context = multiprocessing.get_context("spawn")
-        self._slot = self._context.RawArray("d", 5)
+        self._slot = self._context.RawArray("B", _RECORD.size + _CHECKSUM)
         self._memory = memoryview(self._slot).cast("B")
         self._count = 0.0
         self.url = ""
@@ -91,11 +106,20 @@ class LiveView:
     def show(self, pose: Any) -> None:
         """Give the newest pose, an array of shape (3,); takes about a microsecond, and never waits.
 
-        Nothing is checked here: a pose that cannot be shown is left out.
+        What the numbers are is not checked: a pose that cannot be shown is left out.
+
+        Raises
+        ------
+        InputError
+            If these are not three numbers.
         """
         self._count += 1.0
-        z, tilt_x, tilt_y = pose
-        _SLOT.pack_into(self._memory, 0, self._count, z, tilt_x, tilt_y, self._count)
+        try:
+            z, tilt_x, tilt_y = pose
+            record = _RECORD.pack(self._count, z, tilt_x, tilt_y)
+        except (TypeError, ValueError, struct.error):
+            raise InputError(f"pose = {pose!r}: it must be three numbers") from None
+        self._memory[:] = _checked(record)
 
     @property
     def alive(self) -> bool:
@@ -105,36 +129,41 @@ class LiveView:
     def __enter__(self) -> Self:
         if self._process is not None:
             raise RPSPinError("the view is running already, or has run: make a new one")
+        try:
+            self.url = self._start()
+        except BaseException:  # Ctrl-C too: __exit__ is not called
+            self._stop()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop()
+
+    def _start(self) -> str:
+        """Start the process and return its address."""
         self._line, theirs = self._context.Pipe()
-        self._process = self._context.Process(
+        process = self._context.Process(
             target=_serve,
             args=(*self._asked, self._slot, theirs),
             name="rps_pin live view",
             daemon=True,
         )
-        self._process.start()
-        theirs.close()
+        with theirs, _ctrl_c_blocked():
+            process.start()
+            self._process = process
         try:
-            told = self._line.recv() if self._line.poll(_START_SECONDS) else None
-        except EOFError:
-            told = None
-        if not (isinstance(told, str) and told.startswith("http")):
-            self._stop()
-            raise RPSPinError(f"the live view did not start: {told or 'its process ended'}")
-        self.url = told
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._stop()
+            told = self._line.recv() if self._line.poll(_START_SECONDS) else "it took too long"
+        except (EOFError, OSError):
+            told = 'its process ended (a script needs `if __name__ == "__main__":`)'
+        if not told.startswith("http"):
+            raise RPSPinError(f"the live view did not start: {told}")
+        return str(told)
 
     def _stop(self) -> None:
-        """End the process: it does when its line is cut."""
+        """End the process: it does when its line says anything, or is cut."""
         if self._line is not None:
+            with contextlib.suppress(OSError):  # nobody listens any more
+                self._line.send(None)
             self._line.close()
         if self._process is not None:
             self._process.join(_END_SECONDS)
@@ -143,40 +172,60 @@ class LiveView:
                 self._process.join()
 
 
+def _checked(record: bytes) -> bytes:
+    """Return a record and its checksum."""
+    return record + zlib.crc32(record).to_bytes(_CHECKSUM, "little")
+
+
+@contextlib.contextmanager
+def _ctrl_c_blocked() -> Iterator[None]:
+    """Keep Ctrl-C from the processes that are started here: it is the loop's.
+
+    They inherit the mask, and so never show a traceback, not even while they import.
+    """
+    resource_tracker.ensure_running()  # where it first has to start, it would unblock the signal
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 # In the viewer's process --------------------------------------------------------------------------
 
 
 def _serve(
-    robot: RPSRobot, rate: float, port: int | None, title: str, slot: Any, line: Connection
+    robot: RPSRobot,
+    start: Any,
+    rate: float,
+    port: int | None,
+    title: str,
+    slot: Any,
+    line: Connection,
 ) -> None:
-    """Show what the slot holds, at the rate, until the line is cut."""
+    """Show what the slot holds, at the rate, until the line or the loop's process ends."""
     from rps_pin.viewer.scene import Scene  # noqa: PLC0415
     from rps_pin.viewer.server import LocalViewer  # noqa: PLC0415
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the loop's; the line tells of its end
-    memory = memoryview(slot).cast("B")
-    robot, still = _unlimited(robot), np.zeros(3)
+    memory, parent = memoryview(slot).cast("B"), os.getppid()
+    # Shapes depend on the limits, so the scene is the robot's own.
+    free, still, seen = _unlimited(robot), np.zeros(3), 0.0
     try:
-        seen, pose = _newest(memory)
-        start = robot.state(pose, still, still)[0]
+        first = free.state(start, still, still)[0]
         with LocalViewer(port, title=title) as viewer:
-            scene = Scene(robot.mechanism.model, robot.visual_model(), viewer.window, start[None])
+            scene = Scene(robot.mechanism.model, robot.visual_model(), viewer.window, first)
             line.send(viewer.url)
-            while not line.poll(1.0 / rate):  # a line that is cut polls true
-                count, pose = _newest(memory)
-                if count != seen and all(map(math.isfinite, pose)):
-                    seen = count
-                    _display(scene, robot, pose)
+            # A line that is cut polls true, unless a process forked from the loop's holds it too.
+            while not line.poll(1.0 / rate) and os.getppid() == parent:
+                newest = _newest(memory)
+                if newest is not None and newest[0] != seen:
+                    seen, pose = newest
+                    # One that cannot be shown is left out, overflows and all.
+                    with contextlib.suppress(RPSPinError), np.errstate(all="ignore"):
+                        scene.display(free.state(pose, still, still)[0])
     except (RPSPinError, OSError) as error:
-        _tell(line, str(error))
-
-
-def _display(scene: Any, robot: RPSRobot, pose: tuple[float, float, float]) -> None:
-    still = np.zeros(3)
-    try:
-        scene.display(robot.state(pose, still, still)[0])
-    except RPSPinError:
-        return  # a pose that cannot be shown is left out
+        with contextlib.suppress(OSError):  # nobody listens any more
+            line.send(str(error))
 
 
 def _unlimited(robot: RPSRobot) -> RPSRobot:
@@ -190,16 +239,11 @@ def _unlimited(robot: RPSRobot) -> RPSRobot:
     )
 
 
-def _newest(memory: memoryview) -> tuple[float, tuple[float, float, float]]:
-    """Return the newest pose that is not being written, and its number."""
-    while True:
-        begin, z, tilt_x, tilt_y, end = _SLOT.unpack_from(memory, 0)
-        if begin == end:
-            return begin, (z, tilt_x, tilt_y)
-
-
-def _tell(line: Connection, words: str) -> None:
-    try:
-        line.send(words)
-    except OSError:
-        return  # nobody listens any more
+def _newest(memory: memoryview) -> tuple[float, tuple[float, float, float]] | None:
+    """Return the number of the newest pose and the pose, or None while it is being written."""
+    copy = bytes(memory)
+    record = copy[: _RECORD.size]
+    if copy != _checked(record):
+        return None
+    count, z, tilt_x, tilt_y = _RECORD.unpack(record)
+    return count, (z, tilt_x, tilt_y)
