@@ -186,6 +186,7 @@ def measure_all(ticks: int, console: Console) -> dict[str, dict[str, float]]:
         measured(call, min(count, 20_000), times)
         before = resident()
         measured(call, count, times)
+        grew = resident() - before
         median, p99, p999 = np.percentile(times[:count], [50, 99, 99.9]).tolist()
         found[name] = {
             "ticks": count,
@@ -193,7 +194,7 @@ def measure_all(ticks: int, console: Console) -> dict[str, dict[str, float]]:
             "p99": p99,
             "p99.9": p999,
             "maximum": float(times[:count].max()),
-            "grew_kB": (resident() - before) / 1024,
+            "grew_kB": grew / 1024,
         }
     return found
 

@@ -5,10 +5,12 @@ development dependencies (about two minutes):
 
     .venv/bin/python docs/control_tables.py
 
-The table of latencies is of docs/control_latency.json, which takes longer (about a quarter of an
-hour for a million ticks a stage):
+The tables of times are of docs/control_latency.json and docs/control_profile.json. The first takes
+longer, about ten minutes for a million ticks a stage:
 
-    OPENBLAS_NUM_THREADS=1 .venv/bin/python -m benchmarks.latency --json docs/control_latency.json
+    export OPENBLAS_NUM_THREADS=1
+    .venv/bin/python -m benchmarks.latency --json docs/control_latency.json
+    .venv/bin/python -m benchmarks.tick_profile --json docs/control_profile.json
 """
 
 from __future__ import annotations
@@ -40,6 +42,7 @@ ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "control.md"
 SCENARIOS = ROOT / "docs" / "scenarios"
 LATENCY = ROOT / "docs" / "control_latency.json"
+PROFILE = ROOT / "docs" / "control_profile.json"
 IMAGES = ROOT / "docs" / "images"
 
 BANDWIDTH, INTEGRAL = 15.0, 0.2
@@ -60,6 +63,7 @@ def main() -> None:
         "faults": faults,
         "saturation": saturation,
         "latency": latency,
+        "profile": profile,
     }
     text = PAGE.read_text("utf-8")
     for name, make in parts.items():
@@ -250,6 +254,18 @@ def latency() -> str:
         cells = " | ".join(f"{value:.1f}" for value in figures)
         lines.append(f"| {name} | {row['ticks']:,} | {cells} | {row['grew_kB']:.0f} kB |")
     return "\n".join([*lines, "", f"us a tick; {measured['machine']}."])
+
+
+def profile() -> str:
+    """Return the table of a tick's parts as measured."""
+    measured = json.loads(PROFILE.read_text("utf-8"))
+    whole = measured["parts"]["whole tick"]
+    lines = ["| part of a tick | us | share |", "|---|---:|---:|"]
+    lines += [
+        f"| {name} | {value:.1f} | {value / whole:.0%} |"
+        for name, value in measured["parts"].items()
+    ]
+    return "\n".join([*lines, "", f"{measured['machine']}."])
 
 
 def save_figure_named(run: LoopRun, name: str) -> None:

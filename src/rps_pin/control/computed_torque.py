@@ -23,12 +23,12 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rps_pin.control.controller import Controller, Space, difference
+from rps_pin.control.controller import Controller, Space
 from rps_pin.control.gains import Gains
 from rps_pin.control.real_time import Known
 from rps_pin.control.scalar_rates import leg_speed, pose_rate
 from rps_pin.control.scalar_state import state_at
-from rps_pin.control.targets import Goal
+from rps_pin.control.targets import Goal, difference
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.scalar_tracking import Triple
 

@@ -6,14 +6,15 @@ Nothing in it raises for its numbers, and the forces it leaves are always finite
 
 - A reading that is lost, not finite, or jumps is not believed; for a few ticks the robot is taken
   to move on at its last rate. After `most_lost` of them in a row the controller stops.
-- A target that cannot be gone to is refused, the last good one held (`rps_pin.control.targets`).
+- A target that cannot be gone to is refused, the last good one held, and the next good one come
+  back to without a step (`rps_pin.control.targets`).
 - Forces beyond the limits are replaced by those nearest in effect (`rps_pin.control.force_limits`),
   and the law's integral gives way by what they miss.
 - Where the robot is too near a singularity for its forces to be known, the controller stops.
 
-Stopped, it goes nowhere any more: with readings that can be believed it brakes (the law's damping
-and the weight), without them it holds the weight where it last knew the robot. It stays so until
-`reset`; brakes that hold without current are the drives' business.
+Stopped, it goes nowhere any more: with readings that can be believed the law holds the pose that
+was seen first; without them, or too near a singularity, the forces only bear the weight. It stays
+so until `reset`; brakes that hold without current are the drives' business.
 """
 
 from __future__ import annotations
@@ -153,7 +154,12 @@ class Controller(ABC):
         self._give = tuple(1.0 / time for time in gains.tracking_time)
         self._g, self._h = p.base_radius, p.platform_radius
         self._targets = Targets(
-            LimitCheck(p), self._g, self._h, near_singular, 1e6 * (self._g + self._h)
+            LimitCheck(p),
+            self._g,
+            self._h,
+            near_singular,
+            1e6 * (self._g + self._h),
+            p.actuator_speed_limit,
         )
         self._limits = ForceLimits(_limit(robot, force_limit))
         self._mass = ReducedMass(robot)
@@ -180,6 +186,7 @@ class Controller(ABC):
         self._matched.reset()
         self._measured = False
         self._why = ""
+        self._rest: Goal | None = None
         self.pace = 1.0
         self.status = Status.OK
         self._wanted: Triple = _STILL
@@ -216,27 +223,31 @@ class Controller(ABC):
         """
         estimate = self.estimate
         number = int(estimate.estimate(length, speed, dt=dt))
-        if not self._targets.take(target):
+        time = self.period if dt is None else elapsed_time(dt)
+        if not self._targets.take(target, time):
             number |= _TARGET_HELD
+        # Of a reading that is not believed nothing is integrated.
+        fresh = not number & _KEPT
+        elapsed = time if fresh else 0.0
         if self._why:
-            return self._stopped(number)
+            return self._stopped(number, elapsed)
         self._measured = speed is not None
         known: Known | None = estimate.known
-        fresh = not number & _KEPT
         if not fresh:
             if estimate.age > self._most_lost:
-                return self._stopped(number, f"{estimate.age} readings in a row were not good")
+                why = f"{estimate.age} readings in a row were not good"
+                return self._stopped(number, elapsed, why)
             known = self._ahead(estimate.known, estimate.elapsed)
         if known is None or self._too_near(known):
             return self._stopped(
                 number | _NEAR_SINGULAR,
+                elapsed,
                 f"at a distance of less than {self._stop:.3g} to a singularity",
             )
-        # Of a reading that is not believed nothing is integrated.
-        elapsed = 0.0 if not fresh else self.period if dt is None else elapsed_time(dt)
         force = self._law(known, self._targets.goal, elapsed)
         if force is None or not math.isfinite(force[0] + force[1] + force[2]):
-            return self._stopped(number | _NOT_CONVERGED, "the law gave no finite forces")
+            why = "the law gave no finite forces"
+            return self._stopped(number | _NOT_CONVERGED, elapsed, why)
         if not self._limits.within(force):
             number |= _SATURATED
             force = self._limited(force, known, elapsed)
@@ -260,7 +271,6 @@ class Controller(ABC):
         words = []
         if self.status & (Status.TARGET_HELD):
             words += self._targets.words()
-            words.append("the last good target is held")
         if self.estimate.status:
             words.append(self.estimate.status_text)
         if self.status & Status.SATURATED:
@@ -324,28 +334,36 @@ class Controller(ABC):
         return not (abs(known.gains.determinant) > self._stop < abs(turning))
 
     def _weight(self) -> Triple:
-        """Return the forces that hold the robot still at the last good pose."""
-        held = self._solve(state_at(self.estimate.known.place, _STILL, _STILL, self._h))
+        """Return the forces that hold the weight at the last good pose.
+
+        Near a singularity they grow without bound; then those at the last good target, which is not
+        near one.
+        """
+        known = self.estimate.known
+        place = self._targets.goal.place if self._too_near(known) else known.place
+        held = self._solve(state_at(place, _STILL, _STILL, self._h))
         return _STILL if held is None else held
 
-    def _stopped(self, number: int, why: str = "") -> Status:
-        """Stop, or stay stopped: brake, or hold the weight."""
+    def _stopped(self, number: int, elapsed: float, why: str = "") -> Status:
+        """Stop, or stay stopped: hold the pose that was first seen since, else the weight."""
         self._why = self._why or why
-        known = self.estimate.known
-        force = None if number & _KEPT or self._too_near(known) else self._brake(known)
+        known, force = self.estimate.known, None
+        if number & _KEPT or self._too_near(known):
+            self._rest = None
+        else:
+            self._rest = self._rest or Goal(known.place, _STILL, _STILL)
+            force = self._law(known, self._rest, elapsed)
         if force is None or not math.isfinite(force[0] + force[1] + force[2]):
-            force = self._weight()
+            self._rest, force = None, self._weight()
         if not self._limits.within(force):
             number |= _SATURATED
-            self._wanted = force
-            force = self._limits.cut(force)
+            if self._rest is None:
+                self._wanted, force = force, self._limits.cut(force)
+            else:
+                force = self._limited(force, known, elapsed)
         self._send(force)
         self.status = status = STATUSES[number | _STOPPED]
         return status
-
-    def _brake(self, known: Known) -> Triple | None:
-        """Return the law's damping, and the weight: its forces for a target where the robot is."""
-        return self._law(known, Goal(known.place, _STILL, _STILL), 0.0)
 
     def _send(self, force: Triple) -> None:
         out = self.forces
@@ -363,8 +381,3 @@ def _limit(robot: RPSRobot, given: ArrayLike | None) -> Triple:
         raise InputError(f"force_limit = {given}: it must be one positive number of N, or three")
     one, two, three = np.broadcast_to(limit, 3).tolist()
     return one, two, three
-
-
-def difference(a: Triple, b: Triple) -> Triple:
-    """Return a - b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]

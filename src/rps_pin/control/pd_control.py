@@ -24,12 +24,12 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
-from rps_pin.control.controller import Controller, Space, difference
+from rps_pin.control.controller import Controller, Space
 from rps_pin.control.gains import Gains
 from rps_pin.control.real_time import Known
 from rps_pin.control.scalar_rates import force_of_wrench, leg_gains, leg_speed, wrench_of_force
 from rps_pin.control.scalar_state import state_at
-from rps_pin.control.targets import Goal
+from rps_pin.control.targets import Goal, difference
 from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.scalar_tracking import Triple
@@ -96,13 +96,6 @@ class PDControl(Controller):
         if self.compensation == "feed_forward":
             return self._solve(state_at(goal.place, goal.rate, goal.acceleration, self._h))
         return _STILL
-
-    def _brake(self, known: Known) -> Triple | None:
-        damped = super()._brake(known)
-        if damped is None or self.compensation != "none":
-            return damped
-        weight = self._weight()
-        return damped[0] + weight[0], damped[1] + weight[1], damped[2] + weight[2]
 
     def _missed(self, known: Known, force: Triple, acceleration: Triple) -> Triple:
         return wrench_of_force(known.gains, force) if self._in_task_space else force

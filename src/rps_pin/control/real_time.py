@@ -87,8 +87,8 @@ class RealTimeRobot:
     near_singular
         `distance`, or `force_determinant`, below which the status says so, 0 to 1.
     largest_jump
-        By how much a leg's reading may differ from the last good one, m, for each tick since. With
-        the default any reading that can be followed is believed.
+        By how much a leg's reading may differ from where the last good one and its speed lead, m,
+        for each tick since. With the default any reading that can be followed is believed.
     most_steps
         Steps that one reading may be divided into: what bounds the time of a tick.
 
@@ -197,8 +197,12 @@ class RealTimeRobot:
         self._asked = d = three_floats(length)
         if d is None or not (min(d) > 0.0 and max(d) < self._longest):
             return self._keep(_BAD_INPUT)
-        last = self.known.place.length
-        jump = max(abs(d[0] - last[0]), abs(d[1] - last[1]), abs(d[2] - last[2]))
+        last, (v1, v2, v3) = self.known.place.length, self.known.speed
+        jump = max(
+            abs(d[0] - last[0] - v1 * elapsed),
+            abs(d[1] - last[1] - v2 * elapsed),
+            abs(d[2] - last[2] - v3 * elapsed),
+        )
         if jump > self._jump * (self.age + 1):
             return self._keep(_JUMP)
         rates = self._filter.after(d, elapsed) if speed is None else three_floats(speed)
@@ -273,8 +277,8 @@ class RealTimeRobot:
             )
         if status & Status.JUMP:
             words.append(
-                f"lengths {_shown(self._asked)} m are more than {self._jump:.6g} m a tick from the "
-                f"last good ones, {_shown(known.place.length)} m"
+                f"lengths {_shown(self._asked)} m are more than {self._jump:.6g} m a tick from "
+                f"where the last good ones, {_shown(known.place.length)} m, were going"
             )
         if status & Status.NOT_CONVERGED:
             words.append(

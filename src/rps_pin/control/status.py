@@ -16,7 +16,7 @@ class Status(IntFlag):
     OK = 0
     #: An argument is not three numbers, not finite, or beyond all sense.
     BAD_INPUT = 1
-    #: A leg's reading jumped further than `largest_jump` since the last good one.
+    #: A leg's reading is further than `largest_jump` from where the last good one was going.
     JUMP = 2
     #: No answer was found: the lengths cannot be followed, or the forces are not determined.
     NOT_CONVERGED = 4
@@ -26,9 +26,10 @@ class Status(IntFlag):
     BEYOND_LIMIT = 16
     #: The law's forces are beyond a limit: those nearest in effect are sent.
     SATURATED = 32
-    #: The target was refused: not finite, beyond the robot's limits, or too near a singularity.
+    #: The target was refused: not finite, beyond the robot's limits, or too near a singularity; or
+    #: it is good again, and the robot on its way back to it.
     TARGET_HELD = 64
-    #: The controller has given up: it brakes, or holds the weight, until it is reset.
+    #: The controller has given up: it holds a pose, or else the weight, until it is reset.
     STOPPED = 128
 
     @property

@@ -3,7 +3,8 @@
 A target is refused if it is not finite, if a leg's length, angle or ball joint would be beyond its
 limits there, or if it is nearer to a singularity than allowed, or beyond one: the sign of Eq. 8's
 determinant must stay what it was at the start. A refused target is replaced by the pose of the last
-good one, at rest.
+good one, at rest. From there the robot comes back to the next good one without a step
+(`rps_pin.control.rejoining`), if the way there is allowed.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any, NamedTuple
 from rps_pin.control.limit_check import LimitCheck
 from rps_pin.control.numbers import three_floats
 from rps_pin.control.place import Place, place_of, turning_determinant
+from rps_pin.control.rejoining import Rejoining, rejoining_time
 from rps_pin.rps.scalar_tracking import Triple
 
 _STILL = (0.0, 0.0, 0.0)
@@ -42,52 +44,105 @@ class Targets:
         Least size of Eq. 8's determinant, 0 to 1.
     farthest
         Heights beyond it, and rates and accelerations, make no sense; m, m/s, rad/s and so on.
+    speed_limit
+        Of the actuators, m/s: half of it is for coming back to a target.
     """
 
     def __init__(
-        self, limits: LimitCheck, g: float, h: float, nearest: float, farthest: float
+        self,
+        limits: LimitCheck,
+        g: float,
+        h: float,
+        nearest: float,
+        farthest: float,
+        speed_limit: float,
     ) -> None:
         self._limits, self._g, self._h = limits, g, h
-        self._nearest, self._farthest = nearest, farthest
-        self.refused: Triple | None = None
+        self._nearest, self._farthest, self._fastest = nearest, farthest, speed_limit
 
     def reset(self, place: Place) -> None:
         """Start from a place, at rest: what is held until there is a target."""
-        self._goal = Goal(place, _STILL, _STILL)
+        self._goal = self._asked = Goal(place, _STILL, _STILL)
         self._side = math.copysign(1.0, turning_determinant(place, self._g, self._h))
+        self._held = False
+        self._refused: Triple | None = None
+        self._back: Rejoining | None = None
 
     @property
     def goal(self) -> Goal:
-        """The last one taken, or what is held."""
+        """The last one taken, the way back to it, or what is held."""
         return self._goal
 
-    def take(self, target: Any) -> bool:
-        """Take a target, and return True; or hold the last good one (see `words`).
+    def take(self, target: Any, elapsed: float) -> bool:
+        """Take a target, and return whether `goal` is it: it may be held, or not yet reached again.
 
         Parameters
         ----------
         target
-            Pose (m, rad, rad), rate and acceleration, three times (3,); None for the last one.
+            Pose (m, rad, rad), rate and acceleration, three times (3,); None for the last good one.
+        elapsed
+            Time since the last call, s.
         """
         if target is None:
-            return True
+            if not self._held and self._back is None:
+                return True
+            return self._follow(self._asked, elapsed)
+        asked = self._good(target)
+        if asked is None:
+            self._hold()
+            return False
+        if self._held or self._back is not None:
+            return self._follow(asked, elapsed)
+        self._goal = self._asked = asked
+        return True
+
+    def _good(self, target: Any) -> Goal | None:
+        """Return a target as floats, if it can be gone to; else note it."""
+        self._refused = None
         try:
             pose, rate, acceleration = target
         except (TypeError, ValueError):
-            return self._hold(None)
+            return None
         x, dx, ddx = three_floats(pose), three_floats(rate), three_floats(acceleration)
         if x is None or dx is None or ddx is None:
-            return self._hold(x)
+            return None
+        self._refused = x
         place = self._allowed(x)
         if place is None or not -self._farthest < min(*dx, *ddx) <= max(*dx, *ddx) < self._farthest:
-            return self._hold(x)
-        self._goal = Goal(place, dx, ddx)
-        return True
+            return None
+        return Goal(place, dx, ddx)
+
+    def _follow(self, asked: Goal, elapsed: float) -> bool:
+        """Go on towards a good target from where it was held."""
+        self._asked = asked
+        if self._held or self._back is None:
+            self._held, self._back = False, self._way_back(asked)
+        gap = self._back.after(elapsed if 0.0 < elapsed < math.inf else 0.0)
+        if gap is None:
+            self._back, self._goal = None, asked
+            return True
+        pose = _sum(asked.place.pose, gap[0])
+        place = self._allowed(pose)
+        if place is None:
+            self._refused = pose
+            self._hold()
+            return False
+        self._goal = Goal(place, _sum(asked.rate, gap[1]), _sum(asked.acceleration, gap[2]))
+        return False
+
+    def _way_back(self, asked: Goal) -> Rejoining:
+        held = self._goal
+        far = max(map(abs, difference(held.place.length, asked.place.length)))
+        return Rejoining(
+            difference(held.place.pose, asked.place.pose),
+            difference(held.rate, asked.rate),
+            difference(held.acceleration, asked.acceleration),
+            rejoining_time(far, self._fastest),
+        )
 
     def _allowed(self, pose: Triple) -> Place | None:
         """Return where a pose puts the legs, if it can be gone to."""
-        z, wx, wy = pose
-        if not (wx * wx + wy * wy < LARGEST_TILT_SQUARED and abs(z) < self._farthest):
+        if not self._sensible(pose):
             return None
         place = place_of(pose, self._g, self._h)
         if place is None or self._limits.broken(place):
@@ -95,25 +150,43 @@ class Targets:
         inside = self._side * turning_determinant(place, self._g, self._h) >= self._nearest
         return place if inside else None
 
+    def _sensible(self, pose: Triple) -> bool:
+        z, wx, wy = pose
+        return wx * wx + wy * wy < LARGEST_TILT_SQUARED and abs(z) < self._farthest
+
     def words(self) -> list[str]:
-        """Return why the last refused target was refused."""
-        x = self.refused
+        """Return why the goal is not the last target."""
+        if self._back is not None:
+            return [f"coming back to the target: {self._back.left:.3g} s to go"]
+        return [*self._words_of(self._refused), "the last good target is held"]
+
+    def _words_of(self, x: Triple | None) -> list[str]:
         if x is None:
             return ["the target is not three finite triples: pose, rate and acceleration"]
-        shown = "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
-        place = place_of(x, self._g, self._h) if abs(x[0]) < self._farthest else None
+        shown = "the target (" + ", ".join(f"{value:.6g}" for value in x) + ") m, rad, rad"
+        if not self._sensible(x):
+            return [f"{shown} is beyond all sense"]
+        place = place_of(x, self._g, self._h)
         if place is None:
-            return [f"the target {shown} m, rad, rad gives a leg no length"]
-        words = [f"at the target {shown} m, rad, rad, {one}" for one in self._limits.words(place)]
+            return [f"{shown} gives a leg no length"]
+        words = [f"at {shown}, {one}" for one in self._limits.words(place)]
         determinant = self._side * turning_determinant(place, self._g, self._h)
         if not determinant >= self._nearest:
             words.append(
-                f"the target {shown} m, rad, rad is too near a singularity, or beyond one: "
-                f"determinant {determinant:.3g}, at least {self._nearest:.3g} is asked for"
+                f"{shown} is too near a singularity, or beyond one: determinant "
+                f"{determinant:.3g}, at least {self._nearest:.3g} is asked for"
             )
-        return words or [f"the target {shown} m, rad, rad has rates beyond all sense"]
+        return words or [f"{shown} has rates beyond all sense"]
 
-    def _hold(self, pose: Triple | None) -> bool:
-        self.refused = pose
+    def _hold(self) -> None:
+        self._held, self._back = True, None
         self._goal = Goal(self._goal.place, _STILL, _STILL)
-        return False
+
+
+def _sum(a: Triple, b: Triple) -> Triple:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def difference(a: Triple, b: Triple) -> Triple:
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]

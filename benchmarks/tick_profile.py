@@ -1,0 +1,136 @@
+"""Where the time of a tick goes: each part of a computed-torque tick on its own, in order.
+
+    OPENBLAS_NUM_THREADS=1 .venv/bin/python -m benchmarks.tick_profile [--json FILE]
+
+A profiler would more than double the time of Python code as short as this, and not evenly; so each
+part is called alone, in a loop, with what a tick would give it, and the best of many medians
+counts. What the parts leave of a whole tick is the calls between them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import itertools
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.latency import GAINS, PERIOD, machine, motion
+from rps_pin import RPSRobot
+from rps_pin.control import ComputedTorque
+from rps_pin.control.exponential_map import coefficients
+from rps_pin.control.numbers import three_floats
+from rps_pin.control.scalar_rates import leg_gains, platform_twist, pose_rate
+from rps_pin.control.scalar_state import state_at
+from rps_pin.rps.scalar_tracking import follow, pose_of
+
+_CALLS, _REPEATS = 2000, 15
+_HALF_WAY = 300  # of the motion's ticks
+
+
+def parts() -> dict[str, Callable[[], object]]:
+    """Return the calls of one tick in the middle of a motion, and the whole."""
+    robot = RPSRobot.from_preset("micro")
+    p, rows = robot.parameters, motion()
+    g, h = p.base_radius, p.platform_radius
+    controller = ComputedTorque(robot, rows[0][0], GAINS, period=PERIOD)
+    lengths = robot.inverse_kinematics(rows[0]).length
+    targets = list(zip(*rows, strict=True))
+    for i in range(_HALF_WAY):
+        controller.tick(lengths[i], targets[i])
+    loop, reading = controller.estimate, lengths[_HALF_WAY]
+    known = loop.known
+    place, rate, speed, gains = known
+    d = three_floats(reading)
+    assert d is not None
+    turned, _, _ = follow(place.length, place.way, d, g, h, 1e6, 20)
+    pose = pose_of(d, turned, g, h)
+    tilt = pose[1] ** 2 + pose[2] ** 2
+    wanted = (1.0, 2.0, 3.0)
+    state = state_at(place, rate, wanted, h)
+    goal = controller._targets.goal
+    motions = itertools.cycle(
+        list(
+            zip(
+                np.roll(lengths, -_HALF_WAY, 0),
+                targets[_HALF_WAY:] + targets[:_HALF_WAY],
+                strict=True,
+            )
+        )
+    )
+    errors = (1e-6, 1e-6, 1e-6)
+    return {
+        "numbers out of NumPy arrays (4 times)": lambda: [three_floats(reading) for _ in range(4)],
+        "speed filter": lambda: loop._filter.after(d, PERIOD),
+        "direct kinematics, Newton's method": lambda: follow(
+            place.length, place.way, d, g, h, 1e6, 20
+        ),
+        "pose of leg angles": lambda: pose_of(d, turned, g, h),
+        "rates, twist": lambda: (
+            leg_gains(pose, turned, coefficients(tilt), h),
+            pose_rate(gains, speed),
+            platform_twist(pose, rate, place.coefficient, h),
+        ),
+        "limits, answers written": lambda: (
+            loop._limits.broken(place),
+            loop._limits.too_fast(speed),
+            loop._write(pose, rate, (0.0,) * 6, place.angle, speed),
+        ),
+        "target: legs, limits, singularity": lambda: controller._targets._allowed(goal.place.pose),
+        "the law": lambda: controller._pid(errors, rate, rate, PERIOD),
+        "state completion": lambda: state_at(place, rate, wanted, h),
+        "inverse dynamics (Pinocchio, LU)": lambda: loop.dynamics.solve(state),
+        "force limits, forces written": lambda: (
+            controller._limits.within(wanted),
+            controller._send(wanted),
+        ),
+        "whole tick": lambda: controller.tick(*next(motions)),
+    }
+
+
+def measured(calls: dict[str, Callable[[], object]]) -> dict[str, float]:
+    """Return the least of several medians of each call's time, us, taken in turn."""
+    clock, times = time.perf_counter_ns, np.zeros(_CALLS)
+    least = dict.fromkeys(calls, np.inf)
+    for _ in range(_REPEATS):
+        for name, call in calls.items():
+            for i in range(_CALLS):
+                begin = clock()
+                call()
+                times[i] = clock() - begin
+            least[name] = min(least[name], 1e-3 * float(np.median(times)))
+    return least
+
+
+def main() -> None:
+    """Measure all parts and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path, help="write the figures into this file too")
+    asked = parser.parse_args()
+    gc.disable()
+    found = measured({"nothing": lambda: None, **parts()})
+    empty = found.pop("nothing")
+    found = {name: value - empty for name, value in found.items()}
+    whole = found.pop("whole tick")
+    found["the calls between them"] = whole - sum(found.values())
+    found["whole tick"] = whole
+    table = Table("part of a tick")
+    for column in ("us", "share"):
+        table.add_column(column, justify="right")
+    for name, value in found.items():
+        table.add_row(name, f"{value:.1f}", f"{value / whole:.0%}")
+    console = Console()
+    console.print(table)
+    console.print(machine(), highlight=False)
+    if asked.json:
+        asked.json.write_text(json.dumps({"machine": machine(), "parts": found}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
