@@ -9,7 +9,7 @@
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test bench lint format setup setup-dev clean distclean
+.PHONY: help demo test docs bench lint format setup setup-dev clean distclean
 
 # A sourced ROS or openrobots environment must not put its own pinocchio before ours.
 unexport PYTHONPATH
@@ -26,8 +26,11 @@ help: ## list the targets
 demo: setup ## follow a helix with the 3-RPS robot; results go to demo/
 	.venv/bin/rps-pin helix --output demo
 
-test: setup-dev ## lint, format check, types and all tests; installs or finds Chromium
-	@sh tools/check lint format types tests
+test: setup-dev ## lint, format check, types, documentation and all tests; installs or finds Chromium
+	@sh tools/check lint format types docs tests
+
+docs: setup-dev ## build the documentation into build/docs, warnings are errors
+	@sh tools/check docs
 
 bench: setup-dev ## measure the speed of the solvers
 	OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks --benchmark-only $(PYTEST_ARGS)

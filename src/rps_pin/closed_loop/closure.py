@@ -3,20 +3,20 @@
 A `LoopClosure` joins frame a and frame b by a joint that has no coordinates of its own. It takes
 away some of b's freedom to move relative to a, a row each:
 
-=================  ====  ==========================================================================
-kind               rows  demands
-=================  ====  ==========================================================================
-``spherical``      3     the origins coincide
-``rigid``          6     the frames coincide
-``revolute``       5     the origins coincide, and the axes
-``prismatic``      5     b's origin lies on a's axis, and the frames are parallel
-``cylindrical``    4     b's origin lies on a's axis, and the axes are parallel
-``universal``      4     the origins coincide, and a's axis is perpendicular to b's
-``planar``         3     b's origin lies in the plane through a's, and the normals are parallel
-``point_on_line``  2     b's origin lies on a's axis
-``point_on_plane`` 1     b's origin lies in the plane through a's origin, across a's axis
-``distance``       1     the origins are a given distance apart (a rod with a ball at each end)
-=================  ====  ==========================================================================
+==================  ====  =========================================================================
+kind                rows  demands
+==================  ====  =========================================================================
+``spherical``       3     the origins coincide
+``rigid``           6     the frames coincide
+``revolute``        5     the origins coincide, and the axes
+``prismatic``       5     b's origin lies on a's axis, and the frames are parallel
+``cylindrical``     4     b's origin lies on a's axis, and the axes are parallel
+``universal``       4     the origins coincide, and a's axis is perpendicular to b's
+``planar``          3     b's origin lies in the plane through a's, and the normals are parallel
+``point_on_line``   2     b's origin lies on a's axis
+``point_on_plane``  1     b's origin lies in the plane through a's origin, across a's axis
+``distance``        1     the origins are a given distance apart (a rod with a ball at each end)
+==================  ====  =========================================================================
 
 A `JointCoupling` (1 row) ties two joints' coordinates, as a gear or a parallelogram does.
 

@@ -1,0 +1,56 @@
+"""How Sphinx builds this site; `make docs` does, with warnings as errors."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import rps_pin
+
+project = "rps_pin"
+version = release = rps_pin.__version__
+copyright = "the rps_pin developers; BSD-2-Clause"
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_copybutton",
+    "docstrings",  # ours, beside this file
+    "mathml",  # ours too
+]
+exclude_patterns = ["README.md"]
+
+html_theme = "furo"
+html_title = "rps_pin"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_copy_source = html_show_sourcelink = False
+highlight_language = "none"  # blocks that are indented: what a terminal shows
+html_math_renderer = "mathml"
+
+# Markdown ---------------------------------------------------------------------------------------
+
+myst_enable_extensions = ["amsmath", "colon_fence", "dollarmath"]
+myst_heading_anchors = 3
+
+# The API from docstrings ------------------------------------------------------------------------
+
+default_role = "py:obj"  # `name` in a docstring: a link where it is one
+add_module_names = False
+toc_object_entries = False
+autodoc_default_options = {"members": True, "member-order": "bysource"}
+autodoc_typehints_format = "short"
+autodoc_class_signature = "mixed"
+autodoc_preserve_defaults = True
+python_maximum_signature_line_length = 88
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+
+# A link of ours to a name that is not in the API is a mistake; types in signatures, and names of
+# other libraries, are links where they can be.
+nitpicky = True
+nitpick_ignore_regex = [("py:class", ".*"), ("py:.*", r"(?!rps_pin\.).*")]

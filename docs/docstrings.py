@@ -1,0 +1,57 @@
+"""What autodoc is told of our docstrings: blocks are formulas, bars are absolute values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from docutils import nodes
+from pydantic import BaseModel
+from sphinx import addnodes
+from sphinx.application import Sphinx
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register what is done before napoleon reads a docstring's sections (at 500)."""
+    app.connect("autodoc-process-docstring", fields_of_models, priority=300)
+    app.connect("autodoc-process-docstring", formulas, priority=400)
+    app.connect("doctree-read", exact_names)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def fields_of_models(
+    app: Sphinx, what: str, name: str, obj: Any, options: object, lines: list[str]
+) -> None:
+    """Give a pydantic model's docstring a list of its fields, as their descriptions say."""
+    if what == "class" and issubclass(obj, BaseModel):
+        lines += ["", "Attributes", "----------"]
+        for field, info in obj.model_fields.items():
+            default = "" if info.is_required() else f"; {info.default} if left out"
+            lines += [field, f"    {info.description}{default}"]
+        lines.append("")
+
+
+def formulas(
+    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
+) -> None:
+    """Keep indented blocks as they stand, and bars as they are."""
+    kept: list[str] = []
+    block = -1  # how far the block is indented; -1 outside of one
+    text = 0  # how far the last line of text was
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        if line.strip():
+            if indent < block:
+                block = -1
+            if block < 0 and kept and not kept[-1].strip() and indent >= text + 4:
+                kept += [" " * text + "::", ""]
+                block = indent
+            if block < 0:
+                text = indent
+        kept.append(line if block >= 0 else line.replace("|", r"\|"))
+    lines[:] = kept
+
+
+def exact_names(app: Sphinx, doctree: nodes.document) -> None:
+    """Look names in fields up as they are, not as the end of some name anywhere."""
+    for reference in doctree.findall(addnodes.pending_xref):
+        reference.attributes.pop("refspecific", None)
