@@ -1,13 +1,18 @@
-"""What a mechanism looks like: the shapes of the URDF that its description names."""
+"""What a mechanism looks like: the shapes of the URDF that its description names, or a skeleton."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
+import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
+from pinocchio import coal
 
+from rps_pin.closed_loop.closure import LoopClosure
 from rps_pin.closed_loop.description_schema import validated
+from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.errors import MechanismError
 from rps_pin.yaml_files import read_yaml
 
@@ -44,3 +49,55 @@ def visual_model(path: str | os.PathLike[str], model: pin.Model) -> pin.Geometry
         )
     except ValueError as error:
         raise MechanismError(f"{urdf}: its shapes cannot be read: {error}") from None
+
+
+def skeleton(mechanism: ClosedLoopModel) -> pin.GeometryModel:
+    """Return bars for a mechanism that has no shapes of its own.
+
+    A ball at every joint, and a bar on each body from its joint to the joints that it carries and
+    to its closed frames. The thickness is a fiftieth of the longest bar, or 1 cm if all are short
+    of any length.
+    """
+    model = mechanism.model
+    ends: list[tuple[int, NDArray[np.float64]]] = []
+    for joint in range(1, model.njoints):
+        ends.append((int(model.parents[joint]), np.array(model.jointPlacements[joint].translation)))
+    for closure in mechanism.closures:
+        if isinstance(closure, LoopClosure):
+            for index in closure.frame_ids(model):
+                frame = model.frames[index]
+                ends.append((int(frame.parentJoint), np.array(frame.placement.translation)))
+    longest = max((float(np.linalg.norm(end)) for _, end in ends), default=0.0)
+    radius = longest / 50.0 or 0.01
+    shapes = pin.GeometryModel()
+    for joint in range(1, model.njoints):
+        ball = coal.Sphere(1.6 * radius)
+        _add(shapes, f"joint_{joint}", joint, pin.SE3.Identity(), ball, _JOINT)
+    for count, (joint, end) in enumerate(ends):
+        length = float(np.linalg.norm(end))
+        if length > 2.0 * radius:
+            turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end / length)
+            middle = pin.SE3(turn.matrix(), end / 2.0)
+            bar = coal.Cylinder(radius, length)
+            _add(shapes, f"bar_{count + 1}", joint, middle, bar, _BAR if joint else _BASE)
+    return shapes
+
+
+_JOINT, _BAR, _BASE = (
+    np.array([0.83, 0.62, 0.22, 1.0]),
+    np.array([0.16, 0.39, 0.68, 1.0]),
+    np.array([0.45, 0.48, 0.52, 1.0]),
+)
+
+
+def _add(
+    shapes: pin.GeometryModel,
+    name: str,
+    joint: int,
+    placement: pin.SE3,
+    shape: coal.CollisionGeometry,
+    colour: NDArray[np.float64],
+) -> None:
+    item = pin.GeometryObject(name, joint, placement, shape)
+    item.meshColor = colour
+    shapes.addGeometryObject(item)

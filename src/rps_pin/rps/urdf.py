@@ -31,11 +31,18 @@ LEG_DIRECTIONS = (0.0, 2 * math.pi / 3, -2 * math.pi / 3)
 #: URDF knows no infinite limit: what it says for an effort (N) or a speed (m/s, rad/s) without one.
 URDF_UNLIMITED = 1e6
 
-_STEEL = ("steel", (0.62, 0.65, 0.70, 1.0))
-_DARK = ("dark", (0.23, 0.26, 0.31, 1.0))
-_BLUE = ("blue", (0.16, 0.39, 0.68, 1.0))
+_STEEL = ("steel", (0.58, 0.61, 0.66, 1.0))
+_BRIGHT = ("bright", (0.84, 0.86, 0.89, 1.0))
+_DARK = ("dark", (0.20, 0.23, 0.28, 1.0))
+_BLUE = ("blue", (0.16, 0.33, 0.55, 1.0))
+_WHITE = ("white", (0.76, 0.78, 0.81, 1.0))
 _BRASS = ("brass", (0.83, 0.62, 0.22, 1.0))
-_RED = ("red", (0.80, 0.20, 0.16, 1.0))
+#: One colour for each leg, told apart by all: those of the plots (Okabe and Ito).
+_LEGS = (
+    ("leg_1", (0.0, 0.447, 0.698, 1.0)),
+    ("leg_2", (0.835, 0.369, 0.0, 1.0)),
+    ("leg_3", (0.0, 0.620, 0.451, 1.0)),
+)
 
 Shape: TypeAlias = yourdfpy.Box | yourdfpy.Cylinder | yourdfpy.Sphere
 Paint = tuple[str, tuple[float, float, float, float]]
@@ -116,36 +123,60 @@ def _base(parameters: RPSParameters, size: _Sizes) -> yourdfpy.Link:
     """Return the base: a plate below the revolute joints, and a clevis for each of them."""
     link = yourdfpy.Link("base")
     radius = parameters.base_radius + 2.5 * size.clevis
-    plate = _at(0.0, 0.0, -size.clevis - size.plate / 2)
-    _add(link, "plate", yourdfpy.Cylinder(radius, size.plate), plate, _DARK)
+    top = -size.clevis
+    plate = _at(0.0, 0.0, top - size.plate / 2)
+    _add(link, "plate", yourdfpy.Cylinder(radius, size.plate), plate, _STEEL)
     gap = 1.3 * size.cylinder
     cheek = np.array([1.6 * size.cylinder, 0.5 * size.cylinder, 2 * size.clevis])
+    foot = np.array([3.2 * size.cylinder, 3.8 * size.cylinder, 0.3 * size.clevis])
     for leg, direction in zip(LEGS, LEG_DIRECTIONS, strict=True):
         joint = _leg_placement(parameters, direction)
+        place = joint @ _at(0, 0, top + foot[2] / 2)
+        _decorate(link, f"foot_{leg}", yourdfpy.Box(foot), place, _DARK)
         for side, offset in (("left", gap), ("right", -gap)):
             place = joint @ _at(0, offset, 0)
-            _add(link, f"clevis_{leg}_{side}", yourdfpy.Box(cheek), place, _STEEL)
+            _add(link, f"clevis_{leg}_{side}", yourdfpy.Box(cheek), place, _DARK)
+            end = yourdfpy.Cylinder(0.8 * size.cylinder, 0.5 * size.cylinder)
+            place = joint @ _at(0, offset, size.clevis) @ _turn_x(math.pi / 2)
+            _decorate(link, f"clevis_{leg}_{side}_end", end, place, _DARK)
         pin = yourdfpy.Cylinder(0.45 * size.cylinder, 3.4 * size.cylinder)
         _add(link, f"pin_{leg}", pin, joint @ _turn_x(math.pi / 2), _BRASS)
     return link
 
 
 def _platform(parameters: RPSParameters, size: _Sizes) -> yourdfpy.Link:
-    """Return the platform: a disc with three balls, its leg-1 side marked in red."""
+    """Return the platform: a disc on three balls, with a white face and a mark for each leg.
+
+    The balls' centres, and the platform's own, lie in one plane; the disc lies on the balls.
+    """
     inertial = yourdfpy.Inertial(
         origin=np.eye(4),
         mass=parameters.platform_mass,
         inertia=np.array(parameters.platform_inertia),
     )
     link = yourdfpy.Link("platform", inertial=inertial)
-    thickness = 0.8 * size.plate
-    radius = parameters.platform_radius
-    _add(link, "disc", yourdfpy.Cylinder(radius, thickness), np.eye(4), _BLUE)
-    mark = yourdfpy.Box(np.array([0.35 * radius, 0.06 * radius, 0.3 * thickness]))
-    _add(link, "mark", mark, _at(0.7 * radius, 0, 0.55 * thickness), _RED)
+    radius, thickness = parameters.platform_radius, 0.8 * size.plate
+    outer = radius + 1.3 * size.ball
+    low = 0.7 * size.ball
+    top = low + thickness
+    disc = yourdfpy.Cylinder(outer, thickness)
+    _add(link, "disc", disc, _at(0, 0, low + thickness / 2), _BLUE)
+    face, mark = 0.04 * thickness, 0.08 * thickness
+    white = yourdfpy.Cylinder(outer - 0.8 * size.ball, 2 * face)
+    _decorate(link, "face", white, _at(0, 0, top), _WHITE)
     for leg, direction in zip(LEGS, LEG_DIRECTIONS, strict=True):
         ball = _at(*_polar(radius, direction))
         _add(link, f"ball_{leg}", yourdfpy.Sphere(size.ball), ball, _BRASS)
+        socket = yourdfpy.Cylinder(1.15 * size.ball, 0.8 * size.ball)
+        _decorate(link, f"socket_{leg}", socket, ball @ _at(0, 0, 0.55 * size.ball), _DARK)
+        spoke = yourdfpy.Box(np.array([0.62 * radius, 0.055 * radius, 2 * mark]))
+        turned = _turn(0, 1, direction) @ _at(0.55 * radius, 0, top)
+        _decorate(link, f"mark_{leg}", spoke, turned, _LEGS[leg - 1])
+        dot = yourdfpy.Cylinder(0.075 * radius, 2 * mark)
+        tip = _turn(0, 1, direction) @ _at(0.86 * radius, 0, top)
+        _decorate(link, f"mark_{leg}_end", dot, tip, _LEGS[leg - 1])
+    centre = yourdfpy.Cylinder(0.05 * radius, 2 * mark)
+    _decorate(link, "centre", centre, _at(0, 0, top), _DARK)
     return link
 
 
@@ -160,7 +191,14 @@ def _cylinder_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfp
     middle = _at((size.part + size.cylinder) / 2, 0, 0) @ _TO_X
     _add(link, "tube", tube, middle, _DARK)
     hub = yourdfpy.Sphere(1.15 * size.cylinder)
-    _add(link, "hub", hub, np.eye(4), _DARK)
+    _add(link, "hub", hub, np.eye(4), _STEEL)
+    rear, gland = 1.3 * size.cylinder, 1.6 * size.cylinder
+    for name, at, length, paint in (
+        ("rear", 1.4 * size.cylinder + rear / 2, rear, _STEEL),
+        ("gland", size.part - gland / 2, gland, _LEGS[leg - 1]),
+    ):
+        ring = yourdfpy.Cylinder(1.18 * size.cylinder, length)
+        _decorate(link, name, ring, _at(at, 0, 0) @ _TO_X, paint)
     return link
 
 
@@ -172,7 +210,9 @@ def _rod_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfpy.Lin
         inertial=_bar_inertial(parameters.rod_mass, -parameters.rod_com, inertia),
     )
     rod = yourdfpy.Cylinder(size.rod, size.part)
-    _add(link, "rod", rod, _at(-size.part / 2, 0, 0) @ _TO_X, _STEEL)
+    _add(link, "rod", rod, _at(-size.part / 2, 0, 0) @ _TO_X, _BRIGHT)
+    nut = yourdfpy.Cylinder(1.35 * size.rod, 1.2 * size.ball)
+    _decorate(link, "nut", nut, _at(-1.5 * size.ball, 0, 0) @ _TO_X, _DARK)
     return link
 
 
@@ -198,13 +238,23 @@ def _add(
     link: yourdfpy.Link, name: str, shape: Shape, origin: NDArray[np.float64], paint: Paint
 ) -> None:
     """Give a link a shape, to be seen and to be hit."""
+    visual = _decorate(link, name, shape, origin, paint)
+    link.collisions.append(
+        yourdfpy.Collision(name=visual.name, origin=origin, geometry=visual.geometry)
+    )
+
+
+def _decorate(
+    link: yourdfpy.Link, name: str, shape: Shape, origin: NDArray[np.float64], paint: Paint
+) -> yourdfpy.Visual:
+    """Give a link a shape that is only seen."""
     geometry = yourdfpy.Geometry(**{type(shape).__name__.lower(): shape})
     colour = yourdfpy.Material(name=paint[0], color=yourdfpy.Color(np.array(paint[1])))
-    full_name = f"{link.name}_{name}"
-    link.visuals.append(
-        yourdfpy.Visual(name=full_name, origin=origin, geometry=geometry, material=colour)
+    visual = yourdfpy.Visual(
+        name=f"{link.name}_{name}", origin=origin, geometry=geometry, material=colour
     )
-    link.collisions.append(yourdfpy.Collision(name=full_name, origin=origin, geometry=geometry))
+    link.visuals.append(visual)
+    return visual
 
 
 # Joints -------------------------------------------------------------------------------------------

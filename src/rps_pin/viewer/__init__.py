@@ -1,24 +1,60 @@
-"""Robots in the browser, with Meshcat: a page on disk, or a server on this machine only."""
+"""Robots in the browser, with Meshcat: a page on disk, or a server on this machine only.
+
+`show`, `save_html`, `save_png` and `save_video` take a robot, what it does, and the layers to show
+with it; `Scene` and what is below it know Pinocchio models only.
+"""
 
 from rps_pin.viewer.html import write_html
+from rps_pin.viewer.layers import (
+    LAYERS,
+    Closures,
+    Forces,
+    Frames,
+    Ghosts,
+    Layer,
+    Limits,
+    Reactions,
+    Singularity,
+    Trail,
+    WorkspaceSurface,
+)
 from rps_pin.viewer.live_view import LiveView
 from rps_pin.viewer.motion import FRAME_RATE, Motion
 from rps_pin.viewer.playback import play
 from rps_pin.viewer.recorder import Recorder
+from rps_pin.viewer.save import LocalView, save_html, save_png, save_video, show
 from rps_pin.viewer.scene import Scene
 from rps_pin.viewer.server import LocalViewer
+from rps_pin.viewer.view import View
 from rps_pin.viewer.window import Command, RawCommand, Window
 
 __all__ = [
     "FRAME_RATE",
+    "LAYERS",
+    "Closures",
     "Command",
+    "Forces",
+    "Frames",
+    "Ghosts",
+    "Layer",
+    "Limits",
     "LiveView",
+    "LocalView",
     "LocalViewer",
     "Motion",
     "RawCommand",
+    "Reactions",
     "Recorder",
     "Scene",
+    "Singularity",
+    "Trail",
+    "View",
     "Window",
+    "WorkspaceSurface",
     "play",
+    "save_html",
+    "save_png",
+    "save_video",
+    "show",
     "write_html",
 ]

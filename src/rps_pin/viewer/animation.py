@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,13 +17,44 @@ _FLOAT32_ARRAY = 0x17
 """Meshcat's MessagePack code for numbers that the browser reads as a ``Float32Array``."""
 
 
-def animation_command(
+class Clip(NamedTuple):
+    """How one node of the scene tree moves; n keyframes."""
+
+    path: str
+    """Where it is in the tree."""
+    poses: NDArray[np.float64]
+    """Homogeneous matrices, shape (n, 4, 4); their columns' lengths are scales."""
+    parts: Sequence[str] = ()
+    """Paths of the objects below it whose colour changes."""
+    colours: NDArray[np.float64] | None = None
+    """Red, green and blue of these, 0 to 1, shape (n, 3)."""
+
+
+def link_clips(
     model: pin.Model,
     links: Sequence[Link],
     paths: Mapping[str, str],
-    elapsed: NDArray[np.float64],
     configurations: NDArray[np.float64],
-) -> RawCommand:
+) -> list[Clip]:
+    """Return how a robot's links move.
+
+    Parameters
+    ----------
+    model
+        The robot.
+    links
+        Its links; those that never move get no clip.
+    paths
+        The scene-tree path of each link, by the link's name.
+    configurations : ndarray, shape (n, nq)
+        The configurations at the keyframes.
+    """
+    moving = [link for link in links if link.moves]
+    poses = link_poses(model, moving, configurations)
+    return [Clip(paths[link.name], poses[:, index]) for index, link in enumerate(moving)]
+
+
+def animation_command(elapsed: NDArray[np.float64], clips: Sequence[Clip]) -> RawCommand:
     """Return the command that loads a motion, starts it and repeats it for ever.
 
     Meshcat's own ``Animation`` writes one dictionary for each keyframe; packed arrays, which
@@ -30,40 +62,41 @@ def animation_command(
 
     Parameters
     ----------
-    model
-        The robot.
-    links
-        Its links; those that never move get no track.
-    paths
-        The scene-tree path of each link, by the link's name.
     elapsed : ndarray, shape (n,)
         Times of the keyframes in seconds, from zero.
-    configurations : ndarray, shape (n, nq)
-        The configurations at these times.
+    clips
+        What moves.
     """
-    moving = [link for link in links if link.moves]
-    poses = link_poses(model, moving, configurations)
-    clips = [
-        {"path": paths[link.name], "clip": _clip(elapsed, poses[:, index])}
-        for index, link in enumerate(moving)
-    ]
+    animations: list[dict[str, object]] = []
+    for clip in clips:
+        animations.append({"path": clip.path, "clip": _clip(_pose_tracks(elapsed, clip.poses))})
+        if clip.colours is not None:
+            colour = _track("material.color", "color", elapsed, clip.colours)
+            animations += [{"path": part, "clip": _clip([colour])} for part in clip.parts]
     options = {"play": True, "repetitions": float("inf")}
     return RawCommand(
-        {"type": "set_animation", "path": "", "animations": clips, "options": options}
+        {"type": "set_animation", "path": "", "animations": animations, "options": options}
     )
 
 
-def _clip(elapsed: NDArray[np.float64], poses: NDArray[np.float64]) -> dict[str, object]:
-    """Return one link's clip from its poses of shape (n, 4, 4)."""
-    return {
-        # The tracks' times count frames of 1 / fps; with one frame a second they are seconds.
-        "fps": 1,
-        "name": "default",
-        "tracks": [
-            _track("position", "vector3", elapsed, poses[:, :3, 3]),
-            _track("quaternion", "quaternion", elapsed, continuous_quaternions(poses[:, :3, :3])),
-        ],
-    }
+def _clip(tracks: list[dict[str, object]]) -> dict[str, object]:
+    # The tracks' times count frames of 1 / fps; with one frame a second they are seconds.
+    return {"fps": 1, "name": "default", "tracks": tracks}
+
+
+def _pose_tracks(
+    elapsed: NDArray[np.float64], poses: NDArray[np.float64]
+) -> list[dict[str, object]]:
+    """Return the tracks of poses of shape (n, 4, 4)."""
+    scales = np.linalg.norm(poses[:, :3, :3], axis=1)
+    rotations = poses[:, :3, :3] / scales[:, None, :]
+    tracks = [
+        _track("position", "vector3", elapsed, poses[:, :3, 3]),
+        _track("quaternion", "quaternion", elapsed, continuous_quaternions(rotations)),
+    ]
+    if not np.allclose(scales, 1.0, rtol=0.0, atol=1e-9):
+        tracks.append(_track("scale", "vector3", elapsed, scales))
+    return tracks
 
 
 def _track(

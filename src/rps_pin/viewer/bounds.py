@@ -9,9 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from pinocchio import coal
 
 from rps_pin.errors import InputError
 from rps_pin.viewer.links import Link, link_poses
+
+_SIDES = 16
+"""Of the prism that stands for a cylinder."""
 
 
 class Box(NamedTuple):
@@ -22,15 +26,13 @@ class Box(NamedTuple):
     upper: NDArray[np.float64]
     """Corner with the largest coordinates, shape (3,)."""
 
+    radius: float
+    """Radius of a sphere about the box's middle that holds all in it."""
+
     @property
     def centre(self) -> NDArray[np.float64]:
         """Middle of the box, shape (3,)."""
         return (self.lower + self.upper) / 2.0
-
-    @property
-    def radius(self) -> float:
-        """Radius of the sphere around the box: half its diagonal."""
-        return float(np.linalg.norm(self.upper - self.lower)) / 2.0
 
 
 def bounding_box(
@@ -38,7 +40,8 @@ def bounding_box(
 ) -> Box:
     """Return a box that holds every link at every configuration.
 
-    Each geometry counts with its own bounding box, so the result is a little generous.
+    A cylinder counts with the prism around it, others with their own bounding boxes, so the result
+    is a little generous.
 
     Parameters
     ----------
@@ -60,22 +63,34 @@ def bounding_box(
     corners = np.concatenate(
         [_in_world(poses[:, index], _corners(link)) for index, link in enumerate(links)]
     )
-    box = Box(corners.min(axis=0), corners.max(axis=0))
+    lower, upper = corners.min(axis=0), corners.max(axis=0)
+    radius = float(np.linalg.norm(corners - (lower + upper) / 2.0, axis=1).max())
+    box = Box(lower, upper, radius)
     if not np.isfinite(box.radius) or box.radius <= 0.0:
         raise InputError(f"the robot's bounding box has radius {box.radius} m: it cannot be shown")
     return box
 
 
 def _corners(link: Link) -> NDArray[np.float64]:
-    """Return the corners of the link's geometries' boxes in the link's frame, shape (m, 3)."""
+    """Return corners around the link's geometries in the link's frame, shape (m, 3)."""
     corners = []
     for item in link.geometries:
-        item.geometry.computeLocalAABB()
-        box = item.geometry.aabb_local
         in_link = link.placement.actInv(item.placement)
-        ranges = zip(box.min_, box.max_, strict=True)
-        corners += [in_link.act(np.array(corner)) for corner in product(*ranges)]
+        corners += [in_link.act(corner) for corner in _own_corners(item.geometry)]
     return np.array(corners)
+
+
+def _own_corners(shape: coal.CollisionGeometry) -> NDArray[np.float64]:
+    """Return corners around one shape in its own frame, shape (m, 3)."""
+    if isinstance(shape, coal.Cylinder):
+        turn = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
+        reach = shape.radius / np.cos(np.pi / _SIDES)
+        ring = np.stack([reach * np.cos(turn), reach * np.sin(turn)], axis=1)
+        ends = [np.full((_SIDES, 1), side * shape.halfLength) for side in (-1.0, 1.0)]
+        return np.concatenate([np.hstack([ring, end]) for end in ends])
+    shape.computeLocalAABB()
+    box = shape.aabb_local
+    return np.array(list(product(*zip(box.min_, box.max_, strict=True))))
 
 
 def _in_world(poses: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.viewer.motion import FRAME_RATE, Motion
-from rps_pin.viewer.page import inline_script, licences, page, viewer_library
+from rps_pin.viewer.page import WATCH_LAYERS, inline_script, licences, page, viewer_library
 from rps_pin.viewer.recorder import Recorder
 from rps_pin.viewer.scene import Scene
 
@@ -28,6 +28,7 @@ _POLICY = (
 # commands, and then an object may arrive after the animation that moves it.
 _START = """\
 const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+watchLayers(viewer);
 for (const text of JSON.parse(document.getElementById("commands").textContent)) {
   viewer.handle_command_bytearray(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)));
 }
@@ -79,9 +80,7 @@ def write_html(
     OSError
         If the file cannot be written.
     """
-    target = Path(path)
-    if target.is_dir() or not target.parent.is_dir():
-        raise InputError(f"cannot write {target}: it is a folder, or its folder does not exist")
+    target = checked_target(path)
     text = motion_page(model, visual, times, configurations, title=title, frame_rate=frame_rate)
     with whole_file(target) as scratch:
         scratch.write_text(text, encoding="utf-8")
@@ -103,9 +102,27 @@ def motion_page(
     moves = motion.duration > 0.0
     if moves:
         scene.animate(motion, frame_rate=frame_rate)
-    note = f"grid {1e3 * scene.grid_spacing:g} mm"
-    if moves:
-        note = f"{motion.duration:.3g} s, in a loop · {note}"
+    return recorded_page(
+        recorder, title=title, note=note_of(motion, scene.grid_spacing), moves=moves
+    )
+
+
+def checked_target(path: str | os.PathLike[str]) -> Path:
+    """Return where a file can be written, or raise `InputError`."""
+    target = Path(path)
+    if target.is_dir() or not target.parent.is_dir():
+        raise InputError(f"cannot write {target}: it is a folder, or its folder does not exist")
+    return target
+
+
+def note_of(motion: Motion, spacing: float) -> str:
+    """Return the caption's second line: how long the motion lasts, and the grid."""
+    note = f"grid {1e3 * spacing:g} mm"
+    return f"{motion.duration:.3g} s, in a loop · {note}" if motion.duration > 0.0 else note
+
+
+def recorded_page(recorder: Recorder, *, title: str, note: str, moves: bool) -> str:
+    """Return a page that carries out recorded commands when it is opened."""
     return page(
         title=title,
         note=note,
@@ -123,6 +140,6 @@ def _scripts(commands: Sequence[bytes], *, controls: bool) -> str:
             inline_script(licences(), as_data.format("licences")),
             inline_script(texts, as_data.format("commands")),
             inline_script(viewer_library()),
-            inline_script(_START + (_SHOW_CONTROLS if controls else "")),
+            inline_script(WATCH_LAYERS + _START + (_SHOW_CONTROLS if controls else "")),
         ]
     )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +15,17 @@ FRAME_RATE = 30.0
 """Pictures per second, unless told otherwise."""
 _UNIT_TOLERANCE = 1e-3
 """How far a quaternion's length may be from one; a picture shows nothing finer."""
+
+
+class State(NamedTuple):
+    """One moment of a motion, as Pinocchio has it."""
+
+    q: NDArray[np.float64]
+    """Configuration, shape (nq,)."""
+    v: NDArray[np.float64]
+    """Velocity, shape (nv,)."""
+    a: NDArray[np.float64]
+    """Acceleration, shape (nv,)."""
 
 
 class Motion:
@@ -25,6 +39,8 @@ class Motion:
         Times in seconds, strictly increasing; n may be one.
     configurations : array_like, shape (n, nq)
         The configuration at each time.
+    velocities, accelerations : array_like, shape (n, nv)
+        As Pinocchio has them; for the layers that show forces. Left out: at rest.
 
     Raises
     ------
@@ -33,7 +49,14 @@ class Motion:
         configuration holds a quaternion that is not of unit length.
     """
 
-    def __init__(self, model: pin.Model, times: ArrayLike, configurations: ArrayLike) -> None:
+    def __init__(
+        self,
+        model: pin.Model,
+        times: ArrayLike,
+        configurations: ArrayLike,
+        velocities: ArrayLike | None = None,
+        accelerations: ArrayLike | None = None,
+    ) -> None:
         self._model = model
         self.times: NDArray[np.float64] = np.asarray(times, dtype=np.float64)
         self.configurations = checked_configurations(model, configurations)
@@ -44,6 +67,18 @@ class Motion:
             )
         if not np.all(np.isfinite(self.times)) or np.any(np.diff(self.times) <= 0.0):
             raise InputError("times must be finite and strictly increasing")
+        self.at_rest = velocities is None and accelerations is None
+        self.velocities = self._rates(velocities, "velocities")
+        self.accelerations = self._rates(accelerations, "accelerations")
+
+    def _rates(self, given: ArrayLike | None, name: str) -> NDArray[np.float64]:
+        wanted = (len(self.times), self._model.nv)
+        if given is None:
+            return np.zeros(wanted)
+        rates = np.asarray(given, dtype=np.float64)
+        if rates.shape != wanted or not np.isfinite(rates).all():
+            raise InputError(f"{name} has shape {rates.shape}; it must be {wanted}, all finite")
+        return rates
 
     @property
     def duration(self) -> float:
@@ -67,6 +102,26 @@ class Motion:
         )
         return between
 
+    def state_at(self, elapsed: float) -> State:
+        """Return configuration, velocity and acceleration `elapsed` seconds after the first."""
+        time = self.times[0] + elapsed
+        rates = [
+            np.array([np.interp(time, self.times, column) for column in of_all.T])
+            for of_all in (self.velocities, self.accelerations)
+        ]
+        return State(self.at(elapsed), *rates)
+
+    def states(self, frame_rate: float = FRAME_RATE) -> Iterator[State]:
+        """Give the states at the times of `sampled`."""
+        for elapsed in self.sample_times(frame_rate):
+            yield self.state_at(float(elapsed))
+
+    def sample_times(self, frame_rate: float = FRAME_RATE) -> NDArray[np.float64]:
+        """Return the times of `sampled`, in seconds since the first configuration, shape (m,)."""
+        check_frame_rate(frame_rate)
+        steps = max(1, round(self.duration * frame_rate)) if self.duration > 0.0 else 0
+        return np.linspace(0.0, self.duration, steps + 1)
+
     def sampled(self, frame_rate: float = FRAME_RATE) -> tuple[NDArray[np.float64], ...]:
         """Return evenly spaced samples, from the first configuration to the last.
 
@@ -87,9 +142,7 @@ class Motion:
         InputError
             If the frame rate is not a positive number.
         """
-        check_frame_rate(frame_rate)
-        steps = max(1, round(self.duration * frame_rate)) if self.duration > 0.0 else 0
-        elapsed = np.linspace(0.0, self.duration, steps + 1)
+        elapsed = self.sample_times(frame_rate)
         return elapsed, np.array([self.at(float(time)) for time in elapsed])
 
 

@@ -29,10 +29,25 @@ body { margin: 0; background: #f4f6f9; }
 }
 #caption strong { display: block; font-weight: 600; }
 #caption .error { color: #a31515; }
+#layers {
+  position: absolute; left: 16px; top: 14px; max-width: 300px; padding: 6px 12px; display: none;
+  border-radius: 6px; background: rgba(255, 255, 255, 0.75); color: #26323f;
+  font: 12px/1.45 system-ui, sans-serif;
+}
+#layers label { display: flex; align-items: baseline; gap: 7px; }
+#layers input { margin: 0; align-self: center; }
+#layers .swatch { flex: none; width: 10px; height: 10px; border-radius: 2px; }
+#layers .bar {
+  display: flex; gap: 6px; align-items: center; margin: 0 0 3px 24px; font-size: 12px;
+}
+#layers .bar[hidden] { display: none; }
+#layers .bar i { width: 110px; height: 8px; border-radius: 2px; }
+.picture #layers input, .picture #layers .off { display: none; }
 </style>
 </head>
 <body>
 <div id="meshcat-pane"></div>
+<div id="layers"></div>
 <div id="caption"><strong>$title</strong><span id="note">$note</span></div>
 <script>
 // Whatever goes wrong is said on the page too: an empty page explains nothing.
@@ -46,6 +61,54 @@ $scripts
 </body>
 </html>
 """)
+
+# The key of the layers, with a tick for each: drawn anew whenever it comes (see `legend`).
+WATCH_LAYERS = """\
+function drawLayers(viewer, layers) {
+  const panel = document.getElementById("layers");
+  const piece = (parent, kind, name = "", text = "") => {
+    const made = document.createElement(kind);
+    made.className = name;
+    made.textContent = text;
+    parent.append(made);
+    return made;
+  };
+  panel.replaceChildren();
+  panel.style.display = layers.length ? "block" : "none";
+  for (const layer of layers) {
+    const entry = piece(panel, "div", layer.visible ? "" : "off");
+    const label = piece(entry, "label");
+    const tick = piece(label, "input");
+    tick.type = "checkbox";
+    tick.name = layer.name;
+    tick.checked = layer.visible;
+    piece(label, "span", "swatch").style.background = layer.colour;
+    piece(label, "span", "", layer.text);
+    const bar = piece(entry, "div", "bar");
+    if (layer.colours) {
+      piece(bar, "span", "", layer.low);
+      piece(bar, "i").style.background = `linear-gradient(90deg, ${layer.colours.join(", ")})`;
+      piece(bar, "span", "", layer.high);
+    }
+    bar.hidden = !layer.visible;
+    tick.onchange = () => {
+      viewer.set_property(["world", "layers", layer.name], "visible", tick.checked);
+      viewer.set_dirty();
+      entry.className = tick.checked ? "" : "off";
+      bar.hidden = !tick.checked;
+    };
+  }
+}
+function watchLayers(viewer) {
+  const set = viewer.set_property.bind(viewer);
+  viewer.set_property = (path, property, value) => {
+    set(path, property, value);
+    if (property === "userData" && path.join("/") === "world") {
+      drawLayers(viewer, value.layers);
+    }
+  };
+}
+"""
 
 
 def page(*, title: str, note: str, policy: str, scripts: str) -> str:

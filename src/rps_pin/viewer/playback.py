@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
@@ -49,7 +50,16 @@ def play(
         scene.display(motion.configurations[0])
         stop.wait()
         return
+    follow_clock(
+        motion.duration, lambda elapsed: scene.display(motion.at(elapsed)), stop, frame_rate
+    )
+
+
+def follow_clock(
+    duration: float, show: Callable[[float], None], stop: threading.Event, frame_rate: float
+) -> None:
+    """Show what belongs to the time since now, modulo the duration (s), until `stop` is set."""
     start = time.monotonic()
     while not stop.is_set():
-        scene.display(motion.at((time.monotonic() - start) % motion.duration))
+        show((time.monotonic() - start) % duration)
         stop.wait(1.0 / frame_rate)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import meshcat
@@ -11,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.errors import InputError
-from rps_pin.viewer.animation import animation_command
+from rps_pin.viewer.animation import Clip, animation_command, link_clips
 from rps_pin.viewer.bounds import bounding_box
 from rps_pin.viewer.links import Link, links_of, node_name
 from rps_pin.viewer.motion import FRAME_RATE, Motion, checked_configurations
@@ -45,6 +46,8 @@ class Scene:
     ----------
     paths : dict of str to str
         The scene-tree path of every link that has something to draw, by the link's name there.
+    box : Box
+        What the robot fills at these configurations.
     grid_spacing : float
         Distance between the lines of the floor's grid, in metres.
 
@@ -71,9 +74,9 @@ class Scene:
         shown = checked_configurations(model, configurations)
         pieces = {self.paths[link.name]: _pieces(link) for link in self._links}
         stride = -(-len(shown) // _MOST_FRAMED)
-        box = bounding_box(model, self._links, shown[::stride])
-        self.grid_spacing = grid_spacing(box.radius)
-        set_stage(window, box)
+        self.box = bounding_box(model, self._links, shown[::stride])
+        self.grid_spacing = grid_spacing(self.box.radius)
+        set_stage(window, self.box)
         for path, carried in pieces.items():
             for piece in carried:
                 place = f"{path}/{piece.name}"
@@ -99,7 +102,9 @@ class Scene:
             raise InputError(f"display shows one configuration; {len(rows)} were given")
         self._place(rows[0], [link for link in self._links if link.moves])
 
-    def animate(self, motion: Motion, *, frame_rate: float = FRAME_RATE) -> None:
+    def animate(
+        self, motion: Motion, *, frame_rate: float = FRAME_RATE, more: Sequence[Clip] = ()
+    ) -> None:
         """Let the window play a motion by itself, in a loop, with Meshcat's playback controls.
 
         Parameters
@@ -108,6 +113,8 @@ class Scene:
             The motion; it must be one of this scene's model and last longer than zero seconds.
         frame_rate
             Keyframes per second; between them the browser interpolates.
+        more
+            What else moves, with keyframes at the same times.
 
         Raises
         ------
@@ -117,9 +124,8 @@ class Scene:
         if motion.duration <= 0.0:
             raise InputError("a single configuration cannot be animated")
         elapsed, configurations = motion.sampled(frame_rate)
-        self.window.send(
-            animation_command(self.model, self._links, self.paths, elapsed, configurations)
-        )
+        clips = link_clips(self.model, self._links, self.paths, configurations)
+        self.window.send(animation_command(elapsed, [*clips, *more]))
 
     def _place(self, q: ArrayLike, links: list[Link]) -> None:
         pin.forwardKinematics(self.model, self._data, q)

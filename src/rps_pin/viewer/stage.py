@@ -26,11 +26,8 @@ _FIELD_OF_VIEW = 30.0
 """Vertical angle of the camera, in degrees: narrow, for little distortion."""
 _CAMERA_AZIMUTH = math.radians(-55.0)
 _CAMERA_ELEVATION = math.radians(22.0)
-_CAMERA_DISTANCE = 0.92 / math.sin(math.radians(_FIELD_OF_VIEW / 2.0))
-"""In radii of the robot: where the sphere around its box just overfills the picture's height.
-
-The robot itself is smaller than that sphere, and so has a margin around it.
-"""
+_CAMERA_DISTANCE = 1.02 / math.sin(math.radians(_FIELD_OF_VIEW / 2.0))
+"""In radii of the robot: where the sphere around it just fits into the picture's height."""
 _CAMERA = "/Cameras/default/rotated/<object>"
 
 _TOP_COLOUR = (0.86, 0.90, 0.94)

@@ -9,7 +9,7 @@ import tornado.web
 import tornado.websocket
 from tornado.iostream import IOStream
 
-from rps_pin.viewer.page import inline_script, page, viewer_library
+from rps_pin.viewer.page import WATCH_LAYERS, inline_script, page, viewer_library
 from rps_pin.viewer.store import SceneStore
 
 _SOCKET_PATH = "/socket"
@@ -21,6 +21,7 @@ _GOING_AWAY = 1001
 
 _START = f"""\
 const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+watchLayers(viewer);
 viewer.connect("ws://" + location.host + "{_SOCKET_PATH}");
 viewer.connection.onclose = () => {{
   document.getElementById("note").textContent =
@@ -175,7 +176,7 @@ def application(hub: Hub, *, port: int, title: str, note: str) -> tornado.web.Ap
             "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'unsafe-inline'; "
             f"img-src data: blob:; connect-src {sockets}"
         ),
-        scripts=f'<script src="{_SCRIPT_PATH}"></script>\n{inline_script(_START)}',
+        scripts=f'<script src="{_SCRIPT_PATH}"></script>\n{inline_script(WATCH_LAYERS + _START)}',
     )
     return tornado.web.Application(
         [

@@ -1,0 +1,95 @@
+"""A headless Chromium that takes pictures of pages; its package and itself are optional."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TypeVar
+
+from rps_pin.errors import RPSPinError
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+"""Programs that are looked for, after the one that ``RPS_PIN_CHROMIUM`` names."""
+_ARGUMENTS = (
+    "--no-sandbox",
+    # WebGL without a graphics card: Chromium's own software renderer, the same everywhere.
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--hide-scrollbars",
+    "--force-color-profile=srgb",
+)
+_LOAD_SECONDS = 60.0
+_Answer = TypeVar("_Answer")
+
+
+def in_own_thread(work: Callable[[], _Answer]) -> _Answer:
+    """Return what `work` returns: Playwright refuses threads with an event loop, as Jupyter's."""
+    with ThreadPoolExecutor(1, thread_name_prefix="rps_pin pictures") as pool:
+        return pool.submit(work).result()
+
+
+@contextmanager
+def opened_page(text: str, size: tuple[int, int], scale: float) -> Iterator[Page]:
+    """Give a page that has been loaded and drawn once, in a browser of its own.
+
+    Parameters
+    ----------
+    text
+        The page, as HTML, one of `recorded_page`.
+    size
+        Width and height of the window, in CSS pixels.
+    scale
+        Pixels of the picture to one of these.
+
+    Raises
+    ------
+    RPSPinError
+        If Playwright or a browser is missing, or the page cannot be shown; says what to do.
+    """
+    try:
+        from playwright.sync_api import Error, sync_playwright  # noqa: PLC0415
+    except ImportError:
+        raise RPSPinError(
+            "pictures need Playwright: pip install 'rps-pin[pictures]' (and a Chromium: "
+            "apt-get install chromium, or playwright install chromium)"
+        ) from None
+    with sync_playwright() as playwright:
+        try:
+            browser = playwright.chromium.launch(
+                executable_path=find_browser(), args=list(_ARGUMENTS)
+            )
+        except Error as error:
+            raise RPSPinError(
+                "pictures need a Chromium that runs: apt-get install chromium, or playwright "
+                "install chromium, or set RPS_PIN_CHROMIUM to its path. It said: "
+                f"{str(error).strip().splitlines()[0]}"
+            ) from None
+        try:
+            width, height = size
+            page = browser.new_page(
+                viewport={"width": width, "height": height}, device_scale_factor=scale
+            )
+            page.set_default_timeout(1e3 * _LOAD_SECONDS)
+            wrong: list[str] = []
+            page.on("pageerror", lambda error: wrong.append(str(error)))
+            page.set_content(text)
+            if wrong:
+                raise RPSPinError(f"the browser cannot show the page: {wrong[0]}")
+            yield page
+        finally:
+            browser.close()
+
+
+def find_browser() -> str | None:
+    """Return the path of a Chromium, or None to leave it to Playwright, which may have its own."""
+    named = os.environ.get("RPS_PIN_CHROMIUM")
+    if named:
+        return shutil.which(named) or named
+    return next((path for name in BROWSERS if (path := shutil.which(name))), None)

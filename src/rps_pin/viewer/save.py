@@ -1,0 +1,268 @@
+"""A robot with its layers in a file: a page, a picture, a film; or in the browser, live."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.errors import InputError
+from rps_pin.files import whole_file
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.viewer.browser import in_own_thread
+from rps_pin.viewer.film import check_film, write_film
+from rps_pin.viewer.html import checked_target, note_of, recorded_page
+from rps_pin.viewer.layers import Layer
+from rps_pin.viewer.motion import FRAME_RATE, check_frame_rate
+from rps_pin.viewer.pictures import Progress, checked_size, take_pictures
+from rps_pin.viewer.recorder import Recorder
+from rps_pin.viewer.server import LocalViewer
+from rps_pin.viewer.view import View
+
+SIZE = (1000, 620)
+"""Width and height of a picture in pixels, unless told otherwise."""
+
+
+def save_html(
+    path: str | os.PathLike[str],
+    what: RPSRobot | ClosedLoopModel,
+    motion: Any = None,
+    *,
+    visual: pin.GeometryModel | None = None,
+    layers: Sequence[str | Layer] = (),
+    hidden: Sequence[str | Layer] = (),
+    title: str | None = None,
+    frame_rate: float = FRAME_RATE,
+) -> None:
+    """Write a page that shows a robot with its layers, from disk, with nothing beside it.
+
+    The file is written whole or not at all.
+
+    Parameters
+    ----------
+    path
+        The page to write, for instance ``viewer.html``.
+    what, motion, visual, layers, hidden
+        As for `View`. The page has a tick for each layer.
+    title
+        Plain text for the browser's tab and the caption; the robot's name if left out.
+    frame_rate
+        Keyframes per second that are stored; the browser interpolates between them.
+
+    Raises
+    ------
+    InputError
+        If something cannot be shown, or the file cannot stand there.
+    """
+    target = checked_target(path)
+    text, _ = _page(what, motion, visual, layers, hidden, title, frame_rate)
+    with whole_file(target) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+
+
+def save_png(
+    path: str | os.PathLike[str],
+    what: RPSRobot | ClosedLoopModel,
+    motion: Any = None,
+    *,
+    time: float = 0.0,
+    visual: pin.GeometryModel | None = None,
+    layers: Sequence[str | Layer] = (),
+    title: str | None = None,
+    size: tuple[int, int] = SIZE,
+    scale: float = 1.0,
+    background: str | None = None,
+    captions: bool = True,
+) -> None:
+    """Write a picture of one moment, drawn by a headless Chromium.
+
+    Parameters
+    ----------
+    path
+        The picture to write, ``.png``.
+    what, motion, visual, layers
+        As for `View`.
+    time
+        Seconds since the motion's beginning.
+    title
+        As for `save_html`.
+    size
+        Width and height, in pixels of the page.
+    scale
+        Pixels of the picture to one of the page: 2 or 3 for print.
+    background
+        A colour, for instance ``"white"``, or ``"transparent"``; the viewer's sky if left out.
+    captions
+        Whether the title and the key of the layers are in the picture.
+
+    Raises
+    ------
+    InputError
+        If something cannot be shown, or the file cannot stand there.
+    RPSPinError
+        If Playwright or Chromium is missing; says how to install them.
+    """
+    target = checked_target(path)
+    if target.suffix.lower() != ".png":
+        raise InputError(f"{target.name}: a picture is written as .png")
+    sides = checked_size(size, scale)
+    text, view = _page(what, motion, visual, layers, (), title, FRAME_RATE)
+    if not 0.0 <= time <= view.motion.duration:
+        raise InputError(f"time = {time} s; the motion lasts from 0 to {view.motion.duration:g} s")
+    [picture] = in_own_thread(
+        lambda: list(
+            take_pictures(
+                text, [time], size=sides, scale=scale, background=background, captions=captions
+            )
+        )
+    )
+    with whole_file(target) as scratch:
+        scratch.write_bytes(picture)
+
+
+def save_video(
+    path: str | os.PathLike[str],
+    what: RPSRobot | ClosedLoopModel,
+    motion: Any,
+    *,
+    visual: pin.GeometryModel | None = None,
+    layers: Sequence[str | Layer] = (),
+    title: str | None = None,
+    size: tuple[int, int] = (800, 500),
+    scale: float = 1.0,
+    background: str | None = None,
+    captions: bool = True,
+    frame_rate: float = FRAME_RATE,
+    progress: Progress = iter,
+) -> None:
+    """Write a film of a motion: ``.mp4``, or an animated ``.gif`` or ``.webp``.
+
+    Parameters
+    ----------
+    path
+        The film to write; its suffix says which kind.
+    what, motion, visual, layers, title, size, scale, background, captions
+        As for `save_png`; a film is never transparent.
+    frame_rate
+        Pictures per second. GIF knows hundredths of a second only, and most players are slow below
+        two of them.
+    progress
+        Wraps the loop over the times of the pictures.
+
+    Raises
+    ------
+    InputError
+        If something cannot be shown, the motion stands still, or the file cannot stand there.
+    RPSPinError
+        If Playwright, Chromium or (for MP4) ffmpeg is missing; says how to install them.
+    """
+    target = checked_target(path)
+    check_film(target)
+    check_frame_rate(frame_rate)
+    sides = checked_size(size, scale)
+    if background == "transparent":
+        raise InputError("a film has no transparent background: give a colour, or none")
+    text, view = _page(what, motion, visual, layers, (), title, FRAME_RATE)
+    duration = view.motion.duration
+    if duration <= 0.0:
+        raise InputError("a single pose makes no film: give a motion, or write a picture")
+    # The end is the beginning of the next round: one picture of the two.
+    times = np.arange(0.0, duration - 0.5 / frame_rate, 1.0 / frame_rate)
+
+    def film(scratch: Any) -> None:
+        pictures = take_pictures(
+            text,
+            progress([float(time) for time in times]),
+            size=sides,
+            scale=scale,
+            background=background,
+            captions=captions,
+        )
+        write_film(scratch, pictures, frame_rate, target.suffix.lower())
+
+    with whole_file(target) as scratch:
+        in_own_thread(lambda: film(scratch))
+
+
+@contextmanager
+def show(
+    what: RPSRobot | ClosedLoopModel,
+    motion: Any = None,
+    *,
+    visual: pin.GeometryModel | None = None,
+    layers: Sequence[str | Layer] = (),
+    hidden: Sequence[str | Layer] = (),
+    title: str | None = None,
+    port: int | None = None,
+) -> Iterator[LocalView]:
+    """Serve a view to browsers on this machine while a ``with`` block lasts.
+
+    Parameters
+    ----------
+    what, motion, visual, layers, hidden
+        As for `View`.
+    title
+        As for `save_html`.
+    port
+        As for `LocalViewer`.
+
+    Yields
+    ------
+    LocalView
+        A `View` with an address, `url`.
+
+    Examples
+    --------
+    >>> with show(robot, path, layers=["trail", "forces"]) as view:  # doctest: +SKIP
+    ...     print(view.url)
+    ...     view.play()
+    """
+    with LocalViewer(port, title=title or _title(what)) as viewer:
+        yield LocalView(viewer, what, motion, visual=visual, layers=layers, hidden=hidden)
+
+
+class LocalView(View):
+    """A `View` in a `LocalViewer`.
+
+    Attributes
+    ----------
+    url : str
+        Address to open in a browser on this machine.
+    """
+
+    def __init__(
+        self, viewer: LocalViewer, what: RPSRobot | ClosedLoopModel, motion: Any, **options: Any
+    ) -> None:
+        super().__init__(viewer.window, what, motion, **options)
+        self.url = viewer.url
+
+
+def _page(
+    what: RPSRobot | ClosedLoopModel,
+    motion: Any,
+    visual: pin.GeometryModel | None,
+    layers: Sequence[str | Layer],
+    hidden: Sequence[str | Layer],
+    title: str | None,
+    frame_rate: float,
+) -> tuple[str, View]:
+    """Return a page and the view that it was recorded from."""
+    recorder = Recorder()
+    view = View(recorder, what, motion, visual=visual, layers=layers, hidden=hidden)
+    moves = view.motion.duration > 0.0
+    if moves:
+        view.animate(frame_rate=frame_rate)
+    note = note_of(view.motion, view.scene.grid_spacing)
+    text = recorded_page(recorder, title=title or _title(what), note=note, moves=moves)
+    return text, view
+
+
+def _title(what: RPSRobot | ClosedLoopModel) -> str:
+    if isinstance(what, RPSRobot):
+        return f"3-RPS {what.parameters.name}"
+    return str(getattr(what, "name", "Robot"))
