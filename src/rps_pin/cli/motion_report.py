@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from rps_pin.cli.layer_options import chosen_layers
 from rps_pin.rps.motion_csv import write_csv
 from rps_pin.rps.motion_run import ActuatorSummary, MotionRun, MotionSummary
 from rps_pin.rps.robot import RPSRobot
@@ -26,12 +27,20 @@ def sample_progress(console: Console) -> Callable[[Iterable[int]], Iterable[int]
 
 
 def write_motion(
-    folder: Path, name: str, title: str, robot: RPSRobot, run: MotionRun
+    folder: Path,
+    name: str,
+    title: str,
+    robot: RPSRobot,
+    run: MotionRun,
+    wrench: Sequence[float] | None = None,
 ) -> list[Path]:
-    """Write a motion's table, figures and animation into a folder; return the files."""
+    """Write a motion's table, figures and animation into a folder; return the files.
+
+    The wrench is what something outside exerts on the platform, as for `run_motion`.
+    """
     # Only commands that draw wait for these to be imported.
     from rps_pin.plots import plot_forces, plot_lengths, plot_path, save_figure
-    from rps_pin.viewer import write_html
+    from rps_pin.viewer import Motion, fitting_layers, save_html
 
     table = folder / f"{name}.csv"
     write_csv(table, run)
@@ -43,14 +52,11 @@ def write_motion(
     ):
         files += save_figure(plot(run), folder, figure)
     page = folder / "viewer.html"
-    write_html(
-        page,
-        robot.mechanism.model,
-        robot.visual_model(),
-        run.time,
-        run.configuration,
-        title=title,
-    )
+    shown, at_hand = chosen_layers(None, fitting_layers(robot.mechanism))
+    states = robot.state(run.pose, run.rate, run.acceleration)
+    wrenches = {} if wrench is None else {"platform": wrench}
+    motion = Motion(robot.mechanism.model, run.time, *states, wrenches=wrenches)
+    save_html(page, robot, motion, layers=shown, hidden=at_hand, title=title)
     return [*files, page]
 
 

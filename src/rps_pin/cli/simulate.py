@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from rps_pin.cli.layer_options import LayersOption, chosen_layers
 from rps_pin.cli.mechanism_options import (
     FileArgument,
     by_joint,
@@ -71,6 +72,7 @@ def simulate_command(
         Path | None,
         typer.Option("--output", "-o", help="Folder for the results; named after FILE."),
     ] = None,
+    layers: LayersOption = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")
     ] = False,
@@ -78,8 +80,8 @@ def simulate_command(
     """Simulate any mechanism from rest or a start of yours, its loops closed at every step.
 
     Written to the output folder: **simulation.csv** (every step), **simulation.png** and **.svg**
-    (joints, energy, gap), and, where the description names a URDF, **viewer.html**, the motion in
-    3D.
+    (joints, energy, gap), and **viewer.html**, the motion in 3D (a skeleton where the description
+    names no URDF), with layers to tick: forces, reactions, joint limits and others.
 
     Exit status: 0 done; 1 the mechanism cannot do it (why, and when, is said); 2 wrong usage.
 
@@ -109,7 +111,7 @@ def simulate_command(
         )
     folder = output or Path(f"{file.stem}-simulation")
     folder.mkdir(parents=True, exist_ok=True)
-    files = write_results(folder, file, mechanism, motion)
+    files = write_results(folder, file, mechanism, motion, layers)
     summary = _summary(motion)
     if as_json:
         answer = {"mechanism": mechanism.name, **summary, "files": [str(f) for f in files]}
@@ -119,30 +121,34 @@ def simulate_command(
 
 
 def write_results(
-    folder: Path, file: Path, mechanism: ClosedLoopModel, motion: Simulation
+    folder: Path,
+    file: Path,
+    mechanism: ClosedLoopModel,
+    motion: Simulation,
+    layers: str | None = None,
 ) -> list[Path]:
     """Write a simulation's table, figure and animation into a folder; return the files."""
     from rps_pin.closed_loop.visuals import visual_model
     from rps_pin.plots import save_figure
     from rps_pin.simulation_plots import plot_simulation
-    from rps_pin.viewer import write_html
+    from rps_pin.viewer import fitting_layers, save_html
 
     table = folder / "simulation.csv"
     motion.to_csv(table)
     files = [table, *save_figure(plot_simulation(motion, mechanism), folder, "simulation")]
     described = file.suffix.lower() in (".yaml", ".yml")
-    visual = visual_model(file, mechanism.model) if described else None
-    if visual is not None:
-        page = folder / "viewer.html"
-        write_html(
-            page,
-            mechanism.model,
-            visual,
-            motion.time,
-            motion.q,
-            title=f"{mechanism.name}, simulated",
-        )
-        files.append(page)
+    page = folder / "viewer.html"
+    shown, at_hand = chosen_layers(layers, fitting_layers(mechanism))
+    save_html(
+        page,
+        mechanism,
+        motion,
+        visual=visual_model(file, mechanism.model) if described else None,
+        layers=shown,
+        hidden=at_hand,
+        title=f"{mechanism.name}, simulated",
+    )
+    files.append(page)
     return files
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import track
 
 from rps_pin.cli.console import RobotOption, load_robot
 from rps_pin.cli.helix_options import (
@@ -21,12 +23,8 @@ from rps_pin.cli.helix_options import (
     RadiusOption,
     chosen_helix,
 )
-from rps_pin.rps.motion_run import sample_times
-from rps_pin.rps.robot import RPSRobot
+from rps_pin.cli.layer_options import LayersOption, SizeOption, chosen_layers, chosen_size
 from rps_pin.trajectories.helix import PAPER_DURATION
-from rps_pin.trajectories.path import Trajectory
-
-_SAMPLE_RATE = 100.0
 
 
 def view_command(
@@ -43,6 +41,23 @@ def view_command(
     height: HeightOption = DEFAULT_HEIGHT,
     branch: BranchOption = Branch.PLUS,
     duration: DurationOption = PAPER_DURATION,
+    layers: LayersOption = None,
+    html: Annotated[Path | None, typer.Option(help="Write this page, and start no server.")] = None,
+    png: Annotated[
+        Path | None, typer.Option(help="Write this picture (by a Chromium), and start no server.")
+    ] = None,
+    video: Annotated[
+        Path | None,
+        typer.Option(help="Write this film: .mp4, .gif or .webp; and start no server."),
+    ] = None,
+    time: Annotated[float, typer.Option(help="Moment of the picture, s.")] = 0.0,
+    size: SizeOption = "1000x620",
+    background: Annotated[
+        str | None,
+        typer.Option(
+            metavar="COLOUR", help="Of picture and film: white, or transparent (picture only)."
+        ),
+    ] = None,
     port: Annotated[
         int | None, typer.Option(help="Port to serve on; without it, a free one is found.")
     ] = None,
@@ -50,35 +65,51 @@ def view_command(
     """Show a 3-RPS in the browser: a pose, or the helix in a loop.
 
     Starts a Meshcat server that answers to this machine only, prints its address, and runs until
-    Ctrl-C.
+    Ctrl-C. Or writes files: a page, a picture, a film.
 
     Examples:
 
     - `rps-pin view` the paper's helix
 
-    - `rps-pin view --robot micro --pose 0.22 0.1 0`
+    - `rps-pin view --robot micro --pose 0.22 0.1 0 --layers limits,ghosts`
+
+    - `rps-pin view --png robot.png --time 2.6 --background white`
     """
     # Meshcat and its server are for this command only.
-    from rps_pin.viewer import LocalViewer, Scene, play
+    from rps_pin.viewer import fitting_layers, save_html, save_png, save_video, show
 
     machine = load_robot(robot)
+    shown, at_hand = chosen_layers(layers, fitting_layers(machine.mechanism))
+    sides = chosen_size(size)
+    motion: Any = pose
     if pose is None:
-        path = chosen_helix(machine, radius, pitch, height, branch, duration)
-        times, configurations = _motion(machine, path)
-    else:
-        times, configurations = np.zeros(1), machine.state(pose, np.zeros(3), np.zeros(3))[0][None]
+        motion = chosen_helix(machine, radius, pitch, height, branch, duration)
+    if html is not None:
+        save_html(html, machine, motion, layers=shown, hidden=at_hand)
+        typer.echo(f"wrote {html}")
+    picture: dict[str, Any] = {"layers": shown, "size": sides, "background": background}
+    if png is not None:
+        save_png(png, machine, motion, time=time, **picture)
+        typer.echo(f"wrote {png}")
+    if video is not None:
+        save_video(video, machine, motion, progress=_progress, **picture)
+        typer.echo(f"wrote {video}")
+    if html or png or video:
+        return
     try:
-        with LocalViewer(port, title=f"3-RPS {machine.parameters.name}") as viewer:
-            scene = Scene(
-                machine.mechanism.model, machine.visual_model(), viewer.window, configurations
-            )
-            typer.echo(f"Open {viewer.url} in a browser on this machine. Ctrl-C ends.")
-            play(scene, times, configurations)
+        with show(machine, motion, layers=shown, hidden=at_hand, port=port) as view:
+            typer.echo(f"Open {view.url} in a browser on this machine. Ctrl-C ends.")
+            view.play()
     except KeyboardInterrupt:
         typer.echo("\nended")
 
 
-def _motion(robot: RPSRobot, path: Trajectory) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return times (n,) and configurations (n, nq) of a trajectory."""
-    times = sample_times(path.duration, _SAMPLE_RATE)
-    return times, robot.state(*path.sample(times))[0]
+def _progress(times: Iterable[float]) -> Iterable[float]:
+    console = Console(stderr=True)
+    return track(
+        times,
+        "drawing",
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )

@@ -17,6 +17,7 @@ from rps_pin.viewer.layers import (
     Singularity,
     Trail,
     WorkspaceSurface,
+    fitting_layers,
 )
 from rps_pin.viewer.live_view import LiveView
 from rps_pin.viewer.motion import FRAME_RATE, Motion
@@ -51,6 +52,7 @@ __all__ = [
     "View",
     "Window",
     "WorkspaceSurface",
+    "fitting_layers",
     "play",
     "save_html",
     "save_png",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +41,9 @@ class Motion:
         The configuration at each time.
     velocities, accelerations : array_like, shape (n, nv)
         As Pinocchio has them; for the layers that show forces. Left out: at rest.
+    wrenches
+        What something outside exerts all the time, by frame name: force (N) and moment (N m) in
+        world axes at the frame's origin, shape (6,); for these layers too.
 
     Raises
     ------
@@ -56,6 +59,8 @@ class Motion:
         configurations: ArrayLike,
         velocities: ArrayLike | None = None,
         accelerations: ArrayLike | None = None,
+        *,
+        wrenches: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         self._model = model
         self.times: NDArray[np.float64] = np.asarray(times, dtype=np.float64)
@@ -67,6 +72,7 @@ class Motion:
             )
         if not np.all(np.isfinite(self.times)) or np.any(np.diff(self.times) <= 0.0):
             raise InputError("times must be finite and strictly increasing")
+        self.wrenches = dict(wrenches or {})
         self.at_rest = velocities is None and accelerations is None
         self.velocities = self._rates(velocities, "velocities")
         self.accelerations = self._rates(accelerations, "accelerations")
@@ -90,26 +96,33 @@ class Motion:
 
         Before the start and after the end it is the first and the last configuration.
         """
-        time = self.times[0] + elapsed
-        after = int(np.searchsorted(self.times, time, side="right"))
-        if after == 0 or after == len(self.times):
-            end_of_motion: NDArray[np.float64] = self.configurations[0 if after == 0 else -1]
-            return end_of_motion
-        start, end = self.times[after - 1], self.times[after]
-        fraction = float((time - start) / (end - start))
+        before, fraction = self._place(elapsed)
+        if fraction == 0.0:
+            given: NDArray[np.float64] = self.configurations[before]
+            return given
         between: NDArray[np.float64] = pin.interpolate(
-            self._model, self.configurations[after - 1], self.configurations[after], fraction
+            self._model, self.configurations[before], self.configurations[before + 1], fraction
         )
         return between
 
     def state_at(self, elapsed: float) -> State:
         """Return configuration, velocity and acceleration `elapsed` seconds after the first."""
+        before, fraction = self._place(elapsed)
+        after = before + (fraction > 0.0)
+        v, a = (
+            (1.0 - fraction) * rates[before] + fraction * rates[after]
+            for rates in (self.velocities, self.accelerations)
+        )
+        return State(self.at(elapsed), v, a)
+
+    def _place(self, elapsed: float) -> tuple[int, float]:
+        """Return the sample at or before a time, and the share of the way to the next one."""
         time = self.times[0] + elapsed
-        rates = [
-            np.array([np.interp(time, self.times, column) for column in of_all.T])
-            for of_all in (self.velocities, self.accelerations)
-        ]
-        return State(self.at(elapsed), *rates)
+        after = int(np.searchsorted(self.times, time, side="right"))
+        if after == 0 or after == len(self.times):
+            return max(after - 1, 0), 0.0
+        start, end = self.times[after - 1], self.times[after]
+        return after - 1, float((time - start) / (end - start))
 
     def states(self, frame_rate: float = FRAME_RATE) -> Iterator[State]:
         """Give the states at the times of `sampled`."""

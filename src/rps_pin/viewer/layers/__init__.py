@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
 from rps_pin.errors import InputError, shown
 from rps_pin.viewer.layers.base import Context, Drawing, Layer, Look, Part
 from rps_pin.viewer.layers.closures import Closures
@@ -56,6 +57,14 @@ def layers_of(given: Sequence[str | Layer]) -> list[Layer]:
     return found
 
 
+def fitting_layers(mechanism: ClosedLoopModel) -> list[str]:
+    """Return the names of the layers that any motion of a mechanism can have, at little cost."""
+    closed = any(isinstance(one, LoopClosure) for one in mechanism.closures)
+    of_closures = ["trail", "reactions", "closures"] if closed else []
+    names = ["forces", "limits", "singularity", "frames", *of_closures]
+    return [name for name in LAYERS if name in names]
+
+
 __all__ = [
     "LAYERS",
     "Closures",
@@ -72,5 +81,6 @@ __all__ = [
     "Singularity",
     "Trail",
     "WorkspaceSurface",
+    "fitting_layers",
     "layers_of",
 ]

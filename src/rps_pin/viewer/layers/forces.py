@@ -7,17 +7,17 @@ positive. A turning joint's torque has two heads, and a scale of its own.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
+from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import SingularityError
 from rps_pin.viewer.layers.arrows import Sized, Vectors, arrows_drawing
 from rps_pin.viewer.layers.base import Array, Context, Drawing, Framed
 from rps_pin.viewer.layers.shapes import ORANGE, arrow, double_arrow
 from rps_pin.viewer.motion import State
-
-_AXIS = np.eye(6)
 
 
 @dataclass(frozen=True)
@@ -38,43 +38,61 @@ class Forces(Framed):
     def draw(self, context: Context) -> Drawing:
         """Return the arrows; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
-        data = model.createData()
-        joints = [int(model.getJointId(name)) for name in mechanism.actuated]
-        columns: list[tuple[str, int, int, bool]] = []  # node, joint, row of tau, turns
-        row = 0
-        for joint, name in zip(joints, mechanism.actuated, strict=True):
-            for index in range(model.joints[joint].nv):
-                label = name.replace("/", ".")
-                node = label if model.joints[joint].nv == 1 else f"{label}_{index + 1}"
-                turns = not bool(np.any(_subspace(model, joint)[:3, index]))
-                columns.append((node, joint, row, turns))
-                row += 1
+        data, outside = model.createData(), context.motion.wrenches
+        actuators = _actuators(mechanism)
 
         def vectors(state: State) -> Vectors:
             try:
-                tau = mechanism.inverse_dynamics(*state).tau
+                tau = mechanism.inverse_dynamics(*state, wrenches=outside).tau
             except SingularityError:
                 return {}
-            pin.forwardKinematics(model, data, state.q)
-            found = {}
-            for node, joint, row, turns in columns:
-                subspace = _subspace(model, joint)
-                first = next(r for n, j, r, t in columns if j == joint)
-                axis = subspace[:, row - first]
-                direction = data.oMi[joint].rotation @ (axis[3:] if turns else axis[:3])
-                found[node] = (np.array(data.oMi[joint].translation), tau[row] * direction)
-            return found
+            pin.computeJointJacobians(model, data, state.q)
+            return {
+                one.node: (np.array(data.oMi[one.joint].translation), force * one.axis(model, data))
+                for one, force in zip(actuators, tau, strict=True)
+            }
 
         sized = {
-            node: Sized(double_arrow if turns else arrow, "N m" if turns else "N")
-            for node, _, _, turns in columns
+            one.node: Sized(double_arrow, "N m") if one.turns else Sized(arrow, "N")
+            for one in actuators
         }
         given = {"N": self.newtons_per_metre, "N m": self.newton_metres_per_metre}
         return arrows_drawing("forces", "actuators' forces", ORANGE, context, sized, vectors, given)
 
 
-def _subspace(model: pin.Model, joint: int) -> Array:
-    """Return a joint's motion subspace in its own frame, shape (6, nv)."""
-    data = model.joints[joint].createData()
-    model.joints[joint].calc(data, pin.neutral(model), np.zeros(model.nv))
-    return np.array(data.S).reshape(6, -1)
+class _Actuator(NamedTuple):
+    """One actuated coordinate."""
+
+    node: str
+    """The arrow's node."""
+    joint: int
+    """Index of its joint."""
+    column: int
+    """Of the velocity."""
+    turns: bool
+    """Whether its force is a torque."""
+
+    def axis(self, model: pin.Model, data: pin.Data) -> Array:
+        """Return its direction in world axes, after `computeJointJacobians`."""
+        column = _column(model, data, self.joint, self.column)
+        return column[3:] if self.turns else column[:3]
+
+
+def _actuators(mechanism: ClosedLoopModel) -> list[_Actuator]:
+    """Return the actuated coordinates in the order of tau."""
+    model, data = mechanism.model, mechanism.model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    found: list[_Actuator] = []
+    for column in (int(index) for index in mechanism.actuated_indices):
+        joint = max(j for j in range(1, model.njoints) if model.joints[j].idx_v <= column)
+        own, name = model.joints[joint], model.names[joint].replace("/", ".")
+        node = name if own.nv == 1 else f"{name}_{column - own.idx_v + 1}"
+        turns = not _column(model, data, joint, column)[:3].any()
+        found.append(_Actuator(node, joint, column, turns))
+    return found
+
+
+def _column(model: pin.Model, data: pin.Data, joint: int, column: int) -> Array:
+    """Return the twist of a joint's own origin at unit speed, world axes, shape (6,)."""
+    frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    return np.array(pin.getJointJacobian(model, data, joint, frame)).reshape(6, -1)[:, column]

@@ -33,7 +33,7 @@ class Reactions(Framed):
     def draw(self, context: Context) -> Drawing:
         """Return the arrows; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
-        data = model.createData()
+        data, outside = model.createData(), context.motion.wrenches
         frames = {
             closure.name: closure.frame_ids(model)[0]
             for closure in mechanism.closures
@@ -44,10 +44,10 @@ class Reactions(Framed):
 
         def vectors(state: State) -> Vectors:
             try:
-                forces = mechanism.inverse_dynamics(*state).constraint_forces
+                answer = mechanism.inverse_dynamics(*state, wrenches=outside)
             except SingularityError:
                 return {}
-            wrenches = mechanism.closure_wrenches(state.q, forces)
+            wrenches = mechanism.closure_wrenches(state.q, answer.constraint_forces)
             pin.framesForwardKinematics(model, data, state.q)
             return {
                 _node(name): (np.array(data.oMf[frame].translation), wrenches[name][:3])
