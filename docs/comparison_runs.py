@@ -1,0 +1,111 @@
+"""Write what was run for the comparison page: peers that install here, on this repository's robots.
+
+Run it from the checkout, in an environment with the development dependencies:
+
+    .venv/bin/python docs/comparison_runs.py
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+from lxml import etree
+from marked import block, replaced
+
+from rps_pin import RPSRobot
+
+PAGE = Path(__file__).parent / "comparison.md"
+POSE, RATE, ACCELERATION = [0.4, 0.05, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.0]
+TOOLBOX = "toolbox-parallel-robots==1.2.0"
+
+
+def main() -> None:
+    """Run everything and write the page."""
+    lines = [*pinocchio_alone(), *mujoco_reads(), *toolbox()]
+    text = PAGE.read_text("utf-8")
+    PAGE.write_text(replaced(text, "runs", block(lines)), "utf-8")
+
+
+def pinocchio_alone() -> list[str]:
+    """Whether constraintDynamics finds the acceleration that the forces were made for."""
+    kinds = [name for name in pin.ContactType.names if name != "CONTACT_UNDEFINED"]
+    lines = [f"Pinocchio {pin.__version__}: RigidConstraintModel is of {' or '.join(kinds)}"]
+    robot = RPSRobot.from_preset("sokolov")
+    heavy = RPSRobot(robot.parameters.replace(rod_mass=0.03, rod_com=0.1, rod_inertia=1e-4))
+    for words, tried in (("massless rods", robot), ("rods of 30 g", heavy)):
+        mechanism, model = tried.mechanism, tried.mechanism.model
+        q, v, a = tried.state(POSE, RATE, ACCELERATION)
+        tau = tried.inverse_dynamics(q, v, a).tau
+        models = pin.StdVec_RigidConstraintModel()
+        datas = pin.StdVec_RigidConstraintData()
+        for closure in mechanism.closures:
+            models.append(closure.constraint_model(model))
+        for constraint in models:
+            datas.append(constraint.createData())
+        data = model.createData()
+        pin.initConstraintDynamics(model, data, models, datas)
+        forces = np.zeros(model.nv)
+        forces[mechanism.actuated_indices] = tau
+        theirs = pin.constraintDynamics(model, data, q, v, forces, models, datas)
+        ours = mechanism.forward_dynamics(q, v, tau)
+        answers = f"constraintDynamics {verdict(theirs, a)}, ours {verdict(ours, a)}"
+        lines.append(f"  forward dynamics of the 3-RPS with {words}: {answers}")
+    return lines
+
+
+def verdict(found: np.ndarray, right: np.ndarray) -> str:
+    """Return whether accelerations are the right ones, in words."""
+    if not np.isfinite(found).all():
+        return "returns NaN"
+    return "is right" if np.allclose(found, right, atol=1e-9) else "is wrong"
+
+
+def mujoco_reads() -> list[str]:
+    """Whether MuJoCo takes the preset's URDF as it stands."""
+    robot = etree.fromstring(RPSRobot.from_preset("sokolov").urdf.encode())
+    for visual in robot.iter("visual", "collision"):
+        visual.getparent().remove(visual)
+    try:
+        mujoco.MjModel.from_xml_string(etree.tostring(robot, encoding="unicode"))
+        answer = "is read"
+    except ValueError as error:
+        answer = f"is refused: {str(error).splitlines()[0]}"
+    return [
+        f"MuJoCo {mujoco.__version__}: the URDF of the 3-RPS sokolov (the paper's inertias)",
+        f"  {answer}",
+    ]
+
+
+def toolbox() -> list[str]:
+    """How an installation of the toolbox from PyPI, beside pin from PyPI, imports."""
+    wanted = ("toolbox_parallel_robots", "pinocchio.casadi")
+    with tempfile.TemporaryDirectory() as folder:
+        pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", folder]
+        subprocess.run([*pip, TOOLBOX], check=True, capture_output=True)
+        return [
+            f"{TOOLBOX} beside pin from PyPI",
+            *(f"  import {name}: {imported(name, folder)}" for name in wanted),
+        ]
+
+
+def imported(name: str, folder: str) -> str:
+    """Return what an import says, with a folder on the path."""
+    shown = subprocess.run(
+        [sys.executable, "-c", f"import {name}"],
+        env={**os.environ, "PYTHONPATH": folder},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return "works" if shown.returncode == 0 else shown.stderr.strip().splitlines()[-1]
+
+
+if __name__ == "__main__":
+    main()
