@@ -55,7 +55,7 @@ def write_motion(
     shown, at_hand = chosen_layers(None, fitting_layers(robot.mechanism))
     states = robot.state(run.pose, run.rate, run.acceleration)
     wrenches = {} if wrench is None else {"platform": wrench}
-    motion = Motion(robot.mechanism.model, run.time, *states, wrenches=wrenches)
+    motion = Motion(robot.mechanism.model, run.time, *states, forces=run.force, wrenches=wrenches)
     save_html(page, robot, motion, layers=shown, hidden=at_hand, title=title)
     return [*files, page]
 

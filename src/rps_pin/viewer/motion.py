@@ -26,6 +26,8 @@ class State(NamedTuple):
     """Velocity, shape (nv,)."""
     a: NDArray[np.float64]
     """Acceleration, shape (nv,)."""
+    tau: NDArray[np.float64] | None = None
+    """Actuator forces, where they are known, shape (na,); else the motion's inverse dynamics is."""
 
 
 class Motion:
@@ -41,6 +43,8 @@ class Motion:
         The configuration at each time.
     velocities, accelerations : array_like, shape (n, nv)
         As Pinocchio has them; for the layers that show forces. Left out: at rest.
+    forces : array_like, shape (n, na)
+        What the actuators exert. Left out: what the motion takes.
     wrenches
         What something outside exerts all the time, by frame name: force (N) and moment (N m) in
         world axes at the frame's origin, shape (6,); for these layers too.
@@ -60,6 +64,7 @@ class Motion:
         velocities: ArrayLike | None = None,
         accelerations: ArrayLike | None = None,
         *,
+        forces: ArrayLike | None = None,
         wrenches: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         self._model = model
@@ -72,6 +77,15 @@ class Motion:
             )
         if not np.all(np.isfinite(self.times)) or np.any(np.diff(self.times) <= 0.0):
             raise InputError("times must be finite and strictly increasing")
+        self.forces = None if forces is None else np.asarray(forces, dtype=np.float64)
+        if self.forces is not None and (
+            self.forces.ndim != 2
+            or len(self.forces) != len(self.times)
+            or not np.isfinite(self.forces).all()
+        ):
+            raise InputError(
+                f"forces has shape {self.forces.shape}; it must be ({len(self.times)}, na), finite"
+            )
         self.wrenches = dict(wrenches or {})
         self.at_rest = velocities is None and accelerations is None
         self.velocities = self._rates(velocities, "velocities")
@@ -109,11 +123,14 @@ class Motion:
         """Return configuration, velocity and acceleration `elapsed` seconds after the first."""
         before, fraction = self._place(elapsed)
         after = before + (fraction > 0.0)
-        v, a = (
-            (1.0 - fraction) * rates[before] + fraction * rates[after]
-            for rates in (self.velocities, self.accelerations)
-        )
-        return State(self.at(elapsed), v, a)
+
+        def between(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+            row: NDArray[np.float64] = (1.0 - fraction) * rows[before] + fraction * rows[after]
+            return row
+
+        tau = None if self.forces is None else between(self.forces)
+        v, a = between(self.velocities), between(self.accelerations)
+        return State(self.at(elapsed), v, a, tau)
 
     def _place(self, elapsed: float) -> tuple[int, float]:
         """Return the sample at or before a time, and the share of the way to the next one."""

@@ -84,7 +84,7 @@ def motion_of(subject: Subject, given: Any = None) -> Motion:
     if isinstance(given, Motion):
         return given
     if isinstance(given, Simulation):
-        return Motion(model, given.time, given.q, given.v, given.a)
+        return Motion(model, given.time, given.q, given.v, given.a, forces=given.tau)
     if robot is None:
         return Motion(model, [0.0], _one(subject.mechanism.home if given is None else given, model))
     if isinstance(given, MotionRun):

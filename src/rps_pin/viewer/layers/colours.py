@@ -11,7 +11,7 @@ from rps_pin.viewer.layers.base import Colour
 from rps_pin.viewer.legend import ColourBar
 
 #: From safe to refused: blue, yellow, vermillion (Okabe and Ito's).
-WARNING = LinearSegmentedColormap.from_list("warning", ["#0072B2", "#F0E442", "#D55E00"])
+WARNING = LinearSegmentedColormap.from_list("warning", ["#0072B2", "#F0E442", "#D55E00"], N=4096)
 #: For fields over a surface.
 FIELD = colormaps["viridis"]
 _STOPS = 7

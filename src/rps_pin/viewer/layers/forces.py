@@ -43,7 +43,10 @@ class Forces(Framed):
 
         def vectors(state: State) -> Vectors:
             try:
-                tau = mechanism.inverse_dynamics(*state, wrenches=outside).tau
+                tau = state.tau
+                if tau is None:
+                    q, v, a, _ = state
+                    tau = mechanism.inverse_dynamics(q, v, a, wrenches=outside).tau
             except SingularityError:
                 return {}
             pin.computeJointJacobians(model, data, state.q)

@@ -44,10 +44,15 @@ class Reactions(Framed):
 
         def vectors(state: State) -> Vectors:
             try:
-                answer = mechanism.inverse_dynamics(*state, wrenches=outside)
+                q, v, a, tau = state
+                if tau is None:
+                    answer = mechanism.inverse_dynamics(q, v, a, wrenches=outside)
+                    forces = answer.constraint_forces
+                else:
+                    forces = mechanism.constraint_forces(q, v, a, tau, wrenches=outside)
             except SingularityError:
                 return {}
-            wrenches = mechanism.closure_wrenches(state.q, answer.constraint_forces)
+            wrenches = mechanism.closure_wrenches(q, forces)
             pin.framesForwardKinematics(model, data, state.q)
             return {
                 _node(name): (np.array(data.oMf[frame].translation), wrenches[name][:3])

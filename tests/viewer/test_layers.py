@@ -1,0 +1,313 @@
+"""The layers, without a browser: where their parts stand, in what scale, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rps_pin import ClosedLoopModel, RPSRobot, helix
+from rps_pin.closed_loop.visuals import skeleton
+from rps_pin.errors import InputError
+from rps_pin.rps import joint_reactions
+from rps_pin.viewer import (
+    LAYERS,
+    Forces,
+    Ghosts,
+    Limits,
+    Motion,
+    Reactions,
+    Recorder,
+    Singularity,
+    Trail,
+    View,
+    WorkspaceSurface,
+    fitting_layers,
+)
+from rps_pin.viewer.layers.shapes import between, pointing, round_number, tube
+from rps_pin.viewer.motion import State
+
+URDF = Path(__file__).parents[2] / "urdf"
+POSE = [0.4, 0.1, -0.05]
+LEGS = (1, 2, 3)
+
+
+@pytest.fixture(scope="module")
+def robot() -> RPSRobot:
+    return RPSRobot.from_preset("sokolov")
+
+
+@pytest.fixture(scope="module")
+def path(robot):
+    return helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4)
+
+
+def shown(what, motion=None, **options) -> tuple[View, Recorder]:
+    recorder = Recorder()
+    return View(recorder, what, motion, **options), recorder
+
+
+def placed(recorder: Recorder) -> dict[str, np.ndarray]:
+    """Return the last transform sent to each path below the layers."""
+    start = "/world/layers/"
+    return {
+        m["path"].removeprefix(start): np.reshape(m["matrix"], (4, 4)).T
+        for m in recorder.messages
+        if m["type"] == "set_transform" and m["path"].startswith(start)
+    }
+
+
+def legend(recorder: Recorder) -> list[dict]:
+    return [m for m in recorder.messages if m.get("property") == "userData"][-1]["value"]["layers"]
+
+
+def arrow(place: np.ndarray) -> np.ndarray:
+    """Return what an arrow's placement shows: its direction times its length."""
+    return place[:3, 2]
+
+
+def test_every_arrow_of_the_forces_is_the_force_in_one_scale(robot, path):
+    x, dx, ddx = path.sample(1.0)
+    view, recorder = shown(robot, path, layers=[Forces(newtons_per_metre=4.0), Reactions(8.0)])
+    q, v, a = robot.state(x, dx, ddx)
+    view.display(q, v, a)
+    found = placed(recorder)
+    expected = joint_reactions(robot, x, dx, ddx)  # in closed form, without constraint models
+    position, turn = robot.platform_placement(x)
+    for leg in LEGS:
+        force = found[f"forces/leg_{leg}_prismatic"]
+        along = expected.leg_axes[leg - 1][:, 0]
+        np.testing.assert_allclose(
+            arrow(force), expected.actuator[leg - 1] * along / 4.0, atol=1e-12
+        )
+        way = 2 * np.pi / 3 * (leg - 1)
+        tip = position + turn @ (0.230 * np.array([np.cos(way), np.sin(way), 0.0]))
+        np.testing.assert_allclose(force[:3, 3], tip, atol=1e-12)
+        reaction = found[f"reactions/leg_{leg}"]
+        np.testing.assert_allclose(arrow(reaction), expected.spherical[leg - 1] / 8.0, atol=1e-12)
+        np.testing.assert_allclose(reaction[:3, 3], tip, atol=1e-12)
+
+
+def test_the_scale_on_screen_is_the_arrows_own(robot, path):
+    _, recorder = shown(robot, path, layers=["forces"])
+    text = legend(recorder)[0]["text"]
+    assert text.startswith("actuators' forces: 200 mm for 1 N; at most 0.93")
+    q, v, a = robot.state(*path.sample(0.0))
+    force = robot.inverse_dynamics(q, v, a).tau[0]
+    length = np.linalg.norm(arrow(placed(recorder)["forces/leg_1_prismatic"]))
+    assert length == pytest.approx(0.2 * abs(force), rel=1e-9)
+
+
+def test_outside_wrenches_and_known_forces_are_shown(robot):
+    q, still = robot.state(POSE, np.zeros(3), np.zeros(3))[0], np.zeros((1, 12))
+    push = [0.0, 0.0, -7.0, 0.0, 0.0, 0.0]
+    motion = Motion(robot.mechanism.model, [0.0], q[None], wrenches={"platform": push})
+    _, recorder = shown(robot, motion, layers=[Forces(newtons_per_metre=1.0)])
+    expected = robot.inverse_dynamics(q, still[0], still[0], wrench=push).tau
+    known = Motion(robot.mechanism.model, [0.0], q[None], still, still, forces=[[1.0, 2.0, 3.0]])
+    _, other = shown(robot, known, layers=[Forces(newtons_per_metre=1.0)])
+    for leg in LEGS:
+        node = f"forces/leg_{leg}_prismatic"
+        length = np.linalg.norm(arrow(placed(recorder)[node]))
+        assert length == pytest.approx(abs(expected[leg - 1]), rel=1e-9)
+        assert np.linalg.norm(arrow(placed(other)[node])) == pytest.approx(leg)
+
+
+def test_torques_have_two_heads_and_lie_along_the_axis():
+    four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    _, recorder = shown(four_bar, layers=[Forces(newton_metres_per_metre=2.0)])
+    still = np.zeros(four_bar.model.nv)
+    tau = four_bar.inverse_dynamics(four_bar.home, still, still).tau[0]
+    found = placed(recorder)
+    assert "forces/crank_joint/second_head" in found
+    [joint] = ElementTree.parse(URDF / "four_bar.urdf").findall("joint[@name='crank_joint']")
+    axis = np.array(joint.find("axis").get("xyz").split(), float)
+    np.testing.assert_allclose(arrow(found["forces/crank_joint"]), axis * tau / 2, atol=1e-12)
+
+
+def test_the_trail_is_magnified_as_it_says(robot, path):
+    view, recorder = shown(robot, path, layers=[Trail(factor=200)])
+    assert "magnified 200 times" in legend(recorder)[0]["text"]
+    x = path.sample(1.5)[0]
+    start, now = robot.platform_placement(path.sample(0.0)[0])[0], robot.platform_placement(x)[0]
+    view.display(x)
+    np.testing.assert_allclose(
+        placed(recorder)["trail/point"][:3, 3], start + 200 * (now - start), atol=1e-9
+    )
+
+
+def test_ghosts_are_all_the_other_modes(robot):
+    view, recorder = shown(robot, POSE, layers=["ghosts"])
+    modes = robot.assembly_modes(robot.inverse_kinematics(POSE).length)
+    assert legend(recorder)[0]["text"].startswith(f"{len(modes.angle) - 1} other assembly modes")
+    ghosts = view.drawings["ghosts"].parts
+    balls = {  # of the platforms, told by their link's name and the shape's radius
+        int(part.node): part.placement[:3, 3]
+        for part in ghosts
+        if part.name.startswith("platform_") and type(part.geometry).__name__ == "Sphere"
+    }
+    position, _ = robot.platform_placement(POSE)
+    others = [p for p in modes.position if np.linalg.norm(p - position) > 1e-6]
+    assert sorted(balls) == list(range(1, len(others) + 1))
+    distances = [np.linalg.norm(others[number - 1] - ball) for number, ball in balls.items()]
+    np.testing.assert_allclose(distances, 0.230, atol=1e-9)  # a ball is h from a mode's centre
+
+
+def test_limits_turn_to_vermillion_at_the_limit():
+    micro = RPSRobot.from_preset("micro")
+    context_free = Limits()
+    view, _ = shown(micro, [0.225, 0.0, 0.0], layers=[context_free])
+    follow = view.drawings["limits"].follow
+    assert follow is not None
+    still = np.zeros(12)
+
+    def colour(z: float) -> tuple[float, float, float]:
+        q = micro.state([z, 0.0, 0.0], np.zeros(3), np.zeros(3))[0]
+        return follow(State(q, still, still))["leg_2_prismatic"].colour
+
+    vermillion, blue = (0xD5 / 255, 0x5E / 255, 0.0), (0.0, 0x72 / 255, 0xB2 / 255)
+    np.testing.assert_allclose(colour(0.25 - 1e-9), vermillion, atol=0.01)
+    np.testing.assert_allclose(colour(0.225), blue, atol=0.02)
+
+
+def test_the_singularity_ring_is_the_condition_number(robot):
+    view, _ = shown(robot, POSE, layers=[Singularity(worst=1e-2)])
+    follow = view.drawings["singularity"].follow
+    assert follow is not None
+    still = np.zeros(12)
+    near = robot.state([0.004, 0.0, 0.0], np.zeros(3), np.zeros(3))[0]
+    assert 1 / robot.mechanism.condition(near) < 1e-2
+    red, _, blue = follow(State(near, still, still))["ring"].colour
+    assert red > 0.8 and blue < 0.05
+
+
+def test_the_workspace_surface_spans_the_workspace():
+    micro = RPSRobot.from_preset("micro")
+    view, recorder = shown(micro, [0.225, 0.0, 0.0], layers=[WorkspaceSurface(factor=10)])
+    points = view.drawings["workspace"].parts[0].geometry.vertices
+    assert points[:, 2].min() == pytest.approx(0.200, abs=2e-3)
+    assert points[:, 2].max() == pytest.approx(0.250, abs=1e-6)
+    bar = legend(recorder)[0]
+    assert float(bar["low"]) < float(bar["high"]) <= 1.0
+    assert len(bar["colours"]) == 7
+    # x = h/2 b (wx^2 - wy^2) stays below 2.5 mm: the paper's stroke
+    assert 0.010 < np.abs(points[:, 0]).max() < 0.025
+
+
+@pytest.mark.parametrize("name", ["four_bar", "delta", "stewart", "slider_crank", "five_bar"])
+def test_any_mechanism_shows_with_all_that_fits_and_nothing_but_its_model(name):
+    mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
+    fitting = fitting_layers(mechanism)
+    view, recorder = shown(mechanism, layers=fitting)
+    assert list(view.drawings) == fitting
+    found, data = placed(recorder), mechanism.model.createData()
+    pin.framesForwardKinematics(mechanism.model, data, mechanism.home)
+    for closure in mechanism.closures:
+        a, b = closure.frame_ids(mechanism.model)
+        for side, frame in (("a", a), ("b", b)):
+            mark = found[f"closures/{closure.name}_{side}"][:3, 3]
+            np.testing.assert_allclose(mark, data.oMf[frame].translation, atol=1e-12)
+
+
+def test_an_open_closure_shows_its_gap():
+    four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    view, recorder = shown(four_bar, layers=["closures"])
+    q = four_bar.home + np.array([0.1, 0.0, 0.0])
+    view.display(q)
+    length = np.linalg.norm(placed(recorder)["closures/knee_line"][:3, 2])
+    assert length == pytest.approx(four_bar.loop_gap(q), rel=1e-9)
+    assert length > 0.01
+
+
+def test_a_skeleton_reaches_every_closed_frame():
+    four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    bars = [one for one in skeleton(four_bar).geometryObjects if one.name.startswith("bar")]
+    lengths = sorted(2 * float(bar.geometry.halfLength) for bar in bars)
+    np.testing.assert_allclose(lengths, [0.2, 0.4, 0.45, 0.5], rtol=1e-12)
+
+
+def test_layers_are_switched_by_name(robot):
+    view, recorder = shown(robot, POSE, layers=["frames"], hidden=["limits"])
+    assert [(one["name"], one["visible"]) for one in legend(recorder)] == [
+        ("frames", True),
+        ("limits", False),
+    ]
+    view.set_visible("limits", True)
+    last = [m for m in recorder.messages if m.get("property") == "visible"][-1]
+    assert (last["path"], last["value"]) == ("/world/layers/limits", True)
+    assert legend(recorder)[1]["visible"] is True
+    with pytest.raises(InputError, match="no layer 'trail' in this view; there are: frames, limi"):
+        view.set_visible("trail", True)
+
+
+@pytest.mark.parametrize(
+    ("layers", "complaint"),
+    [
+        (["tail"], "no layer 'tail'; there are: frames, trail"),
+        ([Trail], "is no layer"),
+        ([Trail(factor=0.5)], "factor = 0.5"),
+        ([Trail(frame="nose")], "no frame 'nose'; there are: universe"),
+        ([Forces(newtons_per_metre=-1.0)], "must be positive"),
+    ],
+)
+def test_what_is_no_layer_is_refused(robot, layers, complaint):
+    with pytest.raises(InputError, match=complaint):
+        shown(robot, POSE, layers=layers)
+
+
+@pytest.mark.parametrize("layer", ["ghosts", "workspace"])
+def test_layers_of_the_3_rps_say_so_of_others(layer):
+    four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    with pytest.raises(InputError, match=f"layer '{layer}'"):
+        shown(four_bar, layers=[layer])
+    if layer == "ghosts":
+        view, _ = shown(four_bar, layers=[Ghosts(at=four_bar.home)])
+        assert "1 other poses" in view.drawings["ghosts"].key.text
+
+
+@pytest.mark.parametrize(
+    ("what", "motion", "complaint"),
+    [
+        ("robot", None, "at a pose"),
+        ("robot", [1.0, 2.0], r"shape \(13,\)"),
+        ("robot", "nonsense", "no motion"),
+        ("nothing", None, "cannot be shown"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(robot, what, motion, complaint):
+    with pytest.raises(InputError, match=complaint):
+        shown(robot if what == "robot" else 3.0, motion)
+
+
+def test_all_layers_have_the_names_they_go_by(robot):
+    micro = RPSRobot.from_preset("micro")
+    view, _ = shown(micro, [0.225, 0.1, 0.0], layers=list(LAYERS))
+    assert list(view.drawings) == list(LAYERS)
+
+
+def test_arrows_and_bars_point_every_way():
+    for vector in ([0, 0, 2.0], [0, 0, -2.0], [1.0, 0, 0], [0.3, -0.4, 1.2]):
+        start = np.array([0.1, 0.2, 0.3])
+        place = pointing(start, np.array(vector))
+        np.testing.assert_allclose(place @ [0, 0, 1, 1], [*(start + vector), 1], atol=1e-12)
+        assert np.linalg.det(place[:3, :3]) == pytest.approx(np.linalg.norm(vector) ** 3)
+        bar = between(start, start + np.array(vector))
+        np.testing.assert_allclose(bar @ [0, 0, 1, 1], [*(start + vector), 1], atol=1e-12)
+    assert np.linalg.norm(pointing(np.zeros(3), np.zeros(3))[:3, 2]) < 1e-5
+
+
+def test_a_tube_keeps_its_radius():
+    turn = np.linspace(0, 6, 60)
+    line = np.stack([np.cos(turn), np.sin(turn), 0.1 * turn], axis=1)
+    made = tube(line, 0.02)
+    rings = made.vertices.reshape(60, 6, 3)
+    np.testing.assert_allclose(np.linalg.norm(rings - line[:, None], axis=2), 0.02, rtol=1e-4)
+    assert made.faces.max() == 359
+
+
+@pytest.mark.parametrize(("wanted", "number"), [(7.0, 5.0), (1.0, 1.0), (0.049, 0.02)])
+def test_round_numbers(wanted, number):
+    assert round_number(wanted) == pytest.approx(number)
