@@ -422,7 +422,7 @@ def test_memory_does_not_grow() -> None:
             loop.estimate(length[i % 100])
             loop.inverse_dynamics(pose[i % 100], rate[i % 100], acceleration[i % 100])
 
-    ticks(500)
+    ticks(10_000)
     gc.collect()
     blocks = sys.getallocatedblocks()
     ticks(20_000)

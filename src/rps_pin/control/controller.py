@@ -152,7 +152,7 @@ class Controller(ABC):
         self.period, self.gains, self.space = period, gains, space
         self._kp, self._kd, self._ki = gains.rows
         self._give = tuple(1.0 / time for time in gains.tracking_time)
-        self._g, self._h = p.base_radius, p.platform_radius
+        self._g, self._h = float(p.base_radius), float(p.platform_radius)
         self._targets = Targets(
             LimitCheck(p),
             self._g,

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 
+from rps_pin.rps.compiled import compiled
+
 #: A, B, C, D, dA/ds, dB/ds, dD/ds, d2A/ds2, d2B/ds2.
 Coefficients = tuple[float, float, float, float, float, float, float, float, float]
 
@@ -19,6 +21,7 @@ _C5 = tuple((-1.0) ** k / math.factorial(2 * k + 5) for k in range(9))
 _C6 = tuple((-1.0) ** k / math.factorial(2 * k + 6) for k in range(9))
 
 
+@compiled
 def coefficients(s: float) -> Coefficients:
     """Return A, B, C, D and the slopes named above, of a squared tilt s >= 0, rad^2."""
     if s < _SERIES_BELOW:

@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 from rps_pin.control.exponential_map import Coefficients, coefficients
+from rps_pin.rps.compiled import compiled
 from rps_pin.rps.legs import RADIAL
 from rps_pin.rps.scalar_tracking import Lengths, Triple, Way
 
@@ -30,6 +31,7 @@ class Place(NamedTuple):
     """Of the exponential map."""
 
 
+@compiled
 def place_of(pose: Triple, g: float, h: float) -> Place | None:
     """Return where a pose puts the legs, or None where one has no length."""
     z, wx, wy = pose
@@ -50,6 +52,7 @@ def place_of(pose: Triple, g: float, h: float) -> Place | None:
     )
 
 
+@compiled
 def turning_determinant(place: Place, g: float, h: float) -> float:
     """Return Eq. 8's determinant without unit, at least -1 and at most 1.
 
@@ -67,6 +70,7 @@ def turning_determinant(place: Place, g: float, h: float) -> float:
     return (a1 * b2 * c3 + a2 * b3 * c1) / (side * side * side)
 
 
+@compiled
 def _tip(
     radial: tuple[float, float],
     z: float,

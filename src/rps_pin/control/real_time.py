@@ -25,6 +25,7 @@ from rps_pin.control.scalar_rates import (
 from rps_pin.control.scalar_state import RobotState, state_at
 from rps_pin.control.speed_filter import SpeedFilter
 from rps_pin.control.status import STATUSES, Status
+from rps_pin.control.warm_up import warm_up
 from rps_pin.errors import InputError, SingularityError
 from rps_pin.rps.forward import CONDITION_LIMIT
 from rps_pin.rps.leg_equations import checked_positive
@@ -132,7 +133,7 @@ class RealTimeRobot:
         most_steps: int = 20,
     ) -> None:
         p = robot.parameters
-        self._g, self._h = p.base_radius, p.platform_radius
+        self._g, self._h = float(p.base_radius), float(p.platform_radius)
         self._longest = _BEYOND_SENSE * (self._g + self._h)
         self._limits = LimitCheck(p)
         self.dynamics, self._least = ConstrainedForces(robot), LeastGain()
@@ -143,6 +144,7 @@ class RealTimeRobot:
         self._most = int(checked_positive(most_steps, "most_steps"))
         self.answers = Answers.new() if answers is None else answers.checked()
         self.reset(near)
+        warm_up(self.known.place, self.known.gains, self._g, self._h)
 
     def reset(self, near: ArrayLike) -> None:
         """Start anew from a pose, at rest and without forces. Raises what the constructor does."""

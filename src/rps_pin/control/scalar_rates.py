@@ -14,6 +14,7 @@ import eigenpy
 import numpy as np
 
 from rps_pin.control.exponential_map import Coefficients
+from rps_pin.rps.compiled import compiled
 from rps_pin.rps.legs import RADIAL
 from rps_pin.rps.scalar_tracking import Triple, Way
 
@@ -36,6 +37,7 @@ class LegGains(NamedTuple):
     """Of K, m^2/rad^2."""
 
 
+@compiled
 def leg_gains(pose: Triple, way: Way, coefficient: Coefficients, h: float) -> LegGains:
     """Return the gains of a pose whose legs point along `way`.
 
@@ -87,6 +89,7 @@ class LeastGain:
         return least
 
 
+@compiled
 def pose_rate(gains: LegGains, speed: Triple) -> Triple:
     """Return pose' with K pose' = d': Cramer's rule. The determinant must not be zero."""
     (k11, k12, k13), (k21, k22, k23), (k31, k32, k33) = gains.K
@@ -100,6 +103,7 @@ def pose_rate(gains: LegGains, speed: Triple) -> Triple:
     )
 
 
+@compiled
 def force_of_wrench(gains: LegGains, wrench: Triple) -> Triple:
     """Return f with K' f = wrench on the pose: Cramer's rule. The determinant must not be zero."""
     (k11, k12, k13), (k21, k22, k23), (k31, k32, k33) = gains.K
@@ -115,6 +119,7 @@ def force_of_wrench(gains: LegGains, wrench: Triple) -> Triple:
     )
 
 
+@compiled
 def wrench_of_force(gains: LegGains, force: Triple) -> Triple:
     """Return K' f: N, N m, N m."""
     (k11, k12, k13), (k21, k22, k23), (k31, k32, k33) = gains.K
@@ -126,6 +131,7 @@ def wrench_of_force(gains: LegGains, force: Triple) -> Triple:
     )
 
 
+@compiled
 def leg_speed(gains: LegGains, rate: Triple) -> Triple:
     """Return K pose', m/s; or K pose'', m/s^2, the legs' accelerations without their drift."""
     (k11, k12, k13), (k21, k22, k23), (k31, k32, k33) = gains.K
@@ -137,6 +143,7 @@ def leg_speed(gains: LegGains, rate: Triple) -> Triple:
     )
 
 
+@compiled
 def platform_twist(pose: Triple, rate: Triple, coefficient: Coefficients, h: float) -> Twist:
     """Return the centre's velocity and the angular velocity, base axes: `rates.platform_twist`."""
     _, wx, wy = pose
@@ -156,6 +163,7 @@ def platform_twist(pose: Triple, rate: Triple, coefficient: Coefficients, h: flo
     )
 
 
+@compiled
 def _tip_gradient(
     radial: tuple[float, float], wx: float, wy: float, h: float, coefficient: Coefficients
 ) -> tuple[float, float, float, float]:

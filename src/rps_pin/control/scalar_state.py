@@ -9,6 +9,7 @@ import math
 from typing import NamedTuple
 
 from rps_pin.control.place import Place
+from rps_pin.rps.compiled import compiled
 from rps_pin.rps.legs import RADIAL
 from rps_pin.rps.scalar_tracking import Triple
 
@@ -33,6 +34,7 @@ class RobotState(NamedTuple):
     """Spatial, in platform axes, six numbers."""
 
 
+@compiled
 def state_at(place: Place, rate: Triple, acceleration: Triple, h: float) -> RobotState:
     """Return the state at a place, of the pose's first and second derivative."""
     pose, _, _, _, coefficient = place
@@ -50,11 +52,11 @@ def state_at(place: Place, rate: Triple, acceleration: Triple, h: float) -> Robo
         _leg(1, _E2, place, rate, acceleration, changing, h),
         _leg(2, _E3, place, rate, acceleration, changing, h),
     )
-    return RobotState(
-        place, legs, *_platform(pose, rate, acceleration, changing, coefficient[2], h)
-    )
+    placement, velocity, spatial = _platform(pose, rate, acceleration, changing, coefficient[2], h)
+    return RobotState(place, legs, placement, velocity, spatial)
 
 
+@compiled
 def _platform(
     pose: Triple, rate: Triple, acceleration: Triple, changing: _Changing, c: float, h: float
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
@@ -99,6 +101,7 @@ def _platform(
     )
 
 
+@compiled
 def _leg(
     number: int,
     radial: tuple[float, float],

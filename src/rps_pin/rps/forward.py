@@ -211,6 +211,9 @@ class EncoderTracker:
         self._length, self._way = d, way
         self.condition = condition
         self._pose[:] = pose
+        # Where functions are compiled, now and not in the loop.
+        follow(d, way, d, self._g, self._h, self._limit, self._most)
+        pose_of(d, way, self._g, self._h)
 
     def update(self, length: ArrayLike, out: Array | None = None) -> Array:
         """Return the pose (3,) at a new reading of the leg lengths (3,), m.

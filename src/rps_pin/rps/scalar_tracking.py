@@ -14,6 +14,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rps_pin.rps.compiled import compiled
+
 #: Three leg lengths, m.
 Lengths = tuple[float, float, float]
 #: Cosines, then sines, of the three leg angles.
@@ -57,6 +59,7 @@ def condition_of(d: Lengths, way: Way, g: float, h: float) -> float:
     return _newton_step(d, way, g, h)[2]
 
 
+@compiled
 def follow(
     begin: Lengths, way: Way, goal: Lengths, g: float, h: float, limit: float, most: int
 ) -> Followed:
@@ -79,18 +82,16 @@ def follow(
     for _ in range(most):
         to = min(1.0, done + share)
         d = goal if to == 1.0 else _between(begin, goal, to)
-        led = _solve(d, way, g, h, limit)
-        if isinstance(led, float):
-            share *= led
-            continue
-        way, condition, growth = led
-        done = to
+        solved, there, worth, growth = _solve(d, way, g, h, limit)
+        if solved:
+            way, condition, done = there, worth, to
         if done == 1.0:
             break
         share *= growth
     return Followed(way, condition, done)
 
 
+@compiled
 def pose_of(d: Lengths, way: Way, g: float, h: float) -> Triple:
     """Return (z, tilt_x, tilt_y): as `placement_from_angles`, where the formulas are explained."""
     rho_1, rho_2, rho_3 = g - d[0] * way[0], g - d[1] * way[1], g - d[2] * way[2]
@@ -118,13 +119,15 @@ def pose_of(d: Lengths, way: Way, g: float, h: float) -> Triple:
 # Inner workings -----------------------------------------------------------------------------------
 
 
+@compiled
 def _solve(
     d: Lengths, way: Way, g: float, h: float, limit: float
-) -> tuple[Way, float, float] | float:
-    """Return directions, condition and how the next step may grow; or how to shorten this one."""
+) -> tuple[bool, Way, float, float]:
+    """Return whether it is solved, directions, condition, and by how much to change the step."""
     t, det, condition, kantorovich, inverse = _newton_step(d, way, g, h)
     if not (kantorovich <= TRUST and condition <= limit):
-        return max(0.02, min(0.5, 0.8 * TRUST / kantorovich)) if kantorovich else 0.5
+        shorter = max(0.02, min(0.5, 0.8 * TRUST / kantorovich)) if kantorovich > 0.0 else 0.5
+        return False, way, condition, shorter
     at = _turned(way, t)
     if max(t) > _LAST_STEP or min(t) < -_LAST_STEP:
         at = _turned(at, _chord_step(d, at, g, h, inverse))
@@ -135,11 +138,12 @@ def _solve(
             # What is left is its square: lost in rounding.
             if condition <= limit and (there > 0) == (det > 0):
                 growth = 0.8 * TRUST / max(kantorovich, 1e-9)
-                return at, condition, max(0.5, min(4.0, growth))
-            return 0.5
-    return 0.5
+                return True, at, condition, max(0.5, min(4.0, growth))
+            break
+    return False, way, condition, 0.5
 
 
+@compiled
 def _newton_step(d: Lengths, way: Way, g: float, h: float) -> _Step:
     """Return half Newton's step of Eq. 8 in each angle, and what it is worth.
 
@@ -186,6 +190,7 @@ def _newton_step(d: Lengths, way: Way, g: float, h: float) -> _Step:
     return (t1, t2, t3), det, size * beta, kantorovich, inverse
 
 
+@compiled
 def _chord_step(d: Lengths, way: Way, g: float, h: float, inverse: _Inverse) -> Triple:
     """Return half a step of Eq. 8 in each angle, by an inverse Jacobian from before."""
     d1, d2, d3 = d
@@ -205,6 +210,7 @@ def _chord_step(d: Lengths, way: Way, g: float, h: float, inverse: _Inverse) -> 
     )
 
 
+@compiled
 def _turned(way: Way, t: Triple) -> Way:
     """Return the legs' directions turned by 2 atan(t) each."""
     c1, c2, c3, s1, s2, s3 = way
@@ -224,6 +230,7 @@ def _turned(way: Way, t: Triple) -> Way:
     return k1 * c1, k2 * c2, k3 * c3, k1 * s1, k2 * s2, k3 * s3
 
 
+@compiled
 def _between(begin: Lengths, goal: Lengths, part: float) -> Lengths:
     return (
         begin[0] + part * (goal[0] - begin[0]),
