@@ -7,7 +7,6 @@ Run it from the checkout, in an environment with the development dependencies an
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
@@ -16,12 +15,13 @@ import tempfile
 from pathlib import Path
 
 from marked import block, replaced
-from playwright.sync_api import sync_playwright
+
+from rps_pin import RPSRobot, helix
+from rps_pin.viewer import save_png
 
 ROOT = Path(__file__).parent.parent
 README = ROOT / "README.md"
 IMAGES = ROOT / "docs" / "images"
-BROWSER_OPTIONS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"]
 
 
 def main() -> None:
@@ -32,7 +32,7 @@ def main() -> None:
         shown = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
         text = replaced(text, "rps-pin helix", quoted(shown.stdout.split("Written:")[0]))
         shutil.copy(Path(folder) / "helix" / "figure_9_forces.png", IMAGES / "forces.png")
-        photograph(Path(folder) / "helix" / "viewer.html", IMAGES / "robot.png")
+    photograph(IMAGES / "robot.png")
     block = re.search(r"```python\n(.*?)```", text, re.DOTALL)
     assert block is not None
     printed = subprocess.run(
@@ -46,19 +46,12 @@ def quoted(output: str) -> str:
     return block(output.strip("\n").splitlines())
 
 
-def photograph(page: Path, picture: Path) -> None:
-    """Take a picture of the robot in an animation's page, a second into its motion."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=os.environ.get("RPS_PIN_CHROMIUM") or shutil.which("chromium"),
-            args=BROWSER_OPTIONS,
-        )
-        tab = browser.new_page(viewport={"width": 1000, "height": 620})
-        tab.goto(page.as_uri())
-        tab.add_style_tag(content=".dg { display: none }")  # not the panel with the controls
-        tab.wait_for_timeout(4000)
-        tab.screenshot(path=picture)
-        browser.close()
+def photograph(picture: Path) -> None:
+    """Take a picture of the paper's robot half-way along its helix, as viewer.html shows it."""
+    robot = RPSRobot.from_preset("sokolov")
+    path = helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4)
+    title, layers = "3-RPS sokolov along a helix", ["trail", "forces"]
+    save_png(picture, robot, path, time=2.6, layers=layers, title=title)
 
 
 if __name__ == "__main__":
