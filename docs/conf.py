@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -18,19 +19,19 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
+    "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "docstrings",  # ours, beside this file
-    "mathml",  # ours too
 ]
 exclude_patterns = ["README.md"]
 
 html_theme = "furo"
 html_title = "rps_pin"
-html_static_path = ["_static"]
+html_static_path = ["_static", str(files("sphinx-mathjax-offline") / "static")]
+mathjax_path = "mathjax/tex-chtml.js"  # a copy in the site, not from the network
 html_css_files = ["site.css"]
 html_copy_source = html_show_sourcelink = False
 highlight_language = "none"  # blocks that are indented: what a terminal shows
-html_math_renderer = "mathml"
 
 # Markdown ---------------------------------------------------------------------------------------
 
