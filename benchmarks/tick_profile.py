@@ -13,6 +13,9 @@ import argparse
 import gc
 import itertools
 import json
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -95,7 +98,10 @@ def parts() -> dict[str, Callable[[], object]]:
 
 
 def measured(calls: dict[str, Callable[[], object]]) -> dict[str, float]:
-    """Return the least of several medians of each call's time, us, taken in turn."""
+    """Return the least of several medians of each call's time, us, taken in turn.
+
+    The least, because a machine's other work only ever adds.
+    """
     clock, times = time.perf_counter_ns, np.zeros(_CALLS)
     least = dict.fromkeys(calls, np.inf)
     for _ in range(_REPEATS):
@@ -108,28 +114,54 @@ def measured(calls: dict[str, Callable[[], object]]) -> dict[str, float]:
     return least
 
 
-def main() -> None:
-    """Measure all parts and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, help="write the figures into this file too")
-    asked = parser.parse_args()
+def profile() -> dict[str, float]:
+    """Return the time of each part, of what they leave, and of the whole, us."""
     gc.disable()
     found = measured({"nothing": lambda: None, **parts()})
     empty = found.pop("nothing")
     found = {name: value - empty for name, value in found.items()}
     whole = found.pop("whole tick")
-    found["the calls between them"] = whole - sum(found.values())
-    found["whole tick"] = whole
-    table = Table("part of a tick")
-    for column in ("us", "share"):
+    return {
+        **found,
+        "calls between them, colder caches": whole - sum(found.values()),
+        "whole tick": whole,
+    }
+
+
+def in_a_process(compile_it: bool) -> dict[str, float]:
+    """Return the same from a new process, with or without Numba."""
+    told = subprocess.run(
+        [sys.executable, "-m", "benchmarks.tick_profile", "--one"],
+        env={**os.environ, "RPS_PIN_COMPILE": str(int(compile_it))},
+        stdout=subprocess.PIPE,
+        check=True,
+    )
+    found: dict[str, float] = json.loads(told.stdout)
+    return found
+
+
+def main() -> None:
+    """Measure all parts, compiled and interpreted, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", type=Path, help="write the figures into this file too")
+    parser.add_argument("--one", action="store_true", help="print JSON of this process alone")
+    asked = parser.parse_args()
+    if asked.one:
+        print(json.dumps(profile()))
+        return
+    compiled, interpreted = in_a_process(True), in_a_process(False)
+    table = Table("part of a tick, us")
+    for column in ("compiled", "share", "interpreted"):
         table.add_column(column, justify="right")
-    for name, value in found.items():
-        table.add_row(name, f"{value:.1f}", f"{value / whole:.0%}")
+    for name, value in compiled.items():
+        share = value / compiled["whole tick"]
+        table.add_row(name, f"{value:.1f}", f"{share:.0%}", f"{interpreted[name]:.1f}")
     console = Console()
     console.print(table)
     console.print(machine(), highlight=False)
     if asked.json:
-        asked.json.write_text(json.dumps({"machine": machine(), "parts": found}, indent=2) + "\n")
+        found = {"machine": machine(), "compiled": compiled, "interpreted": interpreted}
+        asked.json.write_text(json.dumps(found, indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -259,11 +259,11 @@ def latency() -> str:
 def profile() -> str:
     """Return the table of a tick's parts as measured."""
     measured = json.loads(PROFILE.read_text("utf-8"))
-    whole = measured["parts"]["whole tick"]
-    lines = ["| part of a tick | us | share |", "|---|---:|---:|"]
+    compiled, interpreted = measured["compiled"], measured["interpreted"]
+    lines = ["| part of a tick | compiled, us | share | interpreted, us |", "|---|---:|---:|---:|"]
     lines += [
-        f"| {name} | {value:.1f} | {value / whole:.0%} |"
-        for name, value in measured["parts"].items()
+        f"| {name} | {value:.1f} | {value / compiled['whole tick']:.0%} | {interpreted[name]:.1f} |"
+        for name, value in compiled.items()
     ]
     return "\n".join([*lines, "", f"{measured['machine']}."])
 

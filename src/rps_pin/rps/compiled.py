@@ -22,8 +22,14 @@ def _compiler() -> Callable[[Any], Any] | None:
         import numba  # noqa: PLC0415
     except ImportError:
         return None
-    compiler: Callable[[Any], Any] = numba.njit(cache=True)
-    return compiler
+
+    def compile_it(function: Any) -> Any:
+        try:
+            return numba.njit(cache=True)(function)
+        except RuntimeError:  # there is no place to keep machine code
+            return numba.njit(function)
+
+    return compile_it
 
 
 _COMPILER = _compiler()
