@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -29,10 +30,19 @@ _LOAD_SECONDS = 60.0
 _Answer = TypeVar("_Answer")
 
 
-def in_own_thread(work: Callable[[], _Answer]) -> _Answer:
-    """Return what `work` returns: Playwright refuses threads with an event loop, as Jupyter's."""
+def in_own_thread(work: Callable[[threading.Event], _Answer]) -> _Answer:
+    """Return what `work` returns, run in a thread of its own.
+
+    Playwright refuses threads with an event loop, as Jupyter's. The event that `work` is given is
+    set when it shall stop, at Ctrl-C.
+    """
+    stop = threading.Event()
     with ThreadPoolExecutor(1, thread_name_prefix="rps_pin pictures") as pool:
-        return pool.submit(work).result()
+        try:
+            return pool.submit(work, stop).result()
+        except BaseException:
+            stop.set()
+            raise
 
 
 @contextmanager

@@ -42,6 +42,11 @@ body { margin: 0; background: #f4f6f9; }
 }
 #layers .bar[hidden] { display: none; }
 #layers .bar i { width: 110px; height: 8px; border-radius: 2px; }
+@media (max-width: 700px) {
+  #layers { max-width: 34vw; font-size: 10px; }
+  #layers .bar { margin-left: 0; font-size: 9px; }
+  #layers .bar i { width: 60px; }
+}
 .picture #layers input, .picture #layers .off { display: none; }
 </style>
 </head>

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import io
 import math
+import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from PIL import Image
 
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, RPSPinError
 from rps_pin.viewer.browser import opened_page
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def checked_size(size: Sequence[int], scale: float) -> tuple[int, int]:
 def take_pictures(
     text: str,
     times: Iterable[float],
+    stop: threading.Event,
     *,
     size: tuple[int, int],
     scale: float = 1.0,
@@ -60,6 +62,8 @@ def take_pictures(
         The page, as HTML.
     times
         Of the page's motion, s.
+    stop
+        Set it to end early.
     size, scale, background, captions
         As for `save_png`.
     """
@@ -69,6 +73,8 @@ def take_pictures(
         page.evaluate(_PICTURE)
         _prepare(page, plain=background is not None)
         for time in times:
+            if stop.is_set():
+                raise RPSPinError("stopped before the last picture")
             page.evaluate(_SEEK % float(time))
             yield page.screenshot(style=style, omit_background=transparent, animations="disabled")
 

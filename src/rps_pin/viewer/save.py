@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -115,9 +117,15 @@ def save_png(
     if not 0.0 <= time <= view.motion.duration:
         raise InputError(f"time = {time} s; the motion lasts from 0 to {view.motion.duration:g} s")
     [picture] = in_own_thread(
-        lambda: list(
+        lambda stop: list(
             take_pictures(
-                text, [time], size=sides, scale=scale, background=background, captions=captions
+                text,
+                [time],
+                stop,
+                size=sides,
+                scale=scale,
+                background=background,
+                captions=captions,
             )
         )
     )
@@ -174,10 +182,11 @@ def save_video(
     # The end is the beginning of the next round: one picture of the two.
     times = np.arange(0.0, duration - 0.5 / frame_rate, 1.0 / frame_rate)
 
-    def film(scratch: Any) -> None:
+    def film(scratch: Path, stop: threading.Event) -> None:
         pictures = take_pictures(
             text,
             progress([float(time) for time in times]),
+            stop,
             size=sides,
             scale=scale,
             background=background,
@@ -186,7 +195,7 @@ def save_video(
         write_film(scratch, pictures, frame_rate, target.suffix.lower())
 
     with whole_file(target) as scratch:
-        in_own_thread(lambda: film(scratch))
+        in_own_thread(lambda stop: film(scratch, stop))
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import numpy as np
 
 from rps_pin.errors import InputError
 from rps_pin.viewer.layers.base import UNSEEN, Array, Context, Drawing, Look, Part
-from rps_pin.viewer.layers.shapes import at, css, pointing, round_number
+from rps_pin.viewer.layers.shapes import at, css, length_text, pointing, round_number
 from rps_pin.viewer.legend import Key
 from rps_pin.viewer.motion import State
 
@@ -98,4 +98,4 @@ def _scale(layer: str, given: float | None, greatest: float, radius: float) -> f
 def _said(unit: str, scale: float, radius: float) -> str:
     """Return a scale in words: how long a round force is drawn."""
     force = round_number(0.5 * radius * scale)
-    return f"{1e3 * force / scale:.3g} mm for {force:g} {unit}"
+    return f"{length_text(force / scale)} for {force:g} {unit}"

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import pinocchio as pin
 
 from rps_pin.closed_loop import LoopClosure
 from rps_pin.errors import InputError
 from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
-from rps_pin.viewer.layers.shapes import cross
+from rps_pin.viewer.layers.shapes import cross, length_text
 from rps_pin.viewer.legend import Key
 from rps_pin.viewer.links import node_name
 from rps_pin.viewer.motion import State
@@ -51,14 +50,10 @@ class Frames(Framed):
             pin.framesForwardKinematics(model, data, state.q)
             return {node: Look(data.oMf[frame].homogeneous) for node, frame in nodes.items()}
 
-        text = f"frames: x red, y green, z blue, {_millimetres(size)} long"
+        text = f"frames: x red, y green, z blue, {length_text(size)} long"
         return Drawing(Key("frames", text, "#2ca02c"), parts, follow)
 
     def _names(self, context: Context) -> list[str]:
         closures = context.subject.mechanism.closures
         closed = [one.frame_b for one in closures if isinstance(one, LoopClosure)]
         return list(dict.fromkeys([*context.subject.model.names, *closed]))
-
-
-def _millimetres(length: float) -> str:
-    return f"{np.round(1e3 * length, 1):g} mm"

@@ -144,6 +144,13 @@ def round_number(wanted: float) -> float:
     return float(max(steps, default=decade))
 
 
+def length_text(length: float) -> str:
+    """Return a length in words, in a unit that suits it."""
+    if length >= 1.0:
+        return f"{length:.3g} m"
+    return f"{1e3 * length:.3g} mm" if length >= 1e-4 else f"{1e6 * length:.3g} µm"
+
+
 def tube(points: Array, radius: float, sides: int = 6) -> mg.TriangularMeshGeometry:
     """Return a tube along a line of points, shape (n, 3), n at least 2, neighbours apart."""
     tangents = np.gradient(points, axis=0)

@@ -11,7 +11,16 @@ import pinocchio as pin
 from rps_pin.closed_loop import LoopClosure
 from rps_pin.errors import InputError
 from rps_pin.viewer.layers.base import Array, Context, Drawing, Framed, Look, Part
-from rps_pin.viewer.layers.shapes import PURPLE, at, ball, css, paint, round_number, tube
+from rps_pin.viewer.layers.shapes import (
+    PURPLE,
+    at,
+    ball,
+    css,
+    length_text,
+    paint,
+    round_number,
+    tube,
+)
 from rps_pin.viewer.legend import Key
 from rps_pin.viewer.motion import State
 from rps_pin.viewer.subject import Subject
@@ -73,7 +82,9 @@ class Trail(Framed):
             return {"point": Look(at(magnified(place(state.q))))}
 
         how = f", magnified {factor:g} times about its start" if factor != 1 else ", to scale"
-        text = f"path of {name}{how}: {_length(size)} across" if size > 0.0 else f"{name}, at rest"
+        text = (
+            f"path of {name}{how}: {length_text(size)} across" if size > 0.0 else f"{name}, at rest"
+        )
         return Drawing(Key("trail", text, css(PURPLE)), parts, follow)
 
     def _factor(self, size: float, radius: float) -> float:
@@ -106,7 +117,3 @@ def _apart(points: Array, least: float) -> Array:
         if np.linalg.norm(point - kept[-1]) >= least:
             kept.append(point)
     return np.array(kept)
-
-
-def _length(size: float) -> str:
-    return f"{1e3 * size:.3g} mm" if size >= 1e-4 else f"{1e6 * size:.3g} µm"
