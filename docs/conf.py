@@ -50,6 +50,7 @@ autodoc_preserve_defaults = True
 python_maximum_signature_line_length = 88
 napoleon_google_docstring = False
 napoleon_use_ivar = True
+napoleon_use_rtype = False
 
 # A link of ours to a name that is not in the API is a mistake; types in signatures, and names of
 # other libraries, are links where they can be.

@@ -14,6 +14,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register what is done before napoleon reads a docstring's sections (at 500)."""
     app.connect("autodoc-process-docstring", fields_of_models, priority=300)
     app.connect("autodoc-process-docstring", formulas, priority=400)
+    app.connect("autodoc-process-signature", signature_of_models)
     app.connect("doctree-read", exact_names)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -28,6 +29,15 @@ def fields_of_models(
             default = "" if info.is_required() else f"; {info.default} if left out"
             lines += [field, f"    {info.description}{default}"]
         lines.append("")
+
+
+def signature_of_models(
+    app: Sphinx, what: str, name: str, obj: Any, options: object, signature: str, returned: str
+) -> tuple[str, None] | None:
+    """Leave out of a pydantic model's signature what its fields say better."""
+    if what == "class" and issubclass(obj, BaseModel):
+        return "(**fields)", None
+    return None
 
 
 def formulas(

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pages
 
-WIDTH = 98
+WIDTH = 84
 
 
 def main() -> None:
