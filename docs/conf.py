@@ -46,6 +46,7 @@ toc_object_entries = False
 autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints_format = "short"
 autodoc_class_signature = "mixed"
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike", "Closure", "Wrenches")}
 autodoc_preserve_defaults = True
 python_maximum_signature_line_length = 88
 napoleon_google_docstring = False

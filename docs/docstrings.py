@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from docutils import nodes
@@ -11,10 +12,11 @@ from sphinx.application import Sphinx
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Register what is done before napoleon reads a docstring's sections (at 500)."""
+    """Register what is done before napoleon reads a docstring's sections (at 500), and after."""
     app.connect("autodoc-process-docstring", fields_of_models, priority=300)
     app.connect("autodoc-process-docstring", formulas, priority=400)
-    app.connect("autodoc-process-signature", signature_of_models)
+    app.connect("autodoc-process-docstring", whole_sentences, priority=600)
+    app.connect("autodoc-process-signature", short_signature)
     app.connect("doctree-read", exact_names)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -31,13 +33,21 @@ def fields_of_models(
         lines.append("")
 
 
-def signature_of_models(
-    app: Sphinx, what: str, name: str, obj: Any, options: object, signature: str, returned: str
-) -> tuple[str, None] | None:
-    """Leave out of a pydantic model's signature what its fields say better."""
+def short_signature(
+    app: Sphinx,
+    what: str,
+    name: str,
+    obj: Any,
+    options: object,
+    signature: str | None,
+    returned: str | None,
+) -> tuple[str | None, str | None]:
+    """Leave out of a pydantic model's signature what its fields say better; aliases are names."""
     if what == "class" and issubclass(obj, BaseModel):
         return "(**fields)", None
-    return None
+    alias = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")  # how autodoc prints one inside a tuple
+    plain = [text and alias.sub(r"\1", text) for text in (signature, returned)]
+    return plain[0], plain[1]
 
 
 def formulas(
@@ -59,6 +69,16 @@ def formulas(
                 text = indent
         kept.append(line if block >= 0 else line.replace("|", r"\|"))
     lines[:] = kept
+
+
+def whole_sentences(
+    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
+) -> None:
+    """Undo what napoleon makes of an attribute's "Which: one or two.": a type and a text."""
+    kinds = [number for number, line in enumerate(lines) if line.startswith(":type: ")]
+    if what in ("attribute", "property", "data") and kinds:
+        which = lines[kinds[0]].removeprefix(":type: ")
+        lines[:] = [f"{which}: {lines[0]}", *lines[1 : kinds[0]]]
 
 
 def exact_names(app: Sphinx, doctree: nodes.document) -> None:
