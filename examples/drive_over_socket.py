@@ -132,7 +132,9 @@ def follow(
     """Answer each reading, until the targets end; return what went wrong, or nothing."""
     chance, done = random.Random(1), 0
     line.settimeout(START)
-    line.connect(line.recvfrom(1, socket.MSG_PEEK)[1])  # nobody else is heard from now on
+    address = line.recvfrom(1, socket.MSG_PEEK)[1]
+    line.connect(address)  # nobody else is heard from now on
+    print(f"controller: the drive is at {address}", flush=True)
     line.settimeout(PATIENCE)
     while done < len(reached):
         packet = line.recv(64)

@@ -8,8 +8,8 @@ the loop; files are written after it. The view is a process of its own, which th
 for; its address, on this machine only, is printed. `--no-view` leaves it out.
 
 Ctrl-C ends the loop, and what has been logged is kept. Prints the tracking error as the encoders
-see it, the clock's report, and the files: `loop.csv` (a row for each tick), `loop.png` and
-`loop.svg`. Exit status: 0 done, Ctrl-C too; 1 the controller stopped; 2 wrong usage.
+see it, the clock's report, and the files: `loop.csv` (a row for each tick) and `loop.png`.
+Exit status: 0 done, Ctrl-C too; 1 the controller stopped; 2 wrong usage.
 """
 
 from __future__ import annotations
@@ -37,7 +37,6 @@ from rps_pin.control import (
 )
 from rps_pin.errors import RPSPinError
 from rps_pin.files import whole_file
-from rps_pin.plots import save_figure
 from rps_pin.trajectories import circle
 from rps_pin.viewer import LiveView
 
@@ -137,7 +136,10 @@ def write(folder: Path, robot: RPSRobot, log: NDArray[np.void]) -> list[Path]:
         own.set_ylabel(label)
     axes[2].legend(["leg 1", "leg 2", "leg 3"])
     axes[2].set_xlabel("time (s)")
-    return [table, *save_figure(figure, folder, "loop")]
+    picture = folder / "loop.png"
+    with whole_file(picture) as scratch:
+        figure.savefig(scratch, dpi=150)
+    return [table, picture]
 
 
 if __name__ == "__main__":
