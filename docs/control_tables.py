@@ -34,8 +34,7 @@ from rps_pin.control.margins import loop_margins
 from rps_pin.control.plant import Plant
 from rps_pin.control.scenario import load_scenario
 from rps_pin.control.wrong_parameters import wrong_parameters
-from rps_pin.control_plots import plot_loop_forces
-from rps_pin.plots import save_figure
+from rps_pin.plots import plot_loop_forces, save_figure
 from rps_pin.trajectories import Trajectory
 
 ROOT = Path(__file__).parent.parent

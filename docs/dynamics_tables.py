@@ -22,8 +22,7 @@ import numpy as np
 from marked import block, replaced
 
 from rps_pin import RPSRobot, helix
-from rps_pin.dynamics_plots import plot_force_causes
-from rps_pin.plots import STYLE
+from rps_pin.plots import STYLE, plot_force_causes
 from rps_pin.rps import Payload, force_causes, time_optimal
 from rps_pin.rps.motion_run import MotionRun, run_motion
 from rps_pin.rps.three_ways import force_differences

@@ -94,9 +94,9 @@ def _write(
     """Write everything into a folder; return the files."""
     from rps_pin.control.loop_run import write_loop_csv
     from rps_pin.control.report import report
-    from rps_pin.control_plots import plot_loop_forces, plot_tracking
     from rps_pin.files import whole_file
     from rps_pin.plots import save_figure
+    from rps_pin.plots.control import plot_loop_forces, plot_tracking
     from rps_pin.viewer import write_html
 
     title = f"3-RPS {scenario.model.parameters.name}, {name}"

@@ -170,9 +170,9 @@ def _write(
     wrench: Six | None,
 ) -> list[Path]:
     """Write the motion, its forces by cause and the sizing sheet; return the files."""
-    from rps_pin.dynamics_plots import plot_force_causes, plot_sizing
     from rps_pin.files import whole_file
     from rps_pin.plots import save_figure
+    from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
     from rps_pin.rps.force_causes import force_causes
 
     title = f"3-RPS {robot.parameters.name} along {trajectory.name}"

@@ -130,7 +130,7 @@ def write_results(
     """Write a simulation's table, figure and animation into a folder; return the files."""
     from rps_pin.closed_loop.visuals import visual_model
     from rps_pin.plots import save_figure
-    from rps_pin.simulation_plots import plot_simulation
+    from rps_pin.plots.simulation import plot_simulation
     from rps_pin.viewer import fitting_layers, save_html
 
     table = folder / "simulation.csv"

@@ -105,7 +105,7 @@ def _write(
 ) -> list[Path]:
     # Only this command draws: the others shall not wait for these to be imported.
     from rps_pin.plots import save_figure
-    from rps_pin.workspace_plots import (
+    from rps_pin.plots.workspace import (
         plot_assembly_modes,
         plot_comparison,
         plot_effective,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-from rps_pin.plots import LEG_COLOURS, STYLE
+from rps_pin.plots.style import LEG_COLOURS, STYLE
 from rps_pin.reproduction.paper_data import Array
 from rps_pin.rps.legs import RADIAL
 from rps_pin.rps.robot import RPSRobot

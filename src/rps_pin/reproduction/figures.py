@@ -10,6 +10,13 @@ from matplotlib.figure import Figure
 
 from rps_pin.files import whole_file
 from rps_pin.plots import STYLE, plot_forces, plot_lengths, plot_path
+from rps_pin.plots.workspace import (
+    plot_assembly_modes,
+    plot_effective,
+    plot_space,
+    plot_theoretical,
+    plot_views,
+)
 from rps_pin.reproduction.compute import Reproduction
 from rps_pin.reproduction.figure_1 import plot_mechanism
 from rps_pin.reproduction.table_2_figures import (
@@ -20,13 +27,6 @@ from rps_pin.reproduction.table_2_figures import (
     plot_table_2,
 )
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.workspace_plots import (
-    plot_assembly_modes,
-    plot_effective,
-    plot_space,
-    plot_theoretical,
-    plot_views,
-)
 
 _DOTS_PER_INCH = 80
 

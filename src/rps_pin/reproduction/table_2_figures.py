@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from rps_pin.plots import LEG_COLOURS, STYLE
+from rps_pin.plots.style import LEG_COLOURS, STYLE
 from rps_pin.reproduction import paper_data as paper
 from rps_pin.reproduction.comparison import force_range
 from rps_pin.reproduction.compute import COLUMNS, Reproduction

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.errors import InputError
-from rps_pin.rps.workspace import Workspace, leg_grid, paper_comparison, pose_grid, workspace
-from rps_pin.workspace_plots import (
+from rps_pin.plots import (
     plot_assembly_modes,
     plot_comparison,
     plot_effective,
@@ -21,6 +20,7 @@ from rps_pin.workspace_plots import (
     plot_theoretical,
     plot_views,
 )
+from rps_pin.rps.workspace import Workspace, leg_grid, paper_comparison, pose_grid, workspace
 
 
 @pytest.fixture(scope="module")

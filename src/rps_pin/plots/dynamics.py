@@ -16,7 +16,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
-from rps_pin.plots import LEG_COLOURS, STYLE
+from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, legend_above
 from rps_pin.rps.checks import finite_entries
 from rps_pin.rps.force_causes import ForceCauses
 from rps_pin.rps.sizing_sheet import SizingSheet
@@ -32,7 +32,6 @@ _CAUSES = {
     "external": ("#F0E442", "--"),
 }
 _LABELS = {"coriolis": "Coriolis"}
-_LEG_STYLES = ("-", "--", "-.")
 
 
 def plot_force_causes(
@@ -79,8 +78,8 @@ def plot_force_causes(
             own.set_ylabel(f"force $F_{leg + 1}$ (N)")
             own.margins(x=0)
         axes[-1].set_xlabel("time (s)")
-        _legend_above(axes[0], columns=7)
-    return _figure_of(axes[0])
+        legend_above(axes[0], columns=7)
+    return figure_of(axes[0])
 
 
 def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
@@ -94,7 +93,7 @@ def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
             figure = Figure(figsize=(6.4, 4.6), layout="constrained")
             figure.suptitle("Force and speed of the actuators")
             axes = figure.add_subplot()
-        legs = list(zip(LEG_COLOURS, _LEG_STYLES, sheet.actuators, strict=True))
+        legs = list(zip(LEG_COLOURS, LEG_STYLES, sheet.actuators, strict=True))
         for leg, (colour, style, actuator) in enumerate(legs):
             speed, force = sheet.speed[:, leg], sheet.force[:, leg]
             label = f"actuator {actuator.actuator}"
@@ -106,8 +105,8 @@ def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
         axes.axvline(0.0, color="black", linewidth=0.6)
         axes.set_xlabel("speed $\\dot d_i$ (m/s), positive is out")
         axes.set_ylabel("force $F_i$ (N), positive pushes out")
-        _legend_above(axes, columns=5)
-    return _figure_of(axes)
+        legend_above(axes, columns=5)
+    return figure_of(axes)
 
 
 def _stacks(axes: Axes, time: np.ndarray, parts: dict[str, np.ndarray]) -> None:
@@ -148,21 +147,3 @@ def _limit_box(axes: Axes, sheet: SizingSheet) -> None:
             for sides in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
                 label = "power limit" if sides == (1, 1) else None
                 axes.plot(sides[0] * v, sides[1] * power / v, ":", color="black", label=label)
-
-
-def _legend_above(axes: Axes, columns: int) -> None:
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0, 1),
-        ncols=columns,
-        frameon=False,
-        fontsize="small",
-        columnspacing=1.0,
-        handlelength=1.6,
-    )
-
-
-def _figure_of(axes: Axes) -> Figure:
-    figure = axes.get_figure(root=True)
-    assert figure is not None  # axes of a figure have one
-    return figure

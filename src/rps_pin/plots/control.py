@@ -18,9 +18,8 @@ from rps_pin.control.loop_run import LoopRun
 from rps_pin.control.loop_summary import TrackingErrors, status_name
 from rps_pin.control.status import Status
 from rps_pin.errors import InputError
-from rps_pin.plots import LEG_COLOURS, STYLE
+from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of
 
-_STYLES = ("-", "--", "-.")
 #: Above the axes, where it hides nothing.
 _LEGEND: Any = {
     "loc": "lower right",
@@ -57,7 +56,7 @@ def plot_tracking(
     with matplotlib.rc_context(STYLE):
         figure, (centre, turn, legs) = _three(axes, "Errors: actual minus target")
         for part, (name, colour) in enumerate(zip("xyz", LEG_COLOURS, strict=True)):
-            style = _STYLES[part]
+            style = LEG_STYLES[part]
             shown = 1e6 * errors.centre[here, part]
             centre.plot(time, shown, style, color=colour, label=f"$p_{name}$")
             shown = 1e6 * errors.length[here, part]
@@ -100,7 +99,7 @@ def plot_loop_forces(
             forces.plot(
                 time,
                 run.applied[here, leg],
-                _STYLES[leg],
+                LEG_STYLES[leg],
                 color=colour,
                 label=f"$F_{leg + 1}$",
                 drawstyle="steps-post",
@@ -140,9 +139,7 @@ def _three(axes: Sequence[Axes] | None, title: str) -> tuple[Figure, Sequence[Ax
         return figure, axes
     if len(axes) != 3:
         raise InputError(f"axes: {len(axes)} given; three are needed")
-    figure_ = axes[0].get_figure(root=True)
-    assert isinstance(figure_, Figure)
-    return figure_, axes
+    return figure_of(axes[0]), axes
 
 
 def _finish(axes: Sequence[Axes], time: Array) -> None:

@@ -12,10 +12,9 @@ from matplotlib.figure import Figure
 
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.simulated_motion import Simulation
-from rps_pin.plots import STYLE
+from rps_pin.plots.style import COLOURS, STYLE
 
-#: Okabe and Ito's colours; and line styles for where they come round again.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+#: Further ones where the colours come round again.
 _STYLES = ("-", "--", "-.", ":")
 
 
@@ -38,7 +37,7 @@ def plot_simulation(
         )
         energies.set_ylabel("energy (J)")
         visible = np.where(simulation.gap > 0, simulation.gap, np.nan)  # an axis of powers has no 0
-        gaps.semilogy(simulation.time, visible, ".", markersize=2, color=_COLOURS[0])
+        gaps.semilogy(simulation.time, visible, ".", markersize=2, color=COLOURS[0])
         gaps.set_ylabel("largest loop gap (m)")
         gaps.set_xlabel("time (s)")
         gaps.margins(x=0)
@@ -58,8 +57,8 @@ def _plot_positions(axes: Axes, simulation: Simulation, mechanism: ClosedLoopMod
 
 def _lines(axes: Axes, time: np.ndarray, curves: dict[str, np.ndarray]) -> None:
     for index, (name, values) in enumerate(curves.items()):
-        colour = _COLOURS[index % len(_COLOURS)]
-        style = _STYLES[(index // len(_COLOURS) + index) % len(_STYLES)]
+        colour = COLOURS[index % len(COLOURS)]
+        style = _STYLES[(index // len(COLOURS) + index) % len(_STYLES)]
         axes.plot(time, values, color=colour, linestyle=style, label=name)
     axes.margins(x=0)
     if curves:

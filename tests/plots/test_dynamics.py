@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSParameters, RPSRobot, helix
-from rps_pin.dynamics_plots import plot_force_causes, plot_sizing
+from rps_pin.plots import plot_force_causes, plot_sizing
 from rps_pin.rps.force_causes import ForceCauses, force_causes
 from rps_pin.rps.loads import Payload
 from rps_pin.rps.sizing import size_trajectory

@@ -6,8 +6,6 @@ Each function draws on a figure of your own, or makes one. Nothing here opens a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -17,23 +15,8 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import NDArray
 
-from rps_pin.files import whole_file
+from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, legend_above
 from rps_pin.rps.motion_run import MotionRun
-
-#: Okabe and Ito's colours for legs 1, 2, 3, told apart by colour-blind readers; and line styles,
-#: so that print without colour will do.
-LEG_COLOURS = ("#0072B2", "#D55E00", "#009E73")
-_LEG_STYLES = ("-", "--", "-.")
-
-#: Of all figures.
-STYLE: Any = {
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "figure.dpi": 150,
-    "svg.hashsalt": "rps_pin",  # the same run writes the same SVG
-}
 
 
 def plot_path(run: MotionRun, figure: Figure | None = None) -> Figure:
@@ -71,15 +54,19 @@ def plot_forces(run: MotionRun, axes: Axes | None = None) -> Figure:
     return _over_time(run.time, run.force, "force $F_i$ (N)", "Actuator forces", axes)
 
 
-def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG, each whole or not at all; return the two paths."""
-    written = []
-    for suffix, metadata in ((".png", {}), (".svg", {"Date": None})):
-        path = folder / f"{name}{suffix}"
-        with matplotlib.rc_context(STYLE), whole_file(path) as scratch:
-            figure.savefig(scratch, metadata=metadata)
-        written.append(path)
-    return written
+def plot_length_phase(run: MotionRun, axes: Axes | None = None) -> Figure:
+    """Draw each leg's speed over its length: mm/s over mm. Crosses mark the start."""
+    with matplotlib.rc_context(STYLE):
+        axes = axes or Figure(figsize=(5.6, 4.2), layout="constrained").add_subplot()
+        legs = zip(LEG_COLOURS, LEG_STYLES, 1e3 * run.length.T, 1e3 * run.speed.T, strict=True)
+        for leg, (colour, style, length, speed) in enumerate(legs, start=1):
+            axes.plot(length, speed, color=colour, linestyle=style, label=f"leg {leg}")
+            axes.plot(length[:1], speed[:1], "x", color=colour)
+        axes.axhline(0.0, color="black", linewidth=0.6)
+        axes.set_xlabel("length $d_i$ (mm)")
+        axes.set_ylabel("speed $\\dot d_i$ (mm/s), positive is out")
+        legend_above(axes, columns=3)
+    return figure_of(axes)
 
 
 def _over_time(
@@ -92,7 +79,7 @@ def _over_time(
     with matplotlib.rc_context(STYLE):
         if axes is None:
             axes = Figure(figsize=(6.4, 3.8), layout="constrained").add_subplot()
-        legs: Sequence[tuple[str, str]] = list(zip(LEG_COLOURS, _LEG_STYLES, strict=True))
+        legs: Sequence[tuple[str, str]] = list(zip(LEG_COLOURS, LEG_STYLES, strict=True))
         for leg, (colour, style) in enumerate(legs):
             axes.plot(time, values[:, leg], color=colour, linestyle=style, label=f"leg {leg + 1}")
         axes.set_xlabel("time (s)")
@@ -101,6 +88,4 @@ def _over_time(
         axes.margins(x=0)
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False)
-        figure = axes.get_figure(root=True)
-        assert figure is not None  # axes of a figure have one
-    return figure
+    return figure_of(axes)

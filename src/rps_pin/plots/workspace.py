@@ -19,7 +19,17 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import NDArray
 
 from rps_pin.errors import InputError
-from rps_pin.plots import LEG_COLOURS, STYLE
+from rps_pin.plots.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LEG_COLOURS,
+    ORANGE,
+    PURPLE,
+    STYLE,
+    VERMILION,
+    YELLOW,
+)
 from rps_pin.rps.legs import RADIAL
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.geometry import boundary
@@ -29,10 +39,10 @@ from rps_pin.rps.workspace.result import Workspace
 
 Array = NDArray[np.float64]
 
-#: Okabe and Ito's colours: the workspace, the theoretical cylinder, the platform.
-_INSIDE, _CYLINDER, _PLATFORM = "#0072B2", "#999999", "#E69F00"
+#: The workspace, the theoretical cylinder, the platform.
+_INSIDE, _CYLINDER, _PLATFORM = BLUE, GREY, ORANGE
 #: A pale one for each family of reasons, in the order of `_FAMILIES`.
-_REASON_COLOURS = ("#F0E442", "#E69F00", "#CC79A7", "#D55E00", "#000000", "#999999")
+_REASON_COLOURS = (YELLOW, ORANGE, PURPLE, VERMILION, BLACK, GREY)
 _FAMILIES = (
     ("a leg too short", Reason.LEG_1_SHORT | Reason.LEG_2_SHORT | Reason.LEG_3_SHORT),
     ("a leg too long", Reason.LEG_1_LONG | Reason.LEG_2_LONG | Reason.LEG_3_LONG),

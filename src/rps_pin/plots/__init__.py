@@ -1,0 +1,47 @@
+"""Figures, by Matplotlib: axes with units, colours told apart by all, nothing that opens a window.
+
+Each function draws on axes (or a figure) of your own, or makes a figure, and returns it. Figures
+that compare with the paper stand in `rps_pin.reproduction`; the 3D viewer is `rps_pin.viewer`.
+"""
+
+from rps_pin.plots.conditioning import plot_height_conditioning, plot_tilt_conditioning
+from rps_pin.plots.control import plot_loop_forces, plot_tracking
+from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
+from rps_pin.plots.motion import plot_forces, plot_length_phase, plot_lengths, plot_path
+from rps_pin.plots.simulation import plot_simulation
+from rps_pin.plots.style import COLOURS, LEG_COLOURS, LEG_STYLES, STYLE, save_figure
+from rps_pin.plots.workspace import (
+    plot_assembly_modes,
+    plot_comparison,
+    plot_effective,
+    plot_reasons,
+    plot_space,
+    plot_theoretical,
+    plot_views,
+)
+
+__all__ = [
+    "COLOURS",
+    "LEG_COLOURS",
+    "LEG_STYLES",
+    "STYLE",
+    "plot_assembly_modes",
+    "plot_comparison",
+    "plot_effective",
+    "plot_force_causes",
+    "plot_forces",
+    "plot_height_conditioning",
+    "plot_length_phase",
+    "plot_lengths",
+    "plot_loop_forces",
+    "plot_path",
+    "plot_reasons",
+    "plot_simulation",
+    "plot_sizing",
+    "plot_space",
+    "plot_theoretical",
+    "plot_tilt_conditioning",
+    "plot_tracking",
+    "plot_views",
+    "save_figure",
+]

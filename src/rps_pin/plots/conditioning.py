@@ -1,0 +1,140 @@
+"""Maps of the distance to a singularity over poses."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+from rps_pin.errors import InputError
+from rps_pin.plots.style import COLOUR_MAP, STYLE, figure_of
+from rps_pin.rps.checks import finite_entries
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.singularity import singularity_measures
+
+Array = NDArray[np.float64]
+Measure = Literal["type_ii", "constraint", "determinant"]
+_LABELS = {
+    "type_ii": "distance to type II (0 singular, 1 at best)",
+    "constraint": "distance to constraint (0 singular, 1 at best)",
+    "determinant": "determinant (0 singular)",
+}
+
+
+def plot_tilt_conditioning(
+    parameters: RPSParameters,
+    height: float,
+    tilts: ArrayLike | None = None,
+    *,
+    measure: Measure = "type_ii",
+    axes: Axes | None = None,
+) -> Figure:
+    """Draw how far all tilts at one height are from a singularity; a black line where they are.
+
+    Parameters
+    ----------
+    parameters
+        The robot's. Its limits are not looked at: see `plot_reasons` for those.
+    height
+        Of the centre, m.
+    tilts
+        About x and about y, increasing, shape (n,), rad; 161 from -1.5 to 1.5 if left out.
+    measure
+        Of `SingularityMeasures`.
+    axes
+        Axes to draw on; a new figure's if left out. A colour bar is added beside them.
+
+    Raises
+    ------
+    InputError
+        If there is no such measure, or tilts are not increasing.
+    """
+    across = _increasing(np.linspace(-1.5, 1.5, 161) if tilts is None else tilts, "tilts")
+    x, y = np.meshgrid(across, across)
+    pose = np.stack([np.full_like(x, _number(height)), x, y], axis=-1)
+    with matplotlib.rc_context(STYLE):
+        axes = axes or Figure(figsize=(5.6, 4.6), layout="constrained").add_subplot()
+        _map(axes, parameters, pose, (np.degrees(x), np.degrees(y)), measure)
+        axes.set_xlabel("tilt about x (degrees)")
+        axes.set_ylabel("tilt about y (degrees)")
+        axes.set_title(f"At $p_z$ = {1e3 * height:.6g} mm", loc="left")
+        axes.set_aspect("equal")
+    return figure_of(axes)
+
+
+def plot_height_conditioning(
+    parameters: RPSParameters,
+    heights: ArrayLike,
+    tilts: ArrayLike | None = None,
+    *,
+    direction: float = 0.0,
+    measure: Measure = "type_ii",
+    axes: Axes | None = None,
+) -> Figure:
+    """Draw how far poses are from a singularity over height and tilt about one axis.
+
+    Parameters
+    ----------
+    parameters
+        The robot's.
+    heights
+        Of the centre, increasing, shape (n,), m.
+    tilts
+        About the axis, increasing, shape (m,), rad; 161 from -1.5 to 1.5 if left out.
+    direction
+        Of the axis in the base plane, rad from x.
+    measure, axes
+        As for `plot_tilt_conditioning`.
+
+    Raises
+    ------
+    InputError
+        If there is no such measure, or heights or tilts are not increasing.
+    """
+    across = _increasing(np.linspace(-1.5, 1.5, 161) if tilts is None else tilts, "tilts")
+    up = _increasing(heights, "heights")
+    angle = _number(direction)
+    tilt, z = np.meshgrid(across, up)
+    pose = np.stack([z, tilt * np.cos(angle), tilt * np.sin(angle)], axis=-1)
+    with matplotlib.rc_context(STYLE):
+        axes = axes or Figure(figsize=(5.6, 4.2), layout="constrained").add_subplot()
+        _map(axes, parameters, pose, (np.degrees(tilt), 1e3 * z), measure)
+        axes.set_xlabel(f"tilt about the axis at {np.degrees(angle):.4g} degrees (degrees)")
+        axes.set_ylabel("height $p_z$ (mm)")
+    return figure_of(axes)
+
+
+def _map(
+    axes: Axes,
+    parameters: RPSParameters,
+    pose: Array,
+    at: tuple[Array, Array],
+    measure: str,
+) -> None:
+    if measure not in _LABELS:
+        raise InputError(f"measure = {measure!r}; there are: {', '.join(_LABELS)}")
+    found = singularity_measures(parameters, pose, errors="mask")
+    values = getattr(found, measure)
+    levels: Any = 20
+    if measure == "determinant":  # both signs are equally far from 0
+        levels = np.linspace(-1.0, 1.0, 21) * np.abs(values).max()
+    filled = axes.contourf(*at, values, levels, cmap=COLOUR_MAP)
+    if found.determinant.min() < 0.0 < found.determinant.max():
+        axes.contour(*at, found.determinant, [0.0], colors="black")
+    axes.grid(visible=False)
+    figure_of(axes).colorbar(filled, ax=axes, label=_LABELS[measure])
+
+
+def _increasing(values: ArrayLike, name: str) -> Array:
+    found = finite_entries(values, (), name)
+    if found.ndim != 1 or found.size < 2 or not (np.diff(found) > 0.0).all():
+        raise InputError(f"{name} has shape {found.shape}: it must be two numbers or more, rising")
+    return found
+
+
+def _number(value: float) -> float:
+    return float(finite_entries(value, (), "height or direction"))

@@ -1,0 +1,64 @@
+"""What all figures share: colours and lines told apart by all readers, legends, files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from rps_pin.files import whole_file
+
+#: Okabe and Ito's colours, told apart by colour-blind readers.
+BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+ORANGE, SKY, YELLOW, BLACK = "#E69F00", "#56B4E9", "#F0E442", "#000000"
+GREY = "#999999"
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+#: Of legs 1, 2, 3; or of x, y, z. Line styles, so that print without colour will do.
+LEG_COLOURS = (BLUE, VERMILION, GREEN)
+LEG_STYLES = ("-", "--", "-.")
+#: From dark to light, in print without colour too.
+COLOUR_MAP = "cividis"
+
+#: Of all figures.
+STYLE: Any = {
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "figure.dpi": 150,
+    "svg.hashsalt": "rps_pin",  # the same run writes the same SVG
+}
+
+
+def figure_of(axes: Axes) -> Figure:
+    """Return the figure that axes stand on."""
+    figure = axes.get_figure(root=True)
+    assert figure is not None  # axes of a figure have one
+    return figure
+
+
+def legend_above(axes: Axes, columns: int) -> None:
+    """Put the legend in a row above the axes, where it hides nothing."""
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0, 1),
+        ncols=columns,
+        frameon=False,
+        fontsize="small",
+        columnspacing=1.0,
+        handlelength=1.6,
+    )
+
+
+def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Write a figure as PNG and SVG, each whole or not at all; return the two paths."""
+    written = []
+    for suffix, metadata in ((".png", {}), (".svg", {"Date": None})):
+        path = folder / f"{name}{suffix}"
+        with matplotlib.rc_context(STYLE), whole_file(path) as scratch:
+            figure.savefig(scratch, metadata=metadata)
+        written.append(path)
+    return written
