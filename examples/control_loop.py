@@ -5,7 +5,9 @@
 The platform's tilt turns about once a second. The machine is simulated, and is not what the
 controller believes: its masses are 20 % more, its encoders step by 50 nm and are noisy, and forces
 come a tick late. Prints how far the platform was from its target, what the controller said, and
-what became of the clock's ticks. Exit status: 0 done; 1 the controller stopped; 2 wrong usage.
+what became of the clock's ticks.
+
+Exit status: 0 done, Ctrl-C too; 1 the controller stopped; 2 wrong usage.
 
 The simulated machine moves one period in each tick that runs: for a deadline that is skipped it
 waits, which yours will not. `drive_over_socket.py` has a machine with a time of its own.
@@ -14,6 +16,7 @@ waits, which yours will not. `drive_over_socket.py` has a machine with a time of
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from collections import Counter
 
@@ -60,7 +63,8 @@ def main() -> int:
 
     reached = np.full_like(targets.pose, np.nan)  # where the platform was, in each tick
     statuses: Counter[Status] = Counter()
-    with LoopClock(PERIOD) as clock:
+    clock = LoopClock(PERIOD)
+    with contextlib.suppress(KeyboardInterrupt), clock:  # Ctrl-C ends it
         # One target a tick. The clock has no end: the targets have.
         for k, (*target, _) in enumerate(zip(*targets, clock.ticks(), strict=False)):
             reached[k] = plant.pose  # known in a simulation only

@@ -145,5 +145,5 @@ def write(folder: Path, robot: RPSRobot, log: NDArray[np.void]) -> list[Path]:
 if __name__ == "__main__":
     try:
         sys.exit(main())
-    except RPSPinError as error:
+    except (RPSPinError, OSError) as error:  # OSError: of the files
         sys.exit(f"error: {error}")
