@@ -194,10 +194,9 @@ def test_faults_reach_the_controller_and_not_the_record_of_targets(speeds: Any) 
             np.testing.assert_array_equal(reading, arrives)
         np.testing.assert_array_equal(run.reading[k], np.nan if arrives is None else arrives)
         assert (speed is None) == (speeds == "filtered" or reading is None)
-        if speed is not None:
-            if 0 < k < 199:
-                slope = (run.length[k + 1] - run.length[k - 1]) / 2e-3
-                np.testing.assert_allclose(speed, slope, rtol=0, atol=5e-3)
+        if speed is not None and 0 < k < 199:
+            slope = (run.length[k + 1] - run.length[k - 1]) / 2e-3
+            np.testing.assert_allclose(speed, slope, rtol=0, atol=5e-3)
     assert np.flatnonzero(run.status & Status.BAD_INPUT).tolist() == [11, 12, 31]
     assert np.flatnonzero(run.status & Status.TARGET_HELD).tolist() == list(
         range(121, 200)

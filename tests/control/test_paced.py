@@ -81,3 +81,11 @@ def test_nonsense_is_refused() -> None:
         PacedTrajectory(path, PERIOD, settle=-1.0)
     with pytest.raises(InputError, match="period"):
         PacedTrajectory(path, 0.0)
+
+
+def test_time_does_not_drift_over_hours() -> None:
+    path = circle(height=0.223, tilt=0.1, duration=0.5)
+    paced = PacedTrajectory(path, PERIOD, settle=0.3)
+    for _ in range(1_000_000):
+        paced.advance()
+    assert paced.time == pytest.approx(1_000_000 * PERIOD - 0.3, rel=0, abs=1e-12)

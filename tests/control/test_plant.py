@@ -282,10 +282,12 @@ def test_readings_are_of_the_true_lengths_and_do_not_move_it() -> None:
         ({"pose": [0.5, 0.0, 0.0]}, UnreachableError, "out of reach"),
         ({"period": 0.0}, InputError, "period = 0"),
         ({"period": np.inf}, InputError, "period = inf"),
-        ({"substeps": 0}, InputError, "substeps = 0: it must be a number, 1 or more"),
+        ({"substeps": 0}, InputError, "substeps = 0: it must be a whole number, 1 or more"),
         ({"substeps": 1.5}, InputError, "substeps = 1.5"),
-        ({"delay": -1}, InputError, "delay = -1: it must be a number, 0 or more"),
+        ({"delay": -1}, InputError, "delay = -1: it must be a whole number, 0 or more"),
         ({"delay": 0.5}, InputError, "delay = 0.5"),
+        ({"substeps": True}, InputError, "substeps = True"),
+        ({"encoders": None}, InputError, "encoders is a NoneType; it must be Encoders"),
     ],
 )
 def test_arguments_that_do_not_fit_are_refused(
@@ -294,3 +296,7 @@ def test_arguments_that_do_not_fit_are_refused(
     arguments = {"pose": POSE} | changes
     with pytest.raises(kind, match=said):
         Plant(RPSRobot.from_preset("micro"), **arguments)
+
+
+def test_numpy_s_whole_numbers_are_whole_numbers() -> None:
+    Plant(RPSRobot.from_preset("micro"), [0.223, 0.0, 0.0], substeps=np.int64(3), delay=np.int64(1))

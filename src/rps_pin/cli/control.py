@@ -10,7 +10,9 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
+from rps_pin.cli.layer_options import chosen_layers
 from rps_pin.cli.motion_report import print_files
+from rps_pin.errors import RPSPinError
 
 if TYPE_CHECKING:
     from rps_pin.control.loop_run import LoopRun
@@ -41,8 +43,8 @@ def control_command(
     micrometres and microradians and statuses, **loop.csv** (every tick), figures, **summary.json**,
     and **viewer.html**, the motion in 3D.
 
-    Exit status: 0 done, whatever the controller said; 1 it cannot be run (why is said); 2 wrong
-    usage.
+    Exit status: 0 done, whatever the controller said; 1 it cannot be run, or not to the end (why is
+    said); 2 wrong usage; 130 Ctrl-C. What was run until then is written all the same.
 
     Examples:
 
@@ -53,9 +55,7 @@ def control_command(
 
     loaded = load_scenario(scenario)
     console = Console(quiet=as_json)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("control loop", total=1.0)
-        run = loaded.run(lambda done: bar.update(task, completed=done))
+    run, broken = _run(loaded, console)
     window = loaded.entry.settle if run.time[-1] > loaded.entry.settle else 0.0
     summary = LoopSummary.of(run, begin=window)
     folder = output or Path(f"{scenario.stem}-control")
@@ -69,6 +69,8 @@ def control_command(
             "files": [str(file) for file in files],
         }
         typer.echo(json.dumps(answer, indent=2))
+        if broken is not None:
+            raise broken
         return
     console.print(
         f"3-RPS [bold]{loaded.model.parameters.name}[/], {scenario}, from {window:g} s on",
@@ -81,6 +83,23 @@ def control_command(
     if len(run.events) > _MOST_SHOWN:
         console.print(f"... and {len(run.events) - _MOST_SHOWN} further changes of the status")
     print_files(console, files)
+    if broken is not None:
+        raise broken
+
+
+def _run(scenario: Scenario, console: Console) -> tuple[LoopRun, BaseException | None]:
+    """Return what was run, and what broke it off; raise that if nothing was."""
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("control loop", total=1.0)
+        try:
+            return scenario.run(lambda done: bar.update(task, completed=done)), None
+        except (RPSPinError, KeyboardInterrupt) as error:
+            partial: LoopRun | None = getattr(error, "partial", None)
+            if partial is None or partial.time.size < 2:
+                raise
+            broken = error
+    console.print(f"broken off after {partial.time[-1]:.6g} s", highlight=False)
+    return partial, broken
 
 
 def _write(
@@ -97,7 +116,7 @@ def _write(
     from rps_pin.files import whole_file
     from rps_pin.plots import save_figure
     from rps_pin.plots.control import plot_loop_forces, plot_tracking
-    from rps_pin.viewer import write_html
+    from rps_pin.viewer import Motion, fitting_layers, save_html
 
     title = f"3-RPS {scenario.model.parameters.name}, {name}"
     files = save_figure(plot_tracking(run, begin=window), folder, "tracking")
@@ -121,12 +140,7 @@ def _write(
         with whole_file(folder / text_name) as scratch:
             scratch.write_text(text, "utf-8")
     machine = scenario.machine
-    write_html(
-        page,
-        machine.mechanism.model,
-        machine.visual_model(),
-        run.time,
-        run.configuration,
-        title=title,
-    )
+    shown, at_hand = chosen_layers(None, fitting_layers(machine.mechanism))
+    motion = Motion(machine.mechanism.model, run.time, run.configuration, forces=run.applied)
+    save_html(page, machine, motion, layers=shown, hidden=at_hand, title=title)
     return [folder / "report.md", table, folder / "summary.json", *files, page]

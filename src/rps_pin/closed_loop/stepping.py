@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from numbers import Integral
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -84,8 +85,8 @@ class Stepper:
         """
         if not 0 < duration < np.inf:
             raise InputError(f"duration = {duration}: it must be positive and finite")
-        if steps < 1:
-            raise InputError(f"steps = {steps}: it must be at least 1")
+        if not isinstance(steps, Integral) or isinstance(steps, bool) or steps < 1:
+            raise InputError(f"steps = {steps!r}: it must be a whole number, 1 or more")
         self._drive.tau = checked_vector(tau, self._drive.tau.size, "tau").copy()
         motion, step = self._motion, duration / steps
         start, state, gap = self.time, (self.q, self.v), self.gap

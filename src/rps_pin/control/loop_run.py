@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from bisect import bisect_left
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
@@ -193,6 +194,7 @@ class _Record:
         self._numbers = {name: np.zeros(ticks) for name in ("time", "distance", "pace", "gap")}
         self._status = np.zeros(ticks, dtype=np.int64)
         self._events: list[LoopEvent] = []
+        self._ticks: list[int] = []
         self._last = 0
         self.applied = self._rows["applied"]
 
@@ -218,6 +220,7 @@ class _Record:
         self._status[k] = status = int(controller.status)
         if status != self._last and len(self._events) < _MOST_EVENTS:
             self._events.append(LoopEvent(time, status, controller.status_text))
+            self._ticks.append(k)
         self._last = status
 
     def run(self, ticks: int) -> LoopRun:
@@ -225,7 +228,7 @@ class _Record:
         return LoopRun(
             parameters=self._controller.robot.parameters,
             status=self._status[:ticks],
-            events=tuple(self._events),
+            events=tuple(self._events[: bisect_left(self._ticks, ticks)]),
             **{name: rows[:ticks] for name, rows in (self._rows | self._numbers).items()},
         )
 

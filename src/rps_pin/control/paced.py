@@ -29,10 +29,6 @@ class PacedTrajectory:
     settle
         For how long its start is held, at rest, before it begins, s.
 
-    Attributes
-    ----------
-    time : float
-        s, along the trajectory; negative before it begins.
     """
 
     def __init__(self, trajectory: Trajectory, period: float, *, settle: float = 0.0) -> None:
@@ -40,7 +36,14 @@ class PacedTrajectory:
             raise InputError(f"settle = {settle}: it must be a time, zero or more")
         self._trajectory = trajectory
         self._period = checked_positive(period, "period")
-        self.time, self._pace, self._change = -settle, 1.0, 0.0
+        # A sum and what it has lost to rounding (Neumaier): it must not drift over hours of ticks.
+        self._sum, self._lost = -float(settle), 0.0
+        self._pace, self._change = 1.0, 0.0
+
+    @property
+    def time(self) -> float:
+        """Along the trajectory, s; negative before it begins."""
+        return self._sum + self._lost
 
     @property
     def done(self) -> bool:
@@ -68,5 +71,9 @@ class PacedTrajectory:
         """
         self._change = (pace - self._pace) / self._period
         # On the way from one pace to the other.
-        self.time += self._period * (self._pace + pace) / 2
+        step = self._period * (self._pace + pace) / 2
+        total = self._sum + step
+        larger, smaller = (self._sum, step) if abs(self._sum) >= abs(step) else (step, self._sum)
+        self._lost += larger - total + smaller
+        self._sum = total
         self._pace = pace

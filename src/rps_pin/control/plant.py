@@ -8,6 +8,7 @@ ticks and the actuators' own limits; between the lengths and a reading, the enco
 from __future__ import annotations
 
 from collections import deque
+from numbers import Integral
 
 import numpy as np
 import pinocchio as pin
@@ -79,11 +80,14 @@ class Plant:
         if x.shape != (3,):
             raise InputError(f"pose has shape {x.shape}; it must be (3,)")
         for name, value, least in (("substeps", substeps, 1), ("delay", delay, 0)):
-            if not isinstance(value, int) or value < least:
-                raise InputError(f"{name} = {value!r}: it must be a number, {least} or more")
+            whole = isinstance(value, Integral) and not isinstance(value, bool)
+            if not (whole and value >= least):
+                raise InputError(f"{name} = {value!r}: it must be a whole number, {least} or more")
+        if not isinstance(encoders, Encoders):
+            raise InputError(f"encoders is a {type(encoders).__name__}; it must be Encoders")
         self.robot, self.encoders = robot, encoders
         self.period = checked_positive(period, "period")
-        self._substeps, self._near = substeps, x
+        self._substeps = int(substeps)
         still = np.zeros(3)
         q, v, a = robot.state(x, still, still)
         self._stepper = Stepper(robot.mechanism, q, v, wrenches=wrenches)
