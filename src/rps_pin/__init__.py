@@ -1,49 +1,15 @@
-"""Closed-loop robots on Pinocchio, in Python; the 3-RPS parallel robot first and completely."""
+"""Closed-loop robots on Pinocchio, in Python; the 3-RPS parallel robot first and completely.
+
+The names to begin with are here (`__init__.pyi` lists them), and are imported when they are asked
+for. More stand in the packages: `rps_pin.closed_loop` (any mechanism), `rps_pin.rps` (the 3-RPS),
+`rps_pin.trajectories`, `rps_pin.control`, `rps_pin.plots`, `rps_pin.viewer`, and
+`rps_pin.reproduction` (the paper).
+"""
 
 from importlib.metadata import version
 
-from rps_pin.closed_loop import (
-    ClosedLoopModel,
-    ForceBound,
-    ForceDistribution,
-    InverseDynamics,
-    JointCoupling,
-    JointEffects,
-    LoopClosure,
-)
-from rps_pin.errors import (
-    ClosureError,
-    InfeasibleError,
-    InputError,
-    MechanismError,
-    ParameterError,
-    RPSPinError,
-    SingularityError,
-    UnreachableError,
-)
-from rps_pin.rps import RPSParameters, RPSRobot
-from rps_pin.trajectories import helix
+import lazy_loader
 
+__getattr__, __dir__, _names = lazy_loader.attach_stub(__name__, __file__)
 __version__ = version("rps-pin")
-
-__all__ = [
-    "ClosedLoopModel",
-    "ClosureError",
-    "ForceBound",
-    "ForceDistribution",
-    "InfeasibleError",
-    "InputError",
-    "InverseDynamics",
-    "JointCoupling",
-    "JointEffects",
-    "LoopClosure",
-    "MechanismError",
-    "ParameterError",
-    "RPSParameters",
-    "RPSPinError",
-    "RPSRobot",
-    "SingularityError",
-    "UnreachableError",
-    "__version__",
-    "helix",
-]
+__all__ = ["__version__", *_names]  # noqa: PLE0604

@@ -13,6 +13,7 @@ from rps_pin.cli.check import check_command
 from rps_pin.cli.console import complain
 from rps_pin.cli.control import control_command
 from rps_pin.cli.describe import describe_command
+from rps_pin.cli.doctor import doctor
 from rps_pin.cli.dynamics import dynamics_command
 from rps_pin.cli.fk import fk_command
 from rps_pin.cli.helix import helix_command
@@ -31,18 +32,34 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("helix")(helix_command)
-app.command("dynamics")(dynamics_command)
-app.command("control")(control_command)
-app.command("view")(view_command)
-app.command("ik")(ik_command)
-app.command("fk")(fk_command)
-app.command("check")(check_command)
-app.command("workspace")(workspace_command)
-app.command("reproduce")(reproduce_command)
-app.command("urdf")(urdf_command)
-app.command("describe")(describe_command)
-app.command("simulate")(simulate_command)
+
+_ROBOT, _MOTION, _ANY, _MORE = "The 3-RPS", "Its motion", "Any mechanism", "More"
+for _panel, _name, _command, _line in (
+    (_ROBOT, "view", view_command, "Show it in the browser: a pose, or a motion."),
+    (_ROBOT, "ik", ik_command, "Leg lengths of a pose, against the robot's limits."),
+    (_ROBOT, "fk", fk_command, "Poses of leg lengths: every assembly mode, or one."),
+    (_ROBOT, "workspace", workspace_command, "Where it can go, and the paper's figures."),
+    (_ROBOT, "urdf", urdf_command, "Its URDF: a preset's, or a parameter file's."),
+    (_MOTION, "helix", helix_command, "Actuator forces along the paper's helix."),
+    (_MOTION, "dynamics", dynamics_command, "The same for any trajectory; actuator sizing."),
+    (_MOTION, "check", check_command, "Where a helix meets a singularity or a limit."),
+    (_MOTION, "control", control_command, "A control loop against a robot unlike its model."),
+    (_ANY, "describe", describe_command, "Joints, closures, rank, mobility, actuation."),
+    (_ANY, "simulate", simulate_command, "Its motion, loops closed at every step."),
+    (_MORE, "reproduce", reproduce_command, "The paper's equations, figures and tables."),
+):
+    app.command(_name, rich_help_panel=_panel, short_help=_line)(_command)
+
+
+@app.command("doctor", rich_help_panel=_MORE)
+def doctor_command(
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
+) -> None:
+    """Say what is installed and what is missing.
+
+    Exit status: 0 all that is needed is here; 1 something is missing or broken.
+    """
+    raise typer.Exit(doctor(as_json))
 
 
 def _version(asked: bool) -> None:
@@ -59,16 +76,12 @@ def rps_pin(
 ) -> None:
     """Closed-loop robots on Pinocchio: the 3-RPS parallel robot, and any other mechanism.
 
-    Everything is in SI units: metres, radians, seconds, kilograms, newtons.
-
-    First steps: **rps-pin helix** computes the paper's motion, **rps-pin view** shows it live,
-    **rps-pin dynamics** takes any trajectory of yours, **rps-pin describe** tells what any other
-    mechanism can do.
+    Units are SI: m, rad, s, kg, N. Begin with **rps-pin helix** and **rps-pin view**.
     """
 
 
-def main() -> None:
-    """Run the command line; the console script ``rps-pin``."""
+def run() -> None:
+    """Run the command line."""
     try:
         app()
     except RPSPinError as error:

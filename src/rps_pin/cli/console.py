@@ -8,6 +8,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from rps_pin.cli.completion import names_or_files, preset_names
 from rps_pin.rps.robot_file import load_robot
 
 __all__ = ["RobotOption", "complain", "load_robot"]
@@ -20,6 +21,7 @@ RobotOption = Annotated[
         metavar="PRESET|FILE",
         help="A preset, **sokolov** (the paper's Table 1) or **micro**, or a YAML parameter file.",
         show_default=True,
+        autocompletion=names_or_files(preset_names),
     ),
 ]
 

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 
@@ -19,6 +20,7 @@ FileArgument = Annotated[
         help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), or the name of one "
         "that comes with the package, such as **delta**.",
         show_default=False,
+        autocompletion=names_or_files(mechanism_names),
     ),
 ]
 
@@ -44,14 +46,13 @@ def mechanism_file(file: Path) -> Path:
     """
     if file.suffix or file.exists():
         return file
-    folder = Path(str(resources.files("rps_pin"))) / "urdf"
-    names = sorted(path.stem for path in folder.glob("*.yaml"))
+    names = mechanism_names()
     if str(file) not in names:
         raise InputError(
             f"{str(file)!r} is no file, and no mechanism of the package; those are: "
             f"{', '.join(names)}"
         )
-    return folder / f"{file}.yaml"
+    return Path(str(resources.files("rps_pin"))) / "urdf" / f"{file}.yaml"
 
 
 def _loaded(file: Path) -> ClosedLoopModel:

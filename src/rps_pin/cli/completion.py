@@ -1,0 +1,43 @@
+"""What the shell may complete: names that come with the package, and files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from importlib import resources
+from pathlib import Path
+
+_FILES = (".yaml", ".yml", ".xml")
+
+
+def mechanism_names() -> list[str]:
+    """Return the names of the package's mechanisms."""
+    folder = Path(str(resources.files("rps_pin"))) / "urdf"
+    return sorted(path.stem for path in folder.glob("*.yaml"))
+
+
+def preset_names() -> list[str]:
+    """Return the names of the 3-RPS presets."""
+    from rps_pin.rps.parameters import RPSParameters
+
+    return sorted(RPSParameters.presets())
+
+
+def names_or_files(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """Return a completion of these names, folders, and files of the kinds that are read."""
+
+    def complete(incomplete: str) -> list[str]:
+        known = [name for name in names() if name.startswith(incomplete)]
+        folder, _, begun = incomplete.rpartition("/")
+        place = Path(folder or ("/" if incomplete.startswith("/") else "."))
+        prefix = f"{folder}/" if "/" in incomplete else ""
+        files = []
+        if place.is_dir():
+            for path in sorted(place.iterdir()):
+                if path.name.startswith(begun or ""):
+                    if path.is_dir() and not path.name.startswith("."):
+                        files.append(f"{prefix}{path.name}/")
+                    elif path.suffix.lower() in _FILES:
+                        files.append(f"{prefix}{path.name}")
+        return known + files
+
+    return complete

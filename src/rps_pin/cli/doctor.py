@@ -1,0 +1,161 @@
+"""``rps-pin doctor``: what is installed, what is missing, what it is for, and how to get it.
+
+It needs nothing but Python, so that it can speak where everything else fails; the command line
+falls back on it (see `rps_pin.cli.main`).
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+import json
+import os
+import platform
+import shutil
+import sys
+from typing import Any, NamedTuple
+
+OLDEST_PYTHON = (3, 11)
+_EXTRA = "pip install 'rps-pin[{}]'"
+#: Programs that take the viewer's pictures; `RPS_PIN_CHROMIUM` comes first.
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+
+class Part(NamedTuple):
+    """Something that is installed, or not."""
+
+    name: str
+    """Of the distribution on PyPI, or of the program."""
+    module: str
+    """What to import; nothing for programs."""
+    purpose: str
+    """What needs it."""
+    extra: str | None = None
+    """The extra that it belongs to; None where everything needs it."""
+
+
+PARTS = (
+    Part("numpy", "numpy", "arrays"),  # first: without it, others crash Python when imported
+    Part("pin", "pinocchio", "rigid-body dynamics, constraint models"),
+    Part("eigenpy", "eigenpy", "factorisations"),
+    Part("proxsuite", "proxsuite", "force limits"),
+    Part("clarabel", "clarabel", "shortest times"),
+    Part("scipy", "scipy", "solvers, rotations"),
+    Part("yourdfpy", "yourdfpy", "writing URDF"),
+    Part("lxml", "lxml", "reading URDF and MJCF"),
+    Part("trimesh", "trimesh", "meshes"),
+    Part("meshcat", "meshcat", "the viewer"),
+    Part("tornado", "tornado", "the viewer's server"),
+    Part("u-msgpack-python", "umsgpack", "the viewer's messages"),
+    Part("matplotlib", "matplotlib", "figures"),
+    Part("h5py", "h5py", "workspaces on disk"),
+    Part("loky", "loky", "workspaces on many cores"),
+    Part("pydantic", "pydantic", "checking files"),
+    Part("ruamel.yaml", "ruamel.yaml", "YAML"),
+    Part("lazy-loader", "lazy_loader", "quick start"),
+    Part("typer", "typer", "the command line"),
+    Part("rich", "rich", "tables and progress"),
+    Part("numba", "numba", "faster control loops", "fast"),
+    Part("playwright", "playwright", "pictures and films", "pictures"),
+    Part("pillow", "PIL", "pictures and films", "pictures"),
+    Part("imageio-ffmpeg", "imageio_ffmpeg", "films as MP4", "pictures"),
+)
+
+
+class Finding(NamedTuple):
+    """What was found of a part."""
+
+    name: str
+    found: str
+    """Version or path; empty if there is none."""
+    purpose: str
+    needed: bool
+    """Whether rps_pin cannot do without."""
+    trouble: str
+    """What is wrong, and what to do; empty if nothing is."""
+
+
+def diagnose() -> list[Finding]:
+    """Return what is there and what is not, by looking."""
+    arrays = _package(PARTS[0], importing=True)
+    others = [_package(part, importing=not arrays.trouble) for part in PARTS[1:]]
+    findings = [_python(), arrays, *others, _browser(), _threads()]
+    broken = any(one.needed and one.trouble for one in findings)
+    return findings if broken else [*findings, _forces()]
+
+
+def doctor(as_json: bool = False) -> int:
+    """Print what was found; return 1 if something is missing that rps_pin cannot do without."""
+    findings = diagnose()
+    failed = any(one.needed and one.trouble for one in findings)
+    if as_json:
+        rows: list[dict[str, Any]] = [one._asdict() for one in findings]
+        print(json.dumps({"ok": not failed, "found": rows}, indent=2))
+        return int(failed)
+    for one in findings:
+        mark = "ok" if not one.trouble else "MISSING" if one.needed else "-"
+        print(f"{mark:8}{one.name:18}{one.found:20}{one.purpose}")
+        if one.trouble:
+            print(f"{'':8}{one.trouble}")
+    print("something is missing: see above" if failed else "all that is needed is here")
+    return int(failed)
+
+
+def _python() -> Finding:
+    new_enough = sys.version_info[:2] >= OLDEST_PYTHON
+    oldest = ".".join(map(str, OLDEST_PYTHON))
+    trouble = "" if new_enough else f"it must be {oldest} or newer"
+    return Finding("Python", platform.python_version(), sys.executable, True, trouble)
+
+
+def _package(part: Part, importing: bool) -> Finding:
+    needed = part.extra is None
+    get = f"pip install {part.name}" if part.extra is None else _EXTRA.format(part.extra)
+    try:
+        version = importlib.metadata.version(part.name)
+    except importlib.metadata.PackageNotFoundError:
+        return Finding(part.name, "", part.purpose, needed, f"not installed: {get}")
+    try:
+        if importing:
+            importlib.import_module(part.module)
+    except Exception as error:  # whatever a broken package raises
+        words = " ".join(str(error).split())
+        if "libgomp" in words:
+            get = "apt-get install libgomp1"
+        return Finding(
+            part.name, version, part.purpose, needed, f"it does not import ({words}): {get}"
+        )
+    return Finding(part.name, version, part.purpose, needed, "")
+
+
+def _browser() -> Finding:
+    purpose = "pictures and films of the viewer"
+    for name in (os.environ.get("RPS_PIN_CHROMIUM") or "", *_BROWSERS):
+        path = shutil.which(name) if name else None
+        if path:
+            return Finding("Chromium", path, purpose, False, "")
+    return Finding("Chromium", "", purpose, False, "not found: apt-get install chromium")
+
+
+def _threads() -> Finding:
+    threads = os.environ.get("OPENBLAS_NUM_THREADS", "")
+    trouble = "" if threads == "1" else "set OPENBLAS_NUM_THREADS=1 in control loops"
+    return Finding("BLAS threads", threads or "as many as cores", "control loops", False, trouble)
+
+
+def _forces() -> Finding:
+    """Compute one sample of the paper's helix in two ways."""
+    name, purpose = "a calculation", "forces on the paper's helix, two ways"
+    try:
+        from rps_pin.rps.robot import RPSRobot
+        from rps_pin.trajectories.helix import helix
+
+        robot = RPSRobot.from_preset("sokolov")
+        motion = helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4).sample(1.0)
+        constrained = robot.inverse_dynamics(*robot.state(*motion)).tau
+        closed_form = robot.actuator_forces(*motion)
+        apart = float(abs(constrained - closed_form).max())
+    except Exception as error:  # this is what it looks for
+        return Finding(name, "", purpose, True, f"it failed: {' '.join(str(error).split())}")
+    trouble = "" if apart < 1e-9 else "they differ: please report this"
+    return Finding(name, f"{apart:.1e} N apart", purpose, True, trouble)

@@ -1,0 +1,84 @@
+"""``rps-pin doctor``: right where all is well, and where something is missing."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+from rps_pin.cli.doctor import PARTS
+
+ROOT = Path(__file__).resolve().parents[2]
+#: A stranger's Python in which a package cannot be imported.
+BROKEN = """
+import sys
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == {name!r}:
+            raise ImportError({reason!r})
+sys.meta_path.insert(0, Hidden())
+sys.argv = ["rps-pin", *{arguments!r}]
+from rps_pin.cli import main
+main()
+"""
+
+
+def doctor(*arguments: str, hidden: str = "nothing", reason: str = "it is not there"):
+    code = BROKEN.format(name=hidden, reason=reason, arguments=list(arguments))
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+def test_all_is_well_here() -> None:
+    run = doctor("doctor", "--json")
+    assert run.returncode == 0
+    answer = json.loads(run.stdout)
+    assert answer["ok"]
+    found = {one["name"]: one for one in answer["found"]}
+    assert found["Python"]["found"] == sys.version.split()[0]
+    assert found["a calculation"]["trouble"] == ""
+    assert float(found["a calculation"]["found"].split()[0]) < 1e-12
+    assert not [one for one in answer["found"] if one["needed"] and one["trouble"]]
+
+
+def test_without_pinocchio_every_command_says_what_is_missing() -> None:
+    reason = "libgomp.so.1: cannot open shared object file"
+    for arguments in (("doctor",), ("helix",), ("--version",)):
+        run = doctor(*arguments, hidden="pinocchio", reason=reason)
+        assert run.returncode == 1
+        assert "Traceback" not in run.stdout + run.stderr
+        lines = run.stdout.splitlines()
+        row = next(i for i, line in enumerate(lines) if line.startswith("MISSING pin "))
+        assert "apt-get install libgomp1" in lines[row + 1]
+        assert lines[-1].startswith("something is missing")
+
+
+@pytest.mark.parametrize("module", ["typer", "rich", "numpy"])
+def test_it_speaks_without_others_too(module: str) -> None:
+    run = doctor("doctor", hidden=module)
+    assert run.returncode == 1
+    assert f"MISSING {module} " in run.stdout
+    assert f"pip install {module}" in run.stdout
+
+
+def test_what_is_optional_is_no_trouble() -> None:
+    run = doctor("doctor", hidden="numba")
+    assert run.returncode == 0, run.stdout
+    line = next(line for line in run.stdout.splitlines() if " numba " in line)
+    assert line.startswith("-")
+    assert "pip install 'rps-pin[fast]'" in run.stdout
+
+
+def test_it_asks_for_what_the_package_needs() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    needed = {Requirement(one).name for one in project["dependencies"]}
+    assert {part.name for part in PARTS if part.extra is None} == needed
+    for extra, ones in project["optional-dependencies"].items():
+        listed = {part.name for part in PARTS if part.extra == extra}
+        assert listed == {Requirement(one).name for one in ones}, extra

@@ -1,0 +1,72 @@
+"""What the command line says of itself: on a screen, and to the shell's completion."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rps_pin.cli.app import app
+
+PROGRAM = "import sys; sys.argv[0] = 'rps-pin'; from rps_pin.cli import main; main()"
+MAIN = [sys.executable, "-c", PROGRAM]
+COMMANDS = sorted(str(one.name) for one in app.registered_commands)
+
+
+def said(*arguments: str, folder: Path | None = None, **environment: str) -> str:
+    run = subprocess.run(
+        [*MAIN, *arguments],
+        cwd=folder,
+        env={**os.environ, "COLUMNS": "80", "TERM": "dumb", **environment},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert run.stderr == ""
+    return run.stdout
+
+
+def test_the_help_fits_a_screen() -> None:
+    lines = said("--help").rstrip().splitlines()
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= 80
+    text = "\n".join(lines)
+    for command in COMMANDS:
+        assert sum(line.startswith(f"│ {command} ") for line in lines) == 1, text
+
+
+def completed(folder: Path, *words: str) -> set[str]:
+    line = "rps-pin " + " ".join(words)
+    found = said(
+        folder=folder,
+        _RPS_PIN_COMPLETE="complete_bash",
+        COMP_WORDS=line,
+        COMP_CWORD=str(len(words)),
+    )
+    return set(found.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["he"], {"helix"}),
+        (["view", "--rob"], {"--robot"}),
+        (["view", "--robot", "m"], {"micro", "mine.yaml"}),
+        (["describe", "de"], {"delta", "delta_rods"}),
+        (["describe", "m"], {"mine.yaml", "more/"}),
+        (["describe", "more/"], {"more/two.xml"}),
+    ],
+)
+def test_the_shell_completes(tmp_path: Path, words: list[str], wanted: set[str]) -> None:
+    (tmp_path / "mine.yaml").touch()
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "two.xml").touch()
+    (tmp_path / "music.mp3").touch()
+    found = completed(tmp_path, *words)
+    if words[-1] == "m" and words[0] == "view":
+        wanted = wanted | {"more/"}
+    assert found == wanted
