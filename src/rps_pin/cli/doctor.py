@@ -56,6 +56,8 @@ PARTS = (
     Part("typer", "typer", "the command line"),
     Part("rich", "rich", "tables and progress"),
     Part("numba", "numba", "faster control loops", "fast"),
+    Part("ipywidgets", "ipywidgets", "the live panel in a notebook", "jupyter"),
+    Part("viser", "viser", "the live panel in a page", "panel"),
     Part("playwright", "playwright", "pictures and films", "pictures"),
     Part("pillow", "PIL", "pictures and films", "pictures"),
     Part("imageio-ffmpeg", "imageio_ffmpeg", "films as MP4", "pictures"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.progress import track
 
+from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.cli.console import RobotOption, load_robot
 from rps_pin.cli.helix_options import (
     DEFAULT_HEIGHT,
@@ -24,6 +27,8 @@ from rps_pin.cli.helix_options import (
     chosen_helix,
 )
 from rps_pin.cli.layer_options import LayersOption, SizeOption, chosen_layers, chosen_size
+from rps_pin.cli.mechanism_options import load_mechanism, mechanism_file
+from rps_pin.errors import InputError
 from rps_pin.trajectories.helix import PAPER_DURATION
 
 
@@ -58,6 +63,17 @@ def view_command(
             metavar="COLOUR", help="Of picture and film: white, or transparent (picture only)."
         ),
     ] = None,
+    interactive: Annotated[
+        bool, typer.Option("--interactive", "-i", help="Sliders and readings beside the robot.")
+    ] = False,
+    mechanism: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE|NAME",
+            help="With **--interactive**: any mechanism instead of a 3-RPS.",
+            autocompletion=names_or_files(mechanism_names),
+        ),
+    ] = None,
     port: Annotated[
         int | None, typer.Option(help="Port to serve on; without it, a free one is found.")
     ] = None,
@@ -65,7 +81,8 @@ def view_command(
     """Show a 3-RPS in the browser: a pose, or the helix in a loop.
 
     Starts a Meshcat server that answers to this machine only, prints its address, and runs until
-    Ctrl-C. Or writes files: a page, a picture, a film.
+    Ctrl-C. Or writes files: a page, a picture, a film. Or, with **--interactive**, serves a page
+    with sliders for pose and leg lengths, or for any mechanism's joints.
 
     Examples:
 
@@ -74,7 +91,14 @@ def view_command(
     - `rps-pin view --robot micro --pose 0.22 0.1 0 --layers limits,ghosts`
 
     - `rps-pin view --png robot.png --time 2.6 --background white`
+
+    - `rps-pin view --interactive --mechanism delta`
     """
+    if interactive:
+        _interact(robot, pose, mechanism, port)
+        return
+    if mechanism is not None:
+        raise InputError("--mechanism goes with --interactive; see rps-pin simulate for its motion")
     # Meshcat and its server are for this command only.
     from rps_pin.viewer import fitting_layers, save_html, save_png, save_video, show
 
@@ -102,6 +126,29 @@ def view_command(
             view.play()
     except KeyboardInterrupt:
         typer.echo("\nended")
+
+
+def _interact(
+    robot: str, pose: tuple[float, float, float] | None, mechanism: Path | None, port: int | None
+) -> None:
+    """Serve a panel until Ctrl-C."""
+    from rps_pin.closed_loop.visuals import visual_model
+    from rps_pin.panel import BrowserPanel, MechanismPanel, Panel, RPSPanel
+
+    panel: Panel
+    if mechanism is None:
+        machine = load_robot(robot)
+        panel, title = RPSPanel(machine, pose), f"3-RPS {machine.parameters.name}"
+    else:
+        file = mechanism_file(mechanism)
+        loaded = load_mechanism(file)
+        shapes = visual_model(file, loaded.model) if file.suffix != ".xml" else None
+        panel, title = MechanismPanel(loaded, visual=shapes), loaded.name
+    with BrowserPanel(panel, port=port, title=title) as page:
+        typer.echo(f"Open {page.url} in a browser on this machine. Ctrl-C ends.")
+        with contextlib.suppress(KeyboardInterrupt):
+            threading.Event().wait()
+    typer.echo("\nended")
 
 
 def _progress(times: Iterable[float]) -> Iterable[float]:

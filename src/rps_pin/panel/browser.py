@@ -1,0 +1,141 @@
+"""A panel as a page of its own, by viser: sliders, readings and the robot, on this machine only."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any, Self
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.errors import RPSPinError
+from rps_pin.panel.sliders import Panel
+
+HOST = "127.0.0.1"
+
+
+class BrowserPanel:
+    """Serve a panel while a ``with`` block lasts.
+
+    Parameters
+    ----------
+    panel
+        An `RPSPanel` or a `MechanismPanel`.
+    port
+        To serve on; a free one from 8080 on if left out.
+    title
+        Plain text, above the sliders.
+
+    Attributes
+    ----------
+    url : str
+        Address to open in a browser on this machine.
+
+    Raises
+    ------
+    RPSPinError
+        If viser is not installed; says how to get it.
+    """
+
+    def __init__(self, panel: Panel, *, port: int | None = None, title: str = "Robot") -> None:
+        try:
+            import viser  # noqa: PLC0415
+        except ImportError:
+            raise RPSPinError(
+                "the panel in the browser needs viser: pip install 'rps-pin[panel]'"
+            ) from None
+        self._panel, self._lock, self._following = panel, threading.RLock(), False
+        self._server: Any = viser.ViserServer(host=HOST, port=port or 8080, verbose=False)
+        self._server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self.url = f"http://{HOST}:{self._server.get_port()}"
+        self._show_robot()
+        self._server.gui.add_markdown(f"## {title}")
+        self._sliders = {
+            group: [self._slider(group, k) for k in range(len(sliders))]
+            for group, sliders in panel.groups.items()
+        }
+        self._text = self._server.gui.add_markdown("")
+        self._update()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.stop()
+
+    @property
+    def text(self) -> str:
+        """What is read out, as Markdown."""
+        return str(self._text.content)
+
+    def move(self, group: str, shown: list[float]) -> None:
+        """Move a group's sliders, in the units they show: as someone in the page does."""
+        for slider, value in zip(self._sliders[group], shown, strict=True):
+            slider.value = value
+
+    def _show_robot(self) -> None:
+        from pinocchio.visualize import ViserVisualizer  # noqa: PLC0415
+
+        panel = self._panel
+        self._robot = ViserVisualizer(
+            panel.mechanism.model, pin.GeometryModel(), panel.visual_model()
+        )
+        self._robot.initViewer(viewer=self._server)
+        self._robot.loadViewerModel("robot")
+        self._robot.display(panel.configuration)
+        data = panel.mechanism.model.createData()
+        pin.framesForwardKinematics(panel.mechanism.model, data, panel.configuration)
+        points = np.array([place.translation for place in data.oMf])
+        middle, size = points.mean(axis=0), float(np.ptp(points, axis=0).max()) or 1.0
+        scene = self._server.scene
+        scene.add_grid(
+            "/floor",
+            width=4 * size,
+            height=4 * size,
+            cell_size=size / 5,
+            position=(0.0, 0.0, float(points[:, 2].min()) - size / 5),
+        )
+        camera = self._server.initial_camera
+        camera.position = tuple(middle + size * np.array([1.4, -1.6, 0.9]))
+        camera.look_at = tuple(middle)
+
+    def _slider(self, group: str, number: int) -> Any:
+        slider = self._panel.groups[group][number]
+        now = slider.scale * float(self._panel.values(group)[number])
+        handle = self._server.gui.add_slider(
+            slider.name,
+            min=min(slider.low, now),
+            max=max(slider.high, now),
+            step=slider.step,
+            initial_value=now,
+        )
+        handle.on_update(lambda _: self._moved(group))
+        return handle
+
+    def _moved(self, group: str) -> None:
+        """Follow the sliders of a group."""
+        with self._lock:
+            if self._following:  # these are ours, not someone's
+                return
+            scales = [slider.scale for slider in self._panel.groups[group]]
+            shown = [handle.value for handle in self._sliders[group]]
+            self._panel.move(group, [v / s for v, s in zip(shown, scales, strict=True)])
+            self._update(moved=group)
+
+    def _update(self, moved: str | None = None) -> None:
+        self._robot.display(self._panel.configuration)
+        rows = [f"| {name} | {value} |" for name, value in self._panel.readings()]
+        trouble = [f"**{words}**\n" for words in self._panel.trouble] or ["within all limits\n"]
+        self._text.content = "\n".join(["| | |", "|---|---|", *rows, "", *trouble])
+        self._following = True
+        try:
+            for group, handles in self._sliders.items():
+                if group != moved:
+                    values = self._panel.values(group)
+                    for handle, slider, value in zip(
+                        handles, self._panel.groups[group], values, strict=True
+                    ):
+                        shown = slider.scale * float(value)
+                        handle.value = min(max(shown, handle.min), handle.max)
+        finally:
+            self._following = False

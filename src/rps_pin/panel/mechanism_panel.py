@@ -1,0 +1,119 @@
+"""Any mechanism under sliders: its actuated joints."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.closed_loop.visuals import skeleton
+from rps_pin.errors import InputError, RPSPinError
+from rps_pin.panel.sliders import Slider, asked_of, told
+
+Array = NDArray[np.float64]
+_MM, _DEGREE = 1e3, 180.0 / math.pi
+
+
+class MechanismPanel:
+    """Sliders of a mechanism's actuated joints, in one group, ``"joints"``.
+
+    The loops are closed round what the sliders say. Where they cannot be, the last good
+    configuration stays, and `trouble` says why.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism; its actuated joints must have one coordinate each.
+    q
+        Where it starts, shape (nq,); its home if left out.
+    visual
+        Its shapes; bars between its joints if left out.
+
+    Raises
+    ------
+    InputError
+        If an actuated joint has another number of coordinates than one, or q does not fit.
+    """
+
+    def __init__(
+        self,
+        mechanism: ClosedLoopModel,
+        q: ArrayLike | None = None,
+        visual: pin.GeometryModel | None = None,
+    ) -> None:
+        self.mechanism, self._visual = mechanism, visual
+        model = mechanism.model
+        self._joints = [model.joints[model.getJointId(name)] for name in mechanism.actuated]
+        for name, joint in zip(mechanism.actuated, self._joints, strict=True):
+            if joint.nq != 1:
+                raise InputError(
+                    f"the actuated joint {name!r} has {joint.nq} coordinates; a slider moves one"
+                )
+        self._q: Array = mechanism.close(mechanism.home if q is None else q)
+        self._angular = ["P" not in joint.shortname()[10:11] for joint in self._joints]
+        self.groups = {"joints": tuple(map(self._slider, range(len(self._joints))))}
+        self.trouble: list[str] = []
+
+    def values(self, group: str = "joints") -> Array:
+        """Return the actuated joints' coordinates, rad or m."""
+        return np.array([self._q[joint.idx_q] for joint in self._joints])
+
+    def move(self, group: str, values: Any) -> bool:
+        """Close the loops round the joints' coordinates; return whether that could be done."""
+        try:
+            asked = asked_of(self.groups, group, values)
+            wanted = dict(zip(self.mechanism.actuated, asked.tolist(), strict=True))
+            self._q = self.mechanism.complete(wanted, self._q)
+        except RPSPinError as error:
+            self.trouble = [f"not followed: {error}"]
+            return False
+        self.trouble = []
+        return True
+
+    def readings(self) -> list[tuple[str, str]]:
+        """Return the joints, the forces that hold the weight, conditioning and gap."""
+        still = np.zeros(self.mechanism.model.nv)
+        rows = [
+            (name, told(value, _DEGREE, "degrees") if angular else told(value, _MM, "mm"))
+            for name, value, angular in zip(
+                self.mechanism.actuated, self.values(), self._angular, strict=True
+            )
+        ]
+        try:
+            held = self.mechanism.inverse_dynamics(self._q, still, still)
+            rows += [
+                (f"holds: {name}", told(tau, 1.0, "N m" if angular else "N"))
+                for name, tau, angular in zip(
+                    self.mechanism.actuated, held.tau, self._angular, strict=True
+                )
+            ]
+        except RPSPinError as error:
+            rows.append(("holds", str(error)))
+        rows.append(("condition of the passive joints", f"{self.mechanism.condition(self._q):.3f}"))
+        rows.append(("largest loop gap", f"{self.mechanism.loop_gap(self._q):.1e} m"))
+        return rows
+
+    @property
+    def configuration(self) -> Array:
+        """Where the mechanism stands, shape (nq,)."""
+        return self._q
+
+    def visual_model(self) -> pin.GeometryModel:
+        """Return its shapes."""
+        return skeleton(self.mechanism) if self._visual is None else self._visual
+
+    def _slider(self, number: int) -> Slider:
+        joint, angular = self._joints[number], self._angular[number]
+        model = self.mechanism.model
+        low = float(model.lowerPositionLimit[joint.idx_q])
+        high = float(model.upperPositionLimit[joint.idx_q])
+        scale, unit = (_DEGREE, "degrees") if angular else (_MM, "mm")
+        here = float(self._q[joint.idx_q])
+        if not high - low < 1e3:  # none
+            low, high = (-math.pi, math.pi) if angular else (here - 1.0, here + 1.0)
+        name = f"{self.mechanism.actuated[number]} ({unit})"
+        return Slider(name, scale * low, scale * high, scale * (high - low) / 1000, scale)

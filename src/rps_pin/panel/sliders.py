@@ -1,0 +1,82 @@
+"""What a panel is, whatever shows it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.errors import InputError
+from rps_pin.rps.checks import finite_entries
+
+
+class Slider(NamedTuple):
+    """One number to move."""
+
+    name: str
+    """With its unit as shown: ``"height (mm)"``."""
+    low: float
+    high: float
+    step: float
+    scale: float
+    """Shown units in one SI unit."""
+
+
+class Panel(Protocol):
+    """Sliders, and what follows from them. Numbers are SI units; nothing raises when they move."""
+
+    groups: dict[str, tuple[Slider, ...]]
+    """Sliders that are moved together, by the group's name."""
+    mechanism: ClosedLoopModel
+    """What is shown."""
+    trouble: list[str]
+    """What is wrong where the sliders are, in words: limits, or why they were not followed."""
+
+    def values(self, group: str) -> NDArray[np.float64]:
+        """Return where a group's sliders stand, SI units."""
+
+    def move(self, group: str, values: Any) -> bool:
+        """Move a group's sliders; return whether the robot could follow."""
+
+    def readings(self) -> list[tuple[str, str]]:
+        """Return names and values to read out."""
+
+    @property
+    def configuration(self) -> NDArray[np.float64]:
+        """Where the mechanism stands, shape (nq,)."""
+
+    def visual_model(self) -> pin.GeometryModel:
+        """Return its shapes."""
+
+
+def asked_of(groups: dict[str, tuple[Slider, ...]], group: str, values: Any) -> NDArray[np.float64]:
+    """Return values that a group's sliders can take.
+
+    Raises
+    ------
+    InputError
+        If there is no such group, or these are not its numbers, or beyond its sliders.
+    """
+    if group not in groups:
+        raise InputError(f"no sliders {group!r}; there are: {', '.join(groups)}")
+    sliders = groups[group]
+    asked = finite_entries(values, (), group)
+    if asked.shape != (len(sliders),):
+        raise InputError(f"{group} has shape {asked.shape}; it must be ({len(sliders)},)")
+    for slider, value in zip(sliders, asked.tolist(), strict=True):
+        shown = slider.scale * value
+        if not slider.low - slider.step <= shown <= slider.high + slider.step:
+            raise InputError(
+                f"{slider.name}: {shown:.6g} is beyond its slider, {slider.low:.6g} to "
+                f"{slider.high:.6g}"
+            )
+    return asked
+
+
+def told(values: Any, scale: float, unit: str, digits: int = 3) -> str:
+    """Return numbers as read out: ``(1.000, 2.000) mm``."""
+    shown = [f"{scale * float(value):.{digits}f}" for value in np.atleast_1d(values)]
+    return (shown[0] if len(shown) == 1 else f"({', '.join(shown)})") + f" {unit}"
