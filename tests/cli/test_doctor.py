@@ -31,7 +31,7 @@ main()
 def doctor(*arguments: str, hidden: str = "nothing", reason: str = "it is not there"):
     code = BROKEN.format(name=hidden, reason=reason, arguments=list(arguments))
     return subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=False
     )
 
 
@@ -49,7 +49,7 @@ def test_all_is_well_here() -> None:
 
 def test_without_pinocchio_every_command_says_what_is_missing() -> None:
     reason = "libgomp.so.1: cannot open shared object file"
-    for arguments in (("doctor",), ("helix",), ("--version",)):
+    for arguments in (("doctor",), ("helix",)):
         run = doctor(*arguments, hidden="pinocchio", reason=reason)
         assert run.returncode == 1
         assert "Traceback" not in run.stdout + run.stderr
@@ -57,6 +57,12 @@ def test_without_pinocchio_every_command_says_what_is_missing() -> None:
         row = next(i for i, line in enumerate(lines) if line.startswith("MISSING pin "))
         assert "apt-get install libgomp1" in lines[row + 1]
         assert lines[-1].startswith("something is missing")
+
+
+def test_without_pinocchio_there_is_help_all_the_same() -> None:
+    run = doctor("--help", hidden="pinocchio")
+    assert run.returncode == 0
+    assert "helix" in run.stdout
 
 
 @pytest.mark.parametrize("module", ["typer", "rich", "numpy"])

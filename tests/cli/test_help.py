@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from rps_pin.cli.app import app
 
@@ -23,7 +24,7 @@ def said(*arguments: str, folder: Path | None = None, **environment: str) -> str
         env={**os.environ, "COLUMNS": "80", "TERM": "dumb", **environment},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=240,
         check=False,
     )
     assert run.stderr == ""
@@ -70,3 +71,20 @@ def test_the_shell_completes(tmp_path: Path, words: list[str], wanted: set[str])
     if words[-1] == "m" and words[0] == "view":
         wanted = wanted | {"more/"}
     assert found == wanted
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_a_command_reads_at_80_columns(command: str) -> None:
+    """In this process: what a command's help costs is its imports."""
+    run = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "80", "TERM": "dumb"})
+    assert run.exit_code == 0
+    lines = run.output.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "…" not in run.output  # nothing is cut off
+    assert any("Exit status" in line for line in lines) or command in ("view", "urdf"), run.output
+
+
+def test_help_and_version_import_no_robot() -> None:
+    code = "import sys, rps_pin.cli.app; print(sorted({'pinocchio', 'scipy'} & set(sys.modules)))"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == "[]\n"

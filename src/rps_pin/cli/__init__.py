@@ -1,17 +1,22 @@
-"""The command line, ``rps-pin``."""
+"""The command line, ``rps-pin``: one module a command, ``NAME.py`` with its ``NAME_command``.
 
-import sys
+`rps_pin.cli.app` lists them. They read options and files, call the library, and print; nothing is
+computed here.
+"""
 
 
 def main() -> None:
-    """Run the command line; where it cannot be imported, say what is missing."""
+    """Run the command line; where a package cannot be imported, say what is missing."""
     try:
         from rps_pin.cli.app import run
+
+        run()
     except ImportError:
         from rps_pin.cli.doctor import doctor
 
-        sys.exit(doctor() or 1)
-    run()
+        if doctor() == 0:
+            raise  # a mistake of ours, not of the installation
+        raise SystemExit(1) from None
 
 
 __all__ = ["main"]

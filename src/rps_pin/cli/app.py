@@ -7,26 +7,17 @@ import sys
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.markup import escape
 
 from rps_pin import __version__
-from rps_pin.cli.check import check_command
-from rps_pin.cli.console import complain
-from rps_pin.cli.control import control_command
-from rps_pin.cli.describe import describe_command
 from rps_pin.cli.doctor import doctor
-from rps_pin.cli.dynamics import dynamics_command
-from rps_pin.cli.fk import fk_command
-from rps_pin.cli.helix import helix_command
-from rps_pin.cli.ik import ik_command
-from rps_pin.cli.reproduce import reproduce_command
-from rps_pin.cli.simulate import simulate_command
-from rps_pin.cli.urdf import urdf_command
-from rps_pin.cli.view import view_command
-from rps_pin.cli.workspace import workspace_command
+from rps_pin.cli.lazy_group import LazyGroup
 from rps_pin.errors import RPSPinError
 
 app = typer.Typer(
     name="rps-pin",
+    cls=LazyGroup,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
@@ -34,21 +25,21 @@ app = typer.Typer(
 )
 
 _ROBOT, _MOTION, _ANY, _MORE = "The 3-RPS", "Its motion", "Any mechanism", "More"
-for _panel, _name, _command, _line in (
-    (_ROBOT, "view", view_command, "Show it in the browser: a pose, or a motion."),
-    (_ROBOT, "ik", ik_command, "Leg lengths of a pose, against the robot's limits."),
-    (_ROBOT, "fk", fk_command, "Poses of leg lengths: every assembly mode, or one."),
-    (_ROBOT, "workspace", workspace_command, "Where it can go, and the paper's figures."),
-    (_ROBOT, "urdf", urdf_command, "Its URDF: a preset's, or a parameter file's."),
-    (_MOTION, "helix", helix_command, "Actuator forces along the paper's helix."),
-    (_MOTION, "dynamics", dynamics_command, "The same for any trajectory; actuator sizing."),
-    (_MOTION, "check", check_command, "Where a helix meets a singularity or a limit."),
-    (_MOTION, "control", control_command, "A control loop against a robot unlike its model."),
-    (_ANY, "describe", describe_command, "Joints, closures, rank, mobility, actuation."),
-    (_ANY, "simulate", simulate_command, "Its motion, loops closed at every step."),
-    (_MORE, "reproduce", reproduce_command, "The paper's equations, figures and tables."),
+for _panel, _name, _line in (
+    (_ROBOT, "view", "Show it in the browser: a pose, or a motion."),
+    (_ROBOT, "ik", "Leg lengths of a pose, against the robot's limits."),
+    (_ROBOT, "fk", "Poses of leg lengths: every assembly mode, or one."),
+    (_ROBOT, "workspace", "Where it can go, and the paper's figures."),
+    (_ROBOT, "urdf", "Its URDF: a preset's, or a parameter file's."),
+    (_MOTION, "helix", "Actuator forces along the paper's helix."),
+    (_MOTION, "dynamics", "The same for any trajectory; actuator sizing."),
+    (_MOTION, "check", "Where a helix meets a singularity or a limit."),
+    (_MOTION, "control", "A control loop against a robot unlike its model."),
+    (_ANY, "describe", "Joints, closures, rank, mobility, actuation."),
+    (_ANY, "simulate", "Its motion, loops closed at every step."),
+    (_MORE, "reproduce", "The paper's equations, figures and tables."),
 ):
-    app.command(_name, rich_help_panel=_panel, short_help=_line)(_command)
+    app.command(_name, rich_help_panel=_panel, short_help=_line)(LazyGroup.stub(_name))
 
 
 @app.command("doctor", rich_help_panel=_MORE)
@@ -85,12 +76,20 @@ def run() -> None:
     try:
         app()
     except RPSPinError as error:
-        complain(str(error))
+        _complain(str(error))
         sys.exit(1)
     except BrokenPipeError:  # the reader of our output left: not worth a word
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        complain(f"{where}{error.strerror or error}")
+        _complain(f"{where}{error.strerror or error}")
         sys.exit(1)
+
+
+def _complain(message: str) -> None:
+    """Write an error to standard error, as one line."""
+    line = " ".join(message.split())
+    Console(stderr=True, soft_wrap=True).print(
+        f"[bold red]error:[/] {escape(line)}", highlight=False
+    )

@@ -1,0 +1,47 @@
+"""A group of commands that are imported when one of them is called, not when they are listed.
+
+Help, completion of a command's name and the version then take no more than Typer does: a command
+imports Pinocchio and much else.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+
+class LazyGroup(TyperGroup):
+    """Commands that are known by name and one line: ``rps_pin.cli.NAME`` has ``NAME_command``."""
+
+    @staticmethod
+    def stub(name: str) -> Callable[[], None]:
+        """Return what stands for a command until it is called."""
+
+        def command() -> None:
+            raise NotImplementedError(name)  # `resolve_command` puts the command in its place
+
+        command.stands_for = name  # type: ignore[attr-defined]
+        return command
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find a command by its name, and import it if it has not been."""
+        name, command, rest = super().resolve_command(ctx, args)
+        stands_for = getattr(getattr(command, "callback", None), "stands_for", "")
+        return name, _imported(stands_for) if stands_for else command, rest
+
+
+def _imported(name: str) -> Any:
+    """Return the command of a module, with the settings of the whole command line."""
+    module = importlib.import_module(f"rps_pin.cli.{name}")
+    one = typer.Typer(
+        add_completion=False,
+        rich_markup_mode="markdown",
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    one.command(name)(getattr(module, f"{name}_command"))
+    return typer.main.get_command(one)
