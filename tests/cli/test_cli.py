@@ -178,11 +178,11 @@ def test_view_serves_this_machine_until_ctrl_c(arguments: list[str]) -> None:
         line = process.stdout.readline()
         address = line.split()[1]
         assert address.startswith("http://127.0.0.1:")
-        with urllib.request.urlopen(address, timeout=10) as page:
+        with urllib.request.urlopen(address, timeout=60) as page:
             assert "MeshCat" in page.read().decode()
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=15)
+        output, errors = process.communicate(timeout=60)
     finally:
         process.kill()
     assert process.returncode == 0

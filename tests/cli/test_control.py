@@ -32,7 +32,7 @@ COMMAND = [sys.executable, "-c", "from rps_pin.cli import main; main()", "contro
 
 def control(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=120, check=False
+        [*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=240, check=False
     )
 
 

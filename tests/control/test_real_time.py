@@ -422,11 +422,13 @@ def test_memory_does_not_grow() -> None:
             loop.estimate(length[i % 100])
             loop.inverse_dynamics(pose[i % 100], rate[i % 100], acceleration[i % 100])
 
-    ticks(10_000)
-    gc.collect()
-    blocks = sys.getallocatedblocks()
-    ticks(20_000)
-    assert sys.getallocatedblocks() - blocks < 200  # less than one in a hundred ticks
+    growth = []
+    for _ in range(4):  # what others begin once in this process is in one of them at most
+        gc.collect()
+        blocks = sys.getallocatedblocks()
+        ticks(6000)
+        growth.append(sys.getallocatedblocks() - blocks)
+    assert min(growth) < 60  # less than one in a hundred ticks
     tracemalloc.start()  # NumPy's memory too, and slow
     try:
         ticks(200)

@@ -344,6 +344,13 @@ def test_missing_fields_are_named(field: str) -> None:
     assert caught.value.field == field
 
 
+def test_misspelt_fields_are_named_before_those_that_are_missing(tmp_path: Path) -> None:
+    text = MINIMAL.replace("platform_radius", "platform_raduis")
+    with pytest.raises(ParameterError, match=r"did you mean platform_radius\?") as caught:
+        read(tmp_path, text)
+    assert str(caught.value).startswith(f"{tmp_path / 'robot.yaml'}, line 2: platform_raduis = ")
+
+
 def test_unknown_fields_are_refused_with_those_there_are() -> None:
     error = None
     with pytest.raises(ParameterError, match="unknown field; the fields are") as caught:
@@ -485,7 +492,7 @@ def test_message_about_a_nest_of_aliases_stays_short(tmp_path: Path, field: str)
     nest = "&a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"
     for level in range(1, 5):
         nest = f"&a{level} [{nest}" + f", *a{level - 1}" * 9 + "]"
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(InputError) as caught:
         read(tmp_path, MINIMAL + f"{field}: {nest}\n")
     assert len(str(caught.value)) < 2000
 
@@ -495,13 +502,13 @@ def test_message_about_a_nest_of_aliases_stays_short(tmp_path: Path, field: str)
     [
         (MINIMAL + "gravity: [0, 0\nrod_mass: 1\n", "line 9"),
         (MINIMAL + "\tgravity: 1\n", "line 8"),
-        (MINIMAL + "leg_mass: 1\n", 'duplicate key "leg_mass".*line 8'),
+        (MINIMAL + "leg_mass: 1\n", 'line 8: .*duplicate key "leg_mass"'),
         (MINIMAL + "gravity: *none\n", "line 8"),
-        ("- 1\n- 2\n", "must hold 'field: value' lines"),
-        ("just words", "must hold 'field: value' lines"),
-        ("", "must hold 'field: value' lines"),
-        ("1: 2\n", "must hold 'field: value' lines"),
-        (MINIMAL + "---\n" + MINIMAL, "not valid YAML.*line 8"),
+        ("- 1\n- 2\n", "must hold 'key: value' lines"),
+        ("just words", "must hold 'key: value' lines"),
+        ("", "must hold 'key: value' lines"),
+        ("1: 2\n", "line 1: the key '1' must be text"),
+        (MINIMAL + "---\n" + MINIMAL, "line 8: not valid YAML"),
         (b"\x00\x01\x02\xff\xfe", "not a UTF-8 text"),
         (b"a: \x00\n", "not valid YAML"),
     ],
