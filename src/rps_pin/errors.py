@@ -54,13 +54,17 @@ class ParameterError(InputError):
         What was given.
     rule : str
         What the field has to satisfy.
+    place : str
+        The file and line where it stands, if it stands in one.
     """
 
-    def __init__(self, field: str, value: object, rule: str) -> None:
+    def __init__(self, field: str, value: object, rule: str, place: str = "") -> None:
         self.field = field
         self.value = value
         self.rule = rule
-        super().__init__(f"{field} = {shown(value)}: {rule}")
+        self.place = place
+        where = f"{place}: " if place else ""
+        super().__init__(f"{where}{field} = {shown(value)}: {rule}")
 
 
 class MechanismError(InputError):

@@ -103,7 +103,7 @@ def _parsed(text: str, origin: str) -> YamlFile:
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f", line {mark.line + 1}" if mark else ""
-        problem = " ".join(str(error.problem or error.context).split())
+        problem = " ".join(f"{error.context or ''} {error.problem or ''}".split())
         raise InputError(f"{origin}{where}: not valid YAML: {problem}") from None
     except (YAMLError, ValueError) as error:
         first = " ".join(str(error).split())

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -24,11 +25,11 @@ from pydantic import (
 )
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
-from ruamel.yaml.error import YAMLError
 
 from rps_pin.closed_loop.joint_effects import FRICTION_SPEED
 from rps_pin.errors import InputError, ParameterError
 from rps_pin.files import whole_file
+from rps_pin.yaml_files import YamlFile, read_yaml
 
 #: A printed table rounds its inertias (the paper's Table 1 by 0.5 %): this much of the largest
 #: principal moment may be missing from the triangle inequality.
@@ -309,8 +310,7 @@ class RPSParameters(BaseModel):
         """
         if name not in cls.presets():
             raise InputError(f"no preset {name!r}; there are: {', '.join(cls.presets())}")
-        text = (resources.files("rps_pin.rps") / "presets" / f"{name}.yaml").read_text("utf-8")
-        return cls._from_text(text, f"preset {name}")
+        return cls.from_yaml(Path(str(resources.files("rps_pin.rps"))) / "presets" / f"{name}.yaml")
 
     @classmethod
     def from_yaml(cls, path: str | os.PathLike[str]) -> RPSParameters:
@@ -323,22 +323,15 @@ class RPSParameters(BaseModel):
         ParameterError
             If a value breaks a rule, a field is missing, or one is unknown.
         """
-        try:
-            text = Path(path).read_text("utf-8")
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or "not a UTF-8 text"
-            raise InputError(f"cannot read the parameter file {path}: {reason}") from None
-        return cls._from_text(text, str(path))
+        return cls._from_file(read_yaml(path, "parameter file"))
 
     @classmethod
-    def _from_text(cls, text: str, origin: str) -> RPSParameters:
+    def _from_file(cls, file: YamlFile) -> RPSParameters:
         try:
-            values = YAML(typ="safe", pure=True).load(text)
-        except YAMLError as error:
-            raise InputError(f"{origin} is not valid YAML: {_first_lines(error)}") from None
-        if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
-            raise InputError(f"{origin} must hold 'field: value' lines")
-        return cls(**values)
+            return cls(**file.values)
+        except ParameterError as error:
+            place = file.place([error.field] if error.field in file.values else [])
+            raise ParameterError(error.field, error.value, error.rule, place) from None
 
     def to_yaml(self, path: str | os.PathLike[str]) -> None:
         """Write the parameters to a YAML file, each with its meaning and unit beside it."""
@@ -363,14 +356,18 @@ def _refuse(field: str, value: object, rule: str) -> None:
 
 def _parameter_error(error: ValidationError) -> ParameterError:
     """Turn the first complaint of pydantic into ours, and name the fields there are if need be."""
-    first = error.errors(include_url=False)[0]
+    # An unknown field first: it is often the one that is then found missing, misspelt.
+    complaints = error.errors(include_url=False)
+    first = min(complaints, key=lambda one: one["type"] != "extra_forbidden")
     cause = first.get("ctx", {}).get("error")
     if isinstance(cause, ParameterError):
         return cause
     field, *inner = [str(part) for part in first["loc"]] or ["parameters"]
     kind, value = first["type"], first["input"]
     if kind == "extra_forbidden":
-        rule = f"unknown field; the fields are {', '.join(RPSParameters.model_fields)}"
+        near = get_close_matches(field, RPSParameters.model_fields, n=1)
+        meant = f" (did you mean {near[0]}?)" if near else ""
+        rule = f"unknown field{meant}; the fields are {', '.join(RPSParameters.model_fields)}"
     elif kind == "missing" and not inner:
         return ParameterError(field, None, "is required and was not given")
     elif inner:
@@ -378,8 +375,3 @@ def _parameter_error(error: ValidationError) -> ParameterError:
     else:
         rule = first["msg"].removeprefix("Value error, ")
     return ParameterError(field, value, rule)
-
-
-def _first_lines(error: Exception) -> str:
-    """Return a YAML error's text in one line: what, and at which line and column."""
-    return " ".join(str(error).split())
