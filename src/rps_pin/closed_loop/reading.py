@@ -6,7 +6,6 @@ entities are declared there), and read without reaching for anything outside its
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 from typing import Any
@@ -14,20 +13,11 @@ from typing import Any
 import pinocchio as pin
 from lxml import etree
 
+from rps_pin.closed_loop.urdf_check import refuse_mistakes
 from rps_pin.errors import InputError, MechanismError
 
 #: How the root link of a tree may stand in the world.
 ROOTS = ("fixed", "free")
-
-#: Attributes that hold numbers. Pinocchio's parser only prints a complaint about a bad one, and
-#: goes on without the element.
-_NUMBERS = {
-    "mass": ("value",),
-    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
-    "origin": ("xyz", "rpy"),
-    "axis": ("xyz",),
-    "limit": ("lower", "upper", "effort", "velocity"),
-}
 
 
 def model_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") -> pin.Model:
@@ -51,7 +41,7 @@ def model_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") ->
     if root not in ROOTS:
         raise InputError(f"root = {root!r}: it must be {' or '.join(map(repr, ROOTS))}")
     text, origin = xml_text(path_or_xml, "URDF")
-    _refuse_bad_numbers(xml_root(text, origin, "URDF"), origin)
+    refuse_mistakes(xml_root(text, origin, "URDF"), origin)
     try:
         if root == "free":
             return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
@@ -105,21 +95,3 @@ def xml_root(text: str, origin: str, form: str) -> Any:
     if root.getroottree().docinfo.doctype:
         raise MechanismError(f"{origin} declares a document type, which no {form} needs: refused")
     return root
-
-
-def _refuse_bad_numbers(root: Any, origin: str) -> None:
-    for element in root.iter(*_NUMBERS):
-        for attribute in _NUMBERS[str(element.tag)]:
-            for part in element.get(attribute, "0").split() or [""]:
-                if not _is_finite(part):
-                    raise MechanismError(
-                        f"{origin}, line {element.sourceline}: {element.tag} {attribute} = "
-                        f"{element.get(attribute)!r} must be finite numbers"
-                    )
-
-
-def _is_finite(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
