@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from rps_pin import RPSParameters, RPSRobot, __version__, helix
+from rps_pin import InputError, RPSParameters, RPSRobot, __version__, helix
+from rps_pin.cli.helix_options import middle_height
 
 FIGURES = [
     f"figure_{name}.{suffix}"
@@ -106,7 +107,7 @@ def test_helix_takes_a_parameter_file_and_other_numbers(tmp_path: Path) -> None:
     ("arguments", "words"),
     [
         (["helix", "--robot", "nope"], "the presets are: micro, sokolov"),
-        (["helix", "--robot", "micro"], "leg 1: length would be"),
+        (["helix", "--robot", "micro", "--height", "0.4"], "leg 1: length would be"),
         (["helix", "--radius", "nan"], "radius = nan"),
         (["helix", "--radius", "75e-3", "--pitch", "50e-3"], "crosses a type II singularity"),
         (
@@ -165,6 +166,23 @@ def test_urdf_is_written_to_standard_output_or_a_file(tmp_path: Path) -> None:
     run = rps_pin("urdf", "--robot", "micro", "-o", str(file))
     assert run.returncode == 0
     assert file.read_text() == expected
+
+
+@pytest.mark.parametrize("preset", ["sokolov", "micro"])
+def test_the_helix_starts_where_a_robot_can_climb(preset: str) -> None:
+    p = RPSParameters.from_preset(preset)
+    height = middle_height(p, 0.5e-3)
+    if preset == "sokolov":
+        assert height == 0.4  # the paper's, to the last digit
+        return
+    half = RPSRobot(p).inverse_kinematics([height + 0.25e-3, 0.0, 0.0]).length
+    assert_allclose(half, np.mean(p.leg_length_limits), rtol=1e-14)
+
+
+def test_a_robot_without_a_middle_is_told_to_give_a_height() -> None:
+    p = RPSParameters.from_preset("micro").replace(base_radius=0.5)
+    with pytest.raises(InputError, match=r"do not reach .* give --height"):
+        middle_height(p, 0.5e-3)
 
 
 @pytest.mark.parametrize("arguments", [[], ["--pose", "0.4", "0.1", "0"]])

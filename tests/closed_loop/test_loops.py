@@ -254,3 +254,8 @@ def test_names_of_closures_may_not_come_twice() -> None:
 def test_characteristic_length_is_a_length(bad: float) -> None:
     with pytest.raises(InputError, match=r"characteristic_length = .* positive"):
         couplings(characteristic_length=bad)
+
+
+def test_what_is_no_closure_is_refused() -> None:
+    with pytest.raises(InputError, match=r"LoopClosure or JointCoupling objects, not \('a', 'b'\)"):
+        ClosedLoopModel(pin.Model(), [("a", "b")], actuated=[])

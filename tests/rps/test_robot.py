@@ -497,3 +497,15 @@ def test_the_cone_is_measured_from_the_joint_s_own_rest_axis() -> None:
     np.testing.assert_allclose([v.value for v in caught.value.violations], np.pi / 6)
     leaning = RPSRobot(parameters.replace(spherical_rest_angle=np.pi / 6))
     assert leaning.inverse_kinematics(pose).reachable
+
+
+@pytest.mark.parametrize("given", ["micro", {"base_radius": 0.1}, None])
+def test_a_robot_is_made_of_parameters(given) -> None:
+    with pytest.raises(InputError, match=r"not of .*RPSRobot\.from_preset\(name\)"):
+        RPSRobot(given)
+
+
+def test_a_pose_is_no_configuration() -> None:
+    robot = RPSRobot.from_preset("micro")
+    with pytest.raises(InputError, match="as a pose has; it must be"):
+        robot.inverse_dynamics([0.22, 0.0, 0.0], [0.0] * 3, [0.0] * 3)

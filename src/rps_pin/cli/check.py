@@ -11,7 +11,6 @@ from rich.console import Console
 
 from rps_pin.cli.console import RobotOption, load_robot
 from rps_pin.cli.helix_options import (
-    DEFAULT_HEIGHT,
     DEFAULT_PITCH,
     DEFAULT_RADIUS,
     Branch,
@@ -31,7 +30,7 @@ def check_command(
     robot: RobotOption = "sokolov",
     radius: RadiusOption = DEFAULT_RADIUS,
     pitch: PitchOption = DEFAULT_PITCH,
-    height: HeightOption = DEFAULT_HEIGHT,
+    height: HeightOption = None,
     branch: BranchOption = Branch.PLUS,
     duration: DurationOption = PAPER_DURATION,
     threshold: Annotated[

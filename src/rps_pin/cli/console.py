@@ -1,4 +1,4 @@
-"""What the commands share: the robot's option."""
+"""What the commands share: the robot's option, and how it is read."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from rps_pin.cli.completion import names_or_files, preset_names
-from rps_pin.rps.robot_file import load_robot
-
-__all__ = ["RobotOption", "load_robot"]
+from rps_pin.rps import robot_file
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.unit_doubts import unit_doubts
 
 RobotOption = Annotated[
     str,
@@ -22,3 +22,11 @@ RobotOption = Annotated[
         autocompletion=names_or_files(preset_names),
     ),
 ]
+
+
+def load_robot(name_or_file: str) -> RPSRobot:
+    """Return the robot of a preset's name or of a parameter file; doubt its units aloud."""
+    robot = robot_file.load_robot(name_or_file)
+    for doubt in unit_doubts(robot.parameters):
+        typer.echo(f"note: {name_or_file}: {doubt}. Units are SI: m, kg, kg m^2", err=True)
+    return robot

@@ -11,7 +11,6 @@ from rich.console import Console
 
 from rps_pin.cli.console import RobotOption, load_robot
 from rps_pin.cli.helix_options import (
-    DEFAULT_HEIGHT,
     DEFAULT_PITCH,
     DEFAULT_RADIUS,
     Branch,
@@ -39,7 +38,7 @@ def helix_command(
     robot: RobotOption = "sokolov",
     radius: RadiusOption = DEFAULT_RADIUS,
     pitch: PitchOption = DEFAULT_PITCH,
-    height: HeightOption = DEFAULT_HEIGHT,
+    height: HeightOption = None,
     branch: BranchOption = Branch.PLUS,
     duration: DurationOption = PAPER_DURATION,
     rate: Annotated[float, typer.Option(help="Samples a second, Hz.")] = 1000.0,
@@ -66,7 +65,7 @@ def helix_command(
 
     - `rps-pin helix` the paper's robot and helix
 
-    - `rps-pin helix --robot micro --height 0.225` another robot
+    - `rps-pin helix --robot micro` another robot
 
     - `rps-pin helix --robot mine.yaml --rate 100 --output results --json`
 

@@ -15,7 +15,6 @@ from rich.progress import track
 from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.cli.console import RobotOption, load_robot
 from rps_pin.cli.helix_options import (
-    DEFAULT_HEIGHT,
     DEFAULT_PITCH,
     DEFAULT_RADIUS,
     Branch,
@@ -43,7 +42,7 @@ def view_command(
     ] = None,
     radius: RadiusOption = DEFAULT_RADIUS,
     pitch: PitchOption = DEFAULT_PITCH,
-    height: HeightOption = DEFAULT_HEIGHT,
+    height: HeightOption = None,
     branch: BranchOption = Branch.PLUS,
     duration: DurationOption = PAPER_DURATION,
     layers: LayersOption = None,

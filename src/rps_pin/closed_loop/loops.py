@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rps_pin.closed_loop.closure import Closure, JointCoupling, LoopClosure
 from rps_pin.closed_loop.closure_rows import Rows, rows_of
-from rps_pin.errors import InputError, MechanismError
+from rps_pin.errors import InputError, MechanismError, shown
 
 Array = NDArray[np.float64]
 
@@ -110,6 +110,11 @@ class Loops:
         _refuse_other_orders(model)
         self.model = model
         self.closures = tuple(closures)
+        for closure in self.closures:
+            if not isinstance(closure, (LoopClosure, JointCoupling)):
+                raise InputError(
+                    f"closures are LoopClosure or JointCoupling objects, not {shown(closure)}"
+                )
         refuse_twice("closure", [closure.name for closure in self.closures])
         self.size = sum(closure.size for closure in self.closures)
         self.data = model.createData()

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.closed_loop import ClosedLoopModel, InverseDynamics, LoopClosure
 from rps_pin.closed_loop.reading import model_from_urdf
-from rps_pin.errors import InputError, UnreachableError
+from rps_pin.errors import InputError, UnreachableError, shown
 from rps_pin.rps import actuator_forces as fast_path
 from rps_pin.rps import legs as leg_kinematics
 from rps_pin.rps.assembly import AssemblyModes, assembly_modes
@@ -62,9 +62,19 @@ class RPSRobot:
         and payload are in it.
     force_terms : ForceTerms
         What the closed form of the actuator forces is made of.
+
+    Raises
+    ------
+    InputError
+        If the parameters are none.
     """
 
     def __init__(self, parameters: RPSParameters, payload: Payload | None = None) -> None:
+        if not isinstance(parameters, RPSParameters):
+            raise InputError(
+                f"a robot is made of RPSParameters, not of {shown(parameters)}; of a preset: "
+                "RPSRobot.from_preset(name); of a file: RPSRobot(RPSParameters.from_yaml(path))"
+            )
         self.parameters = parameters
         self.payload = payload
         self.urdf = build_urdf(parameters)
@@ -300,8 +310,13 @@ class RPSRobot:
         Raises
         ------
         InputError, SingularityError
-            As `ClosedLoopModel.inverse_dynamics`.
+            As `ClosedLoopModel.inverse_dynamics`; and if q is a pose.
         """
+        if np.shape(q) == (3,):
+            raise InputError(
+                "q has shape (3,), as a pose has; it must be (13,): state(pose, rate, "
+                "acceleration) gives q, v and a; or take actuator_forces"
+            )
         if wrench is None:
             return self.mechanism.inverse_dynamics(q, v, a)
         return self.mechanism.inverse_dynamics(q, v, a, wrenches={"platform": wrench})
