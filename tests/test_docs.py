@@ -121,4 +121,6 @@ def test_every_public_name_is_in_the_api(package: str) -> None:
 def test_every_name_of_the_package_itself_lives_where_the_api_has_it() -> None:
     package = importlib.import_module("rps_pin")
     for public in set(package.__all__) - {"__version__"}:
+        if inspect.ismodule(getattr(package, public)):
+            continue
         assert re.search(rf":: rps_pin\.\w+\.{public}\n", API), public

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
+
+import rps_pin
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "src" / "rps_pin"
@@ -70,3 +74,13 @@ def test_dependencies_point_one_way() -> None:
         for path in (PACKAGE / name).rglob("*.py"):
             for used in re.findall(r"^\s*from rps_pin\.(\w+)", path.read_text("utf-8"), re.M):
                 assert used in allowed, f"{path.relative_to(PACKAGE)} uses {used}"
+
+
+def test_every_package_is_reached_from_the_top() -> None:
+    """Without an import of its own: ``rps_pin.control.Gains``. All but the command line."""
+    packages = {one.parent.name for one in PACKAGE.glob("*/__init__.py")} - {"cli"}
+    assert packages <= set(rps_pin.__all__)
+    code = "import sys, rps_pin; print(sorted({'numpy', 'pinocchio'} & set(sys.modules)));"
+    code += " ".join(f"rps_pin.{name};" for name in sorted(packages))
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stdout) == (0, "[]\n"), run.stderr

@@ -1,3 +1,4 @@
+from . import closed_loop, control, errors, panel, plots, reproduction, rps, trajectories, viewer
 from .closed_loop import (
     ClosedLoopModel,
     ForceBound,
@@ -41,5 +42,14 @@ __all__ = [
     "SingularityError",
     "UnreachableError",
     "__version__",
+    "closed_loop",
+    "control",
+    "errors",
     "helix",
+    "panel",
+    "plots",
+    "reproduction",
+    "rps",
+    "trajectories",
+    "viewer",
 ]
