@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from rps_pin.cli.doctor import PARTS
+from rps_pin.cli.doctor import _BROWSERS, PARTS, _browser
+from rps_pin.viewer.browser import BROWSERS
 
 ROOT = Path(__file__).resolve().parents[2]
 #: A stranger's Python in which a package cannot be imported.
@@ -71,6 +72,31 @@ def test_it_speaks_without_others_too(module: str) -> None:
     assert run.returncode == 1
     assert f"MISSING {module} " in run.stdout
     assert f"pip install {module}" in run.stdout
+
+
+def test_it_fits_a_screen_and_says_what_each_is_for() -> None:
+    lines = doctor("doctor").stdout.splitlines()
+    assert all(len(line) <= 80 for line in lines if "/" not in line), lines  # paths may be long
+    names = {line[8:25].strip() for line in lines if line[:8].strip()}
+    assert {"rps-pin", "Chromium", "ffmpeg", "mujoco", "backend", "pin's options"} <= names
+
+
+def test_a_browser_that_is_a_stub_is_no_browser(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stub = tmp_path / "chromium"
+    stub.write_text("#!/bin/sh\nexit 1\n")
+    stub.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("PLAYWRIGHT_BROWSERS_PATH", str(tmp_path / "none"))
+    monkeypatch.delenv("RPS_PIN_CHROMIUM", raising=False)
+    assert "apt-get install chromium" in _browser().trouble
+    stub.write_text("#!/bin/sh\nexit 0\n")
+    assert _browser().found == str(stub)
+
+
+def test_it_looks_for_the_browsers_that_are_used() -> None:
+    assert tuple(_BROWSERS) == BROWSERS
 
 
 def test_what_is_optional_is_no_trouble() -> None:

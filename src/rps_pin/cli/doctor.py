@@ -12,7 +12,9 @@ import json
 import os
 import platform
 import shutil
+import subprocess
 import sys
+from pathlib import Path
 from typing import Any, NamedTuple
 
 OLDEST_PYTHON = (3, 11)
@@ -31,12 +33,12 @@ class Part(NamedTuple):
     purpose: str
     """What needs it."""
     extra: str | None = None
-    """The extra that it belongs to; None where everything needs it."""
+    """The extra that it belongs to, "" where it is in none; None where everything needs it."""
 
 
 PARTS = (
     Part("numpy", "numpy", "arrays"),  # first: without it, others crash Python when imported
-    Part("pin", "pinocchio", "rigid-body dynamics, constraint models"),
+    Part("pin", "pinocchio", "rigid bodies, constraint models"),
     Part("eigenpy", "eigenpy", "factorisations"),
     Part("proxsuite", "proxsuite", "force limits"),
     Part("clarabel", "clarabel", "shortest times"),
@@ -61,6 +63,7 @@ PARTS = (
     Part("playwright", "playwright", "pictures and films", "pictures"),
     Part("pillow", "PIL", "pictures and films", "pictures"),
     Part("imageio-ffmpeg", "imageio_ffmpeg", "films as MP4", "pictures"),
+    Part("mujoco", "mujoco", "only to compare with", ""),
 )
 
 
@@ -81,9 +84,10 @@ def diagnose() -> list[Finding]:
     """Return what is there and what is not, by looking."""
     arrays = _package(PARTS[0], importing=True)
     others = [_package(part, importing=not arrays.trouble) for part in PARTS[1:]]
-    findings = [_python(), arrays, *others, _browser(), _threads()]
-    broken = any(one.needed and one.trouble for one in findings)
-    return findings if broken else [*findings, _forces()]
+    findings = [_itself(), _python(), arrays, *others]
+    if not any(one.needed and one.trouble for one in findings):
+        findings += [_pinocchio_parts(), _backend(), _forces()]
+    return [*findings, _films(), _browser(), _threads()]
 
 
 def doctor(as_json: bool = False) -> int:
@@ -96,11 +100,19 @@ def doctor(as_json: bool = False) -> int:
         return int(failed)
     for one in findings:
         mark = "ok" if not one.trouble else "MISSING" if one.needed else "-"
-        print(f"{mark:8}{one.name:18}{one.found:20}{one.purpose}")
+        print(f"{mark:8}{one.name:17}{one.found or 'no':18} {one.purpose}")
         if one.trouble:
             print(f"{'':8}{one.trouble}")
     print("something is missing: see above" if failed else "all that is needed is here")
     return int(failed)
+
+
+def _itself() -> Finding:
+    where = str(Path(__file__).parents[1])
+    try:
+        return Finding("rps-pin", importlib.metadata.version("rps-pin"), where, True, "")
+    except importlib.metadata.PackageNotFoundError:
+        return Finding("rps-pin", "", where, True, "not installed: pip install . in its checkout")
 
 
 def _python() -> Finding:
@@ -112,7 +124,7 @@ def _python() -> Finding:
 
 def _package(part: Part, importing: bool) -> Finding:
     needed = part.extra is None
-    get = f"pip install {part.name}" if part.extra is None else _EXTRA.format(part.extra)
+    get = _EXTRA.format(part.extra) if part.extra else f"pip install {part.name}"
     try:
         version = importlib.metadata.version(part.name)
     except importlib.metadata.PackageNotFoundError:
@@ -130,13 +142,57 @@ def _package(part: Part, importing: bool) -> Finding:
     return Finding(part.name, version, part.purpose, needed, "")
 
 
+def _pinocchio_parts() -> Finding:
+    """Whether Pinocchio was built with what is optional in it and needed here."""
+    name, purpose = "pin's options", "reading URDF, shapes of links"
+    import pinocchio
+
+    lacking = [
+        option
+        for option in ("WITH_URDFDOM", "WITH_COLLISION")
+        if not getattr(pinocchio, option, False)
+    ]
+    get = "pip install --force-reinstall pin"
+    trouble = f"it was built without {', '.join(lacking)}: {get}" if lacking else ""
+    return Finding(name, "" if lacking else "URDF, coal", purpose, True, trouble)
+
+
+def _backend() -> Finding:
+    import matplotlib
+
+    purpose = "of matplotlib, for windows of yours"
+    return Finding("backend", str(matplotlib.get_backend()), purpose, False, "")
+
+
+def _films() -> Finding:
+    name, purpose = "ffmpeg", "films as MP4"
+    try:
+        path = importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
+    except Exception:  # not there, or none for this system
+        get = _EXTRA.format("pictures")
+        return Finding(name, "", purpose, False, f"not found: {get}, or set IMAGEIO_FFMPEG_EXE")
+    return Finding(name, Path(path).name[:17], purpose, False, "")
+
+
 def _browser() -> Finding:
-    purpose = "pictures and films of the viewer"
-    for name in (os.environ.get("RPS_PIN_CHROMIUM") or "", *_BROWSERS):
-        path = shutil.which(name) if name else None
-        if path:
-            return Finding("Chromium", path, purpose, False, "")
-    return Finding("Chromium", "", purpose, False, "not found: apt-get install chromium")
+    """Look for a Chromium that runs: some distributions have a stub of that name."""
+    name, purpose = "Chromium", "pictures and films of the viewer"
+    cache = os.environ.get("PLAYWRIGHT_BROWSERS_PATH") or Path.home() / ".cache" / "ms-playwright"
+    own = map(str, Path(cache).glob("chromium-*/chrome-linux*/chrome"))
+    for candidate in (os.environ.get("RPS_PIN_CHROMIUM") or "", *_BROWSERS, *own):
+        path = shutil.which(candidate) if candidate else None
+        if path and _runs(path):
+            return Finding(name, path, purpose, False, "")
+    get = "apt-get install chromium, or playwright install chromium"
+    return Finding(name, "", purpose, False, f"not found: {get}")
+
+
+def _runs(program: str) -> bool:
+    try:
+        run = subprocess.run([program, "--version"], capture_output=True, timeout=20, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return run.returncode == 0
 
 
 def _threads() -> Finding:
@@ -147,7 +203,7 @@ def _threads() -> Finding:
 
 def _forces() -> Finding:
     """Compute one sample of the paper's helix in two ways."""
-    name, purpose = "a calculation", "forces on the paper's helix, two ways"
+    name, purpose = "a calculation", "forces on the helix, two ways"
     try:
         from rps_pin.rps.robot import RPSRobot
         from rps_pin.trajectories.helix import helix
