@@ -9,7 +9,7 @@
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test docs bench lint format setup setup-dev clean distclean
+.PHONY: help demo test docs bench wheel lint format setup setup-dev clean distclean
 
 # A sourced ROS or openrobots environment must not put its own pinocchio before ours.
 unexport PYTHONPATH
@@ -34,6 +34,10 @@ docs: setup-dev ## build the documentation into build/docs, warnings are errors
 
 bench: setup-dev ## measure the speed of the solvers
 	OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks --benchmark-only $(PYTEST_ARGS)
+
+wheel: ## build sdist and wheel into dist, and try the wheel on every Python found
+	@sh tools/check-wheel build/wheel
+	@mkdir -p dist && cp build/wheel/*.whl build/wheel/*.tar.gz dist/
 
 lint: setup-dev ## lint, format check and types only
 	@sh tools/check lint format types
