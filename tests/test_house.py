@@ -7,9 +7,11 @@ import re
 import subprocess
 import sys
 import tomllib
+from datetime import date
 from pathlib import Path
 
 import pytest
+from packaging.version import Version
 from ruamel.yaml import YAML
 
 import rps_pin
@@ -50,8 +52,28 @@ def test_the_version_is_one() -> None:
     assert citation["license"] == PROJECT["license"]
     for key in ("cff-version", "message", "title", "authors"):  # what the format demands
         assert citation[key]
+    released = versions()
+    assert released[0][0] == version
+    assert str(citation["date-released"]) == released[0][1]
+
+
+def versions() -> list[tuple[str, str]]:
+    """Return the changelog's versions with their dates, newest first."""
     changes = (ROOT / "CHANGELOG.md").read_text("utf-8")
-    assert re.search(rf"^## \[(Unreleased|{re.escape(version)})\]", changes, re.MULTILINE)
+    headings = re.findall(r"^## (.*)$", changes, re.MULTILINE)
+    assert headings[0] == "[Unreleased]"
+    found = [re.fullmatch(r"\[(\d+\.\d+\.\d+)\] - (\d{4}-\d\d-\d\d)", one) for one in headings[1:]]
+    assert all(found), headings
+    return [(one[1], one[2]) for one in found if one]
+
+
+def test_the_changelog_keeps_its_form() -> None:
+    released = versions()
+    assert released == sorted(released, key=lambda one: Version(one[0]), reverse=True)
+    dates = [date.fromisoformat(one[1]) for one in released]
+    assert dates == sorted(dates, reverse=True)
+    kinds = re.findall(r"^### (.*)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    assert set(kinds) <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
 
 
 def test_dependencies_point_one_way() -> None:
