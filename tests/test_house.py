@@ -43,6 +43,8 @@ def test_every_module_says_what_lives_there() -> None:
         words = ast.get_docstring(ast.parse(path.read_text("utf-8")))
         assert words, path
         assert len(words.splitlines()[0]) > 15, path
+        if path.parent.parent == PACKAGE and path.name == "__init__.py":
+            assert len(words.splitlines()) > 2, f"{path}: and what does not"
 
 
 def test_the_version_is_one() -> None:

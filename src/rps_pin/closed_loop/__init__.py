@@ -1,4 +1,10 @@
-"""Any mechanism: open chains and loop closures. Knows nothing of the 3-RPS."""
+"""Any mechanism: open chains and loop closures. Knows nothing of the 3-RPS.
+
+`ClosedLoopModel` is where to begin: it reads or composes a tree, closes its loops, and computes
+kinematics, dynamics both ways, derivatives and simulations. Pinocchio does the rigid-body work.
+Nothing here draws, controls or plans in time: those are `rps_pin.viewer`, `rps_pin.plots`,
+`rps_pin.control` and `rps_pin.trajectories`.
+"""
 
 from rps_pin.closed_loop.closure import JointCoupling, LoopClosure
 from rps_pin.closed_loop.composing import Part, body, compose

@@ -1,4 +1,10 @@
-"""The 3-RPS parallel robot: parameters, URDF, closed-form kinematics, a motion's dynamics."""
+"""The 3-RPS parallel robot: parameters, URDF, closed-form kinematics, a motion's dynamics.
+
+`RPSRobot` is where to begin. What holds for this robot only stands here: poses, assembly modes,
+singularities, the workspace (`rps_pin.rps.workspace`), forces three ways, loads, sizing, shortest
+times. Its loops and its constrained dynamics are those of `rps_pin.closed_loop`; motions in time
+are `rps_pin.trajectories`, the paper's own numbers `rps_pin.reproduction`.
+"""
 
 from rps_pin.rps.assembly import AssemblyModes
 from rps_pin.rps.conversions import (

@@ -1,4 +1,9 @@
-"""Trajectories of poses with exact first and second derivatives."""
+"""Trajectories of poses with exact first and second derivatives.
+
+Each has a ``duration`` and a ``sample(t)``, made by one function (`helix`, `point_to_point`,
+`spline`, `circle`, `lissajous`, `read_csv`) or of a curve and a law of time. Whether a robot can
+follow one, how fast, and with which forces is asked in `rps_pin.rps`.
+"""
 
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.curve import Curve, CurveSample, LawSample, TimedCurve, TimeLaw
