@@ -112,7 +112,7 @@ def test_huge_things_are_refused_at_once(content: str, why: str, tmp_path: Path)
     start = time.perf_counter()
     with pytest.raises(InputError, match=why):
         read_yaml(held(tmp_path, content), "file")
-    assert time.perf_counter() - start < 10
+    assert time.perf_counter() - start < 60
 
 
 def test_a_file_without_an_end_is_refused() -> None:
