@@ -57,6 +57,16 @@ def without_numbers(text: str) -> str:
     return "".join(NUMBER.sub("#", text).split())
 
 
+first_hour = from_docs("first_hour")
+
+
+@pytest.mark.parametrize("part", first_hour.PARTS)
+def test_the_mistakes_of_the_first_hour_are_answered_as_shown(part: str) -> None:
+    text = (ROOT / "docs" / "first_hour.md").read_text("utf-8")
+    shown = text.partition(f"<!-- made by docs/first_hour.py: {part} -->")[2]
+    assert first_hour.told(first_hour.PARTS[part]).split() == shown.partition("<!--")[0].split()
+
+
 def test_prints_are_told_apart() -> None:
     assert_same_print("x = [1.25 -0.  ] m, 4.9e-18", "x = [1.24\n-0.] m, 2.1e-17")
     for wrong in ("x = [1.22 -0.] m, 0", "y = [1.24 -0.] m, 0", "x = [1.24 -0.] m, 0 1"):
