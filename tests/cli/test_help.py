@@ -51,6 +51,14 @@ def completed(folder: Path, *words: str) -> set[str]:
     return set(found.split())
 
 
+def test_the_shell_is_told_how_to_complete(tmp_path: Path) -> None:
+    """As ``--install-completion`` writes it down; bash must understand it."""
+    script = said(_RPS_PIN_COMPLETE="source_bash")
+    assert "complete -o default -F _rps_pin_completion rps-pin" in script
+    (tmp_path / "completion.sh").write_text(script)
+    subprocess.run(["bash", "-n", tmp_path / "completion.sh"], check=True)
+
+
 @pytest.mark.parametrize(
     ("words", "wanted"),
     [
