@@ -71,6 +71,7 @@ ROBOT = (
     ),
     Mistake("A colon forgotten", IK, Edit(MINE, "base_radius: 0.12", "base_radius 0.12")),
     Mistake("A pose out of reach", "rps-pin ik --robot micro --pose 0.22 0.3 0"),
+    Mistake("Lengths in millimetres", "rps-pin fk --robot micro --lengths 223 223 223"),
     Mistake("A pose of two numbers", "rps-pin ik --robot micro --pose 0.22 0.3"),
     Mistake("A trajectory without units", "rps-pin dynamics path.csv --robot micro"),
 )

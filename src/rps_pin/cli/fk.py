@@ -47,6 +47,9 @@ def fk_command(
     - `rps-pin fk --lengths 0.45 0.47 0.46 --near 0.4 0 0` the one near the level pose
     """
     machine = load_robot(robot)
+    low, high = machine.parameters.leg_length_limits
+    if not all(low <= length <= high for length in lengths):
+        typer.echo(f"note: the legs' limits are {low:g} to {high:g} m", err=True)
     if near is None:
         _show_all(machine, machine.assembly_modes(lengths), lengths, as_json=as_json)
     else:
@@ -102,7 +105,7 @@ def _print_modes(modes: AssemblyModes) -> None:
     console = Console()
     count = len(modes.angle)
     if not count:
-        console.print("no way to assemble the robot: these lengths cannot close", highlight=False)
+        console.print("no way was found to assemble the robot with these lengths", highlight=False)
         return
     table = Table("", "z (m)", "tilt_x (rad)", "tilt_y (rad)", "leg angles (degrees)", "mirror")
     for column in table.columns[:5]:
