@@ -4,7 +4,9 @@
 
 One thread, one tick after the other, no waiting between them. Python's garbage collector is frozen
 and switched off during the loop, as a control program would do (`LoopClock` does). Each stage's
-time includes reading the clock. Peers do a tenth of the ticks, in the same run: the same law
+time includes reading the clock. What the machine itself adds (interrupts, other programs, the
+host) shows in a sum that is always the same and takes about as long as a tick: read the other
+tails beside that one. Peers do a tenth of the ticks, in the same run: the same law
 written with Pinocchio and NumPy, with a quadratic program built at each tick, and with MuJoCo, all
 of which must give our forces to 1e-8 N before anything is measured. Linux only (it reads
 /proc/self/statm).
@@ -46,6 +48,8 @@ PERIOD = 1e-3
 GAINS = Gains(400.0, 40.0)
 STATES = 1000
 """The motion is repeated after so many ticks."""
+SAME_WORK = range(3000)
+"""To add these takes about as long as a whole tick."""
 
 
 def motion() -> tuple[Array, Array, Array]:
@@ -78,6 +82,7 @@ def stages(robot: RPSRobot) -> dict[str, Callable[[int], object]]:
     weak = controller(force_limit=4.0)  # the weight alone takes more
     return {
         "clock alone": lambda i: None,
+        "the same sum each tick: the machine's tail": lambda i: sum(SAME_WORK),
         "direct kinematics: estimate": lambda i: loop.estimate(length[i]),
         "state completion": lambda i: state_at(places[i], *triples[i][1:], p.platform_radius),
         "inverse dynamics, state given": lambda i: solve(*states[i]),

@@ -27,7 +27,7 @@ from rps_pin.control.controller import Controller, Space
 from rps_pin.control.gains import Gains
 from rps_pin.control.real_time import Known
 from rps_pin.control.scalar_rates import leg_speed, pose_rate
-from rps_pin.control.scalar_state import state_at
+from rps_pin.control.scalar_state import leg_motion, state_at
 from rps_pin.control.targets import Goal, difference
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.scalar_tracking import Triple
@@ -68,11 +68,10 @@ class ComputedTorque(Controller):
             c1, c2, c3 = self._pid(e, goal.rate, rate, elapsed)
             a1, a2, a3 = goal.acceleration
             return self._solve(state_at(place, rate, (a1 + c1, a2 + c2, a3 + c3), self._h))
-        wanted = state_at(goal.place, goal.rate, goal.acceleration, self._h).legs
-        (_, s1, _, a1), (_, s2, _, a2), (_, s3, _, a3) = wanted
+        speed_wanted, (a1, a2, a3) = leg_motion(goal.place, goal.rate, goal.acceleration, self._h)
         e = difference(goal.place.length, place.length)
-        c1, c2, c3 = self._pid(e, (s1, s2, s3), speed, elapsed)
-        (_, _, _, b1), (_, _, _, b2), (_, _, _, b3) = state_at(place, rate, _STILL, self._h).legs
+        c1, c2, c3 = self._pid(e, speed_wanted, speed, elapsed)
+        _, (b1, b2, b3) = leg_motion(place, rate, _STILL, self._h)
         u = (a1 + c1 - b1, a2 + c2 - b2, a3 + c3 - b3)
         return self._solve(state_at(place, rate, pose_rate(gains, u), self._h))
 

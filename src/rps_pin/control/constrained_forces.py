@@ -60,7 +60,7 @@ class ConstrainedForces:
         self._q, self._v, self._a = state[:13], state[13:25], state[25:]
         self._matrix = np.zeros((model.nv, model.nv), order="F")
         self._factors = eigenpy.PartialPivLU(model.nv)
-        self._of_closures = self._matrix[:, :9]
+        self._closures = self._matrix.T[:9]  # J, in the rows that are the matrix's columns
         for column, name in enumerate(mechanism.actuated):
             self._matrix[model.joints[model.getJointId(name)].idx_v, 9 + column] = 1.0
         p = robot.parameters
@@ -97,9 +97,9 @@ class ConstrainedForces:
         computeJointJacobians(model, data, q)
         for calc, scratch in self._calls:  # getConstraintsJacobian reads what they refresh
             calc(model, data, scratch)
-        self._of_closures[:] = getConstraintsJacobian(
+        self._closures[:] = getConstraintsJacobian(
             model, data, self._constraints, self._constraint_data
-        ).T
+        )
         if self._resisted:
             self._add_friction(force, v)
         self._factors.compute(self._matrix)

@@ -57,6 +57,13 @@ def state_at(place: Place, rate: Triple, acceleration: Triple, h: float) -> Robo
 
 
 @compiled
+def leg_motion(place: Place, rate: Triple, acceleration: Triple, h: float) -> tuple[Triple, Triple]:
+    """Return the legs' speeds and accelerations: those of `state_at`, in less time."""
+    leg1, leg2, leg3 = state_at(place, rate, acceleration, h).legs
+    return (leg1[1], leg2[1], leg3[1]), (leg1[3], leg2[3], leg3[3])
+
+
+@compiled
 def _platform(
     pose: Triple, rate: Triple, acceleration: Triple, changing: _Changing, c: float, h: float
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rps_pin.control.place import Place, place_of, turning_determinant
 from rps_pin.control.scalar_rates import LegGains, force_of_wrench, leg_speed, wrench_of_force
-from rps_pin.control.scalar_state import state_at
+from rps_pin.control.scalar_state import leg_motion, state_at
 from rps_pin.rps.scalar_tracking import follow
 
 _STILL = (0.0, 0.0, 0.0)
@@ -16,5 +16,6 @@ def warm_up(place: Place, gains: LegGains, g: float, h: float) -> None:
     place_of(place.pose, g, h)
     turning_determinant(place, g, h)
     state_at(place, _STILL, _STILL, h)
+    leg_motion(place, _STILL, _STILL, h)
     for transform in (leg_speed, force_of_wrench, wrench_of_force):
         transform(gains, _STILL)
