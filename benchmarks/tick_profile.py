@@ -27,11 +27,10 @@ from rich.table import Table
 from benchmarks.latency import GAINS, PERIOD, machine, motion
 from rps_pin import RPSRobot
 from rps_pin.control import ComputedTorque
-from rps_pin.control.exponential_map import coefficients
 from rps_pin.control.numbers import three_floats
-from rps_pin.control.scalar_rates import leg_gains, platform_twist, pose_rate
+from rps_pin.control.reading import reading_of
 from rps_pin.control.scalar_state import state_at
-from rps_pin.rps.scalar_tracking import follow, pose_of
+from rps_pin.rps.scalar_tracking import follow
 
 _CALLS, _REPEATS = 2000, 15
 _HALF_WAY = 300  # of the motion's ticks
@@ -49,12 +48,10 @@ def parts() -> dict[str, Callable[[], object]]:
         controller.tick(lengths[i], targets[i])
     loop, reading = controller.estimate, lengths[_HALF_WAY]
     known = loop.known
-    place, rate, speed, gains = known
+    place, rate, speed, _ = known
     d = three_floats(reading)
     assert d is not None
     turned, _, _ = follow(place.length, place.way, d, g, h, 1e6, 20)
-    pose = pose_of(d, turned, g, h)
-    tilt = pose[1] ** 2 + pose[2] ** 2
     wanted = (1.0, 2.0, 3.0)
     state = state_at(place, rate, wanted, h)
     goal = controller._targets.goal
@@ -74,16 +71,11 @@ def parts() -> dict[str, Callable[[], object]]:
         "direct kinematics, Newton's method": lambda: follow(
             place.length, place.way, d, g, h, 1e6, 20
         ),
-        "pose of leg angles": lambda: pose_of(d, turned, g, h),
-        "rates, twist": lambda: (
-            leg_gains(pose, turned, coefficients(tilt), h),
-            pose_rate(gains, speed),
-            platform_twist(pose, rate, place.coefficient, h),
-        ),
+        "pose, rates, twist, gains": lambda: reading_of(d, turned, speed, g, h),
         "limits, answers written": lambda: (
             loop._limits.broken(place),
             loop._limits.too_fast(speed),
-            loop._write(pose, rate, (0.0,) * 6, place.angle, speed),
+            loop._write(place.pose, rate, (0.0,) * 6, place.angle, speed),
         ),
         "target: legs, limits, singularity": lambda: controller._targets._allowed(goal.place.pose),
         "the law": lambda: controller._pid(errors, rate, rate, PERIOD),

@@ -20,6 +20,7 @@ from rps_pin.control import (
     effective_inertia,
     exponential_map,
     place,
+    reading,
     scalar_rates,
     scalar_state,
 )
@@ -27,7 +28,7 @@ from rps_pin.rps import scalar_tracking
 from rps_pin.rps.compiled import COMPILES
 
 pytestmark = pytest.mark.skipif(not COMPILES, reason="Numba is not installed, or switched off")
-MODULES = [exponential_map, place, scalar_rates, scalar_state, scalar_tracking]
+MODULES = [exponential_map, place, reading, scalar_rates, scalar_state, scalar_tracking]
 RNG = np.random.default_rng(11)
 ROBOT = RPSRobot.from_preset("micro")
 G, H = ROBOT.parameters.base_radius, ROBOT.parameters.platform_radius
@@ -79,6 +80,8 @@ def answers(f: dict[str, Any], numbers: list[Any]) -> list[float]:
             *(f["pose_rate"](gains, rate), f["leg_speed"](gains, rate)),
             *(f["force_of_wrench"](gains, rate), f["wrench_of_force"](gains, rate)),
             f["platform_twist"](pose, rate, at.coefficient, H),
+            f["leg_motion"](at, rate, acceleration, H),
+            f["reading_of"](goal, followed.way, rate, G, H),
         )
     )
 

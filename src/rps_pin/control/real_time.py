@@ -10,18 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.control.answers import Answers
 from rps_pin.control.constrained_forces import ConstrainedForces
-from rps_pin.control.exponential_map import coefficients
 from rps_pin.control.limit_check import LimitCheck
 from rps_pin.control.numbers import Numbers, elapsed_time, three_floats
 from rps_pin.control.place import Place, place_of, turning_determinant
-from rps_pin.control.scalar_rates import (
-    LeastGain,
-    LegGains,
-    Twist,
-    leg_gains,
-    platform_twist,
-    pose_rate,
-)
+from rps_pin.control.reading import reading_of
+from rps_pin.control.scalar_rates import LeastGain, LegGains, Twist
 from rps_pin.control.scalar_state import RobotState, state_at
 from rps_pin.control.speed_filter import SpeedFilter
 from rps_pin.control.status import STATUSES, Status
@@ -38,7 +31,6 @@ from rps_pin.rps.scalar_tracking import (
     condition_of,
     direction_of_legs,
     follow,
-    pose_of,
 )
 
 Array = NDArray[np.float64]
@@ -327,23 +319,12 @@ class RealTimeRobot:
 
     def _accept(self, d: Triple, way: Way, speed: Triple) -> Status:
         """Put what a followed reading says in the answers, unless its rates are not finite."""
-        g, h = self._g, self._h
-        pose = pose_of(d, way, g, h)
-        _, wx, wy = pose
-        coefficient = coefficients(wx * wx + wy * wy)
-        gains = leg_gains(pose, way, coefficient, h)
-        if gains.determinant == 0.0:
+        reading = reading_of(d, way, speed, self._g, self._h)
+        if reading is None:
             return self._keep(_NOT_CONVERGED | _NEAR_SINGULAR)
-        rate = pose_rate(gains, speed)
-        twist = platform_twist(pose, rate, coefficient, h)
+        place, rate, twist, gains = reading
         if not math.isfinite(sum(twist)):  # the rate is in it
             return self._keep(_BAD_INPUT)
-        angle = (
-            math.atan2(way[3], way[0]),
-            math.atan2(way[4], way[1]),
-            math.atan2(way[5], way[2]),
-        )
-        place = Place(pose, d, angle, way, coefficient)
         self._distance, self.determinant = None, gains.determinant
         number = self._place_number = _BEYOND_LIMIT if self._limits.broken(place) else 0
         if self._limits.too_fast(speed):
@@ -353,7 +334,7 @@ class RealTimeRobot:
         if not abs(gains.determinant) >= self._near and self.distance < self._near:
             number |= _NEAR_SINGULAR
         self._filter.follow(d, speed)
-        self._write(pose, rate, twist, angle, speed)
+        self._write(place.pose, rate, twist, place.angle, speed)
         self.age, self.elapsed = 0, 0.0
         self.status = status = STATUSES[number]
         return status
