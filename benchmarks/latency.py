@@ -223,7 +223,7 @@ def main() -> None:
     parser.add_argument("--ticks", type=int, default=1_000_000, help="of each stage")
     parser.add_argument("--json", type=Path, help="write the figures into this file too")
     asked = parser.parse_args()
-    console = Console()
+    console = Console(width=110)  # for the table, in a pipe too
     found = measure_all(asked.ticks, console)
     table = Table("stage", title=f"us a tick, {asked.ticks:,} ticks a stage, peers a tenth")
     for column in ("median", "p99", "p99.9", "quietest tenth", "maximum", "grew, kB"):

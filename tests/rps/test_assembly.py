@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -95,7 +96,24 @@ def random_case(rng: np.random.Generator) -> tuple[Array, float, float]:
     return rng.uniform(0.1, 2.5, 3) * g, g, h
 
 
-def check(count: int, seed: int = 0, starts: int = 400, *, progress: bool = False) -> Counts:
+def long_legs(rng: np.random.Generator) -> tuple[Array, float, float]:
+    """The same with legs of 2 to 60 times the radii, which closed are all but parallel."""
+    g = rng.uniform(0.2, 0.8)
+    h = g * rng.uniform(0.3, 1.5)
+    far = (g + h) * 10 ** rng.uniform(0.3, 1.8)
+    if rng.random() < 0.5:
+        return inverse(np.append(far, rng.uniform(-1.2, 1.2, 2)), g, h)[0], g, h
+    return far + rng.uniform(-0.5, 0.5, 3) * h, g, h
+
+
+def check(
+    count: int,
+    seed: int = 0,
+    starts: int = 400,
+    case_of: Callable[[np.random.Generator], tuple[Array, float, float]] = random_case,
+    *,
+    progress: bool = False,
+) -> Counts:
     """Compare all modes with the search's on random robots; fails where one is missing.
 
     A solution the search found must be among the modes. A mode the search did not find is proved by
@@ -106,7 +124,7 @@ def check(count: int, seed: int = 0, starts: int = 400, *, progress: bool = Fals
     solutions = missed = near_double = 0
     worst = 0.0
     for case in range(count):
-        length, g, h = random_case(rng)
+        length, g, h = case_of(rng)
         modes = assembly_modes(length, g, h)
         k = len(modes.angle)
         solutions += k
@@ -115,7 +133,10 @@ def check(count: int, seed: int = 0, starts: int = 400, *, progress: bool = Fals
         for i in range(k):
             others = np.delete(modes.angle, i, axis=0)
             assert (chord(others, modes.angle[i]) > 1e-8).all(), (case, "listed twice", i)
-        start = rng.uniform(-np.pi, np.pi, (starts, 3))
+        # A tip is within 2 h of the axis, or it is too far from the other legs' planes.
+        within = (g + rng.uniform(-2 * h, 2 * h, (starts, 3))) / length
+        start = np.arccos(np.clip(within, -1, 1)) * rng.choice([-1, 1], (starts, 3))
+        start[: starts // 2] = rng.uniform(-np.pi, np.pi, (starts // 2, 3))
         start[:, 0] = np.abs(start[:, 0])  # the other half is mirrored
         seen = np.zeros(k, dtype=bool)
         for angle in search(length, g, h, start):
@@ -140,6 +161,22 @@ def test_modes_are_those_of_a_dense_search_on_random_robots() -> None:
     assert counts.solutions > 1000
     assert counts.largest_residual < 1e-12
     assert counts.missed_by_search <= 0.01 * counts.solutions  # or the search proves little
+
+
+def test_so_are_those_of_legs_much_longer_than_the_radii() -> None:
+    counts = check(60, starts=800, case_of=long_legs)
+    assert counts.solutions > 300
+    assert counts.missed_by_search <= 0.01 * counts.solutions
+
+
+@pytest.mark.parametrize("far", [3.0, 10.0, 30.0, 100.0])
+def test_long_legs_of_a_pose_have_that_pose(far: float) -> None:
+    g, h = 0.12, 0.12
+    rng = np.random.default_rng(3)
+    pose = np.column_stack([np.full(300, far * (g + h)), rng.uniform(-1.2, 1.2, (300, 2))])
+    modes = assembly_modes(inverse(pose, g, h)[0], g, h)
+    apart = np.abs(modes.pose - pose[:, None]).max(axis=-1)
+    assert (np.nanmin(apart, axis=1) < 1e-9 * far).all()
 
 
 # Axioms -------------------------------------------------------------------------------------------

@@ -120,9 +120,9 @@ def test_nothing_is_compiled_in_a_loop() -> None:
     before = {f: len(f.signatures) for f in COMPILED}
     assert max(before.values()) > 0  # other tests in this process may have asked for more
     for controller in ready:
-        for reading in (length, length.tolist(), None, length + 1e-6, [1, 2, 3], length):
+        for lengths in (length, length.tolist(), None, length + 1e-6, [1, 2, 3], length):
             for target in (None, (start, still, still), ([1, 0, 0], [0, 0, 0], [0, 0, 0])):
-                controller.tick(reading, target)
+                controller.tick(lengths, target)
                 controller.tick(reading, target, [0, 0, 0], dt=1)
         for _ in range(6):
             controller.tick(None)

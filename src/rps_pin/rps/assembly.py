@@ -54,8 +54,6 @@ _CROWDED, _UNFIT = 3e-3, 0.1
 _TURN = np.arange(3)
 #: Largest |f_23| over 3 h^2 with which a pair of points on the circles is tried.
 _NEARLY_CLOSED = 1e-2
-#: Tip distances are right to this part of g + h: 1e-12 m for robots of some metres.
-_TOLERANCE = 2.5e-13
 #: Solutions this close, in the tips' directions, are one; singular ones are less sharp.
 _SAME, _SAME_DOUBLE = 1e-8, 1e-5
 #: Below this determinant (see `leg_equations.determinant`) a solution counts as double: another one
@@ -114,7 +112,8 @@ def assembly_modes(length: ArrayLike, base_radius: float, platform_radius: float
     -------
     AssemblyModes
         None (k = 0, or `exists` false everywhere) if the lengths cannot close. Every tip distance
-        is right to 2.5e-13 (g + h). No limit of a robot is applied.
+        is right to 2.5e-13 of g + h, or of the longest leg if that is longer. No limit of a robot
+        is applied. Legs of more than 100 (g + h) may have more solutions than are found.
 
     Raises
     ------
@@ -203,14 +202,12 @@ def _solutions(length: Array, g: float, h: float) -> tuple[Array, NDArray[np.int
     fitness = np.abs(3 * g - length) / (3 * g + length)
     best = np.argmax(fitness, axis=1)
     every = np.arange(len(length))
-    x = _zeros(length[every[:, None], (best[:, None] + _TURN) % 3], g, h)
-    with np.errstate(invalid="ignore"):  # NaN - NaN
-        crowded = (np.diff(np.sort(x, axis=1), axis=1) < _CROWDED).any(axis=1)
+    x, crowded = _zeros(length[every[:, None], (best[:, None] + _TURN) % 3], g, h)
     hard = np.flatnonzero(crowded | (fitness[every, best] < _UNFIT))
     tries = [_from_leg(every, best, length, x, g, h)]
     for other in (1, 2):
         leg = (best[hard] + other) % 3
-        x = _zeros(length[hard[:, None], (leg[:, None] + _TURN) % 3], g, h)
+        x, _ = _zeros(length[hard[:, None], (leg[:, None] + _TURN) % 3], g, h)
         tries.append(_from_leg(hard, leg, length, x, g, h))
     owner, w, z = _polished(length, *_joined(tries), g, h)
     twin = _twins(length, owner, w, z, g, h)
@@ -240,9 +237,14 @@ def _joined(parts: list[Candidates]) -> Candidates:
     return owner, w, z
 
 
-def _zeros(length: Array, g: float, h: float) -> Array:
-    """Return the eliminant's zeros that may be real, (n, 8), as x in [-1, 1]; NaN for the rest."""
-    values = eliminant(length, _NODES[:, None], g, h)
+def _zeros(length: Array, g: float, h: float) -> tuple[Array, Mask]:
+    """Return the eliminant's zeros that may be real, (n, 8), and whether any two are close, (n,).
+
+    As x = cos(phi_1); NaN for the rest.
+    """
+    low, high = _interval(length[:, 0], g, h)
+    middle, half = (low + high) / 2, (high - low) / 2
+    values = eliminant(length, middle + half * _NODES[:, None], g, h)
     series = _TO_SERIES @ values  # (3 shifts, 9, n)
     size = np.abs(series).max(axis=1)
     series /= np.where(size > 0, size, 1.0)[:, None]
@@ -255,8 +257,20 @@ def _zeros(length: Array, g: float, h: float) -> Array:
     y = np.linalg.eigvals(_colleague(chosen))
     likely = (np.abs(y.imag) < _NEARLY_REAL) & (np.abs(y.real) < 1 + _NEARLY_REAL)
     a = _SHIFTS[choice, None]
-    x = np.clip((y.real + a) / (1 + a * y.real), -1.0, 1.0)
-    return np.where(likely, x, np.nan)
+    t = np.where(likely, np.clip((y.real + a) / (1 + a * y.real), -1.0, 1.0), np.nan)
+    with np.errstate(invalid="ignore"):  # NaN - NaN
+        crowded: Mask = np.any(np.diff(np.sort(t, axis=1), axis=1) < _CROWDED, axis=1)
+    return middle[:, None] + half[:, None] * t, crowded
+
+
+def _interval(d: Array, g: float, h: float) -> tuple[Array, Array]:
+    """Return between which x = cos(phi_1) a leg of length d can close: most of [-1, 1], or little.
+
+    The tips of the other two legs are in planes at 120 degrees to this one's: a tip at rho is at
+    least |rho| sin(60 degrees) from them, and at most sqrt(3) h. So |rho| <= 2 h, d x = g - rho.
+    """
+    low, high = np.maximum((g - 2 * h) / d, -1.0), np.minimum((g + 2 * h) / d, 1.0)
+    return np.minimum(low, 1.0), high
 
 
 def _candidates(length: Array, x: Array, g: float, h: float) -> Candidates:
@@ -282,7 +296,7 @@ def _polished(
 ) -> Candidates:
     """Return the candidates that Newton's method turns into solutions."""
     d = length[owner].T
-    tolerance = _TOLERANCE * (g + h)
+    tolerance = eq.closing_tolerance(d, g, h)
     # Stop at the tolerance: beside a double solution, more steps would lead away again. Then take
     # as many as make it better.
     eq.newton(d, w, z, g, h, 0.5 * tolerance / eq.WITHIN, _STEPS)
@@ -292,7 +306,7 @@ def _polished(
     better = np.flatnonzero(error > _ROUNDING * (g + h))
     for _ in range(_POLISHING_STEPS):
         w_next, z_next = w[:, better], z[:, better]
-        eq.newton(d[:, better], w_next, z_next, g, h, 1e-9 * tolerance, 1)
+        eq.newton(d[:, better], w_next, z_next, g, h, 0.0, 1)
         error_next = eq.largest(eq.distance_errors(w_next, z_next, g, h))
         gain = error_next < error[better]
         better = better[gain]
@@ -336,7 +350,8 @@ def _twins(
 def _flat(length: Array, g: float, h: float) -> Candidates:
     """Return the solutions with all tips on the base plane: highly singular, so tried directly."""
     w = length.T[:, :, None] * _SIDES[:, None, :]
-    closed = eq.largest(eq.distance_errors(w, 0 * w, g, h)) <= _TOLERANCE * (g + h)
+    tolerance = eq.closing_tolerance(length.T, g, h)
+    closed = eq.largest(eq.distance_errors(w, 0 * w, g, h)) <= tolerance[:, None]
     owner, side = np.nonzero(closed)
     w = w[:, owner, side]
     return owner, w, np.zeros_like(w)

@@ -52,8 +52,6 @@ CONDITION_LIMIT = 1e6
 #: covers about a tenth of what is left.
 _MOST_STEPS = 1000
 _MOST_NEWTON = 12
-#: Tip distances are right to this part of g + h.
-_TOLERANCE = 2.5e-13
 _SQRT3 = math.sqrt(3.0)
 
 
@@ -278,13 +276,14 @@ def _followed(
         good = np.flatnonzero(small)
         w, z, d_good = w[:, good], z[:, good], d[:, good]
         before = cosine[:, going[good]], sine[:, going[good]]
-        eq.newton(d_good, w, z, g, h, _TOLERANCE * (g + h), _MOST_NEWTON)
+        tolerance = eq.closing_tolerance(d_good, g, h)
+        eq.newton(d_good, w, z, g, h, tolerance, _MOST_NEWTON)
         error = eq.largest(eq.distance_errors(w, z, g, h))
         w, z = w / d_good, z / d_good
         shift = np.abs(np.arcsin(np.clip(z * before[0] - w * before[1], -1, 1))).max(axis=0)
         there, same = _condition_and_sign(d_good, w, z, g)
         # To rounding: a step of nothing moves by nothing.
-        right = (error <= _TOLERANCE * (g + h)) & (shift <= 2 * moved[good] + 1e-12)
+        right = (error <= tolerance) & (shift <= 2 * moved[good] + 1e-12)
         right &= (there <= limit) & (same == sign[going[good]])
         accepted = good[right]
         share[going] *= np.clip(0.8 * TRUST / np.maximum(kantorovich, 1e-300), 0.02, 0.5)

@@ -38,6 +38,8 @@ PAIRS = ((0, 1), (1, 2), (2, 0))
 
 #: Triples worked on at a time: few enough for their arrays to stay in the processor's cache.
 _BLOCK = 8192
+#: Tip distances can be right to this part of g + h, or of the longest leg: 1e-12 m for some metres.
+_ACCURACY = 2.5e-13
 #: Share of the tolerance that Newton's method goes for.
 WITHIN = 1e-2
 #: Half a step, rad, after which another one would only move rounding errors.
@@ -336,14 +338,17 @@ def _checked_steps(tolerance: float, iterations: int) -> int:
 
 
 def newton(
-    d: Array, w: Array, z: Array, g: float, h: float, tolerance: float, iterations: int
+    d: Array, w: Array, z: Array, g: float, h: float, tolerance: ArrayLike, iterations: int
 ) -> None:
     """Turn the tips (w, z), shape (3, n), by Newton's steps until Eq. 8 holds; in place.
+
+    The tolerance, m, is a number or one for each triple.
 
     A triple is done when its error is far within the tolerance, or when a step was so small that
     its square, which is what is left, is lost in rounding.
     """
-    small = 2 * _SQRT3 * h * tolerance * WITHIN
+    within = np.asarray(tolerance)
+    small = 2 * _SQRT3 * h * WITHIN * within
     constant = constants(d, g, h)
     wanting = np.ones(d.shape[1], dtype=bool)
     for step in range(iterations):
@@ -355,7 +360,8 @@ def newton(
         if left < _FEW * len(wanting):
             few = np.flatnonzero(wanting)
             w_few, z_few = w[:, few], z[:, few]
-            newton(d[:, few], w_few, z_few, g, h, tolerance, iterations - step)
+            of_few = within[few] if within.ndim else within
+            newton(d[:, few], w_few, z_few, g, h, of_few, iterations - step)
             w[:, few], z[:, few] = w_few, z_few
             return
         (a1, a2), (b2, b3), (c3, c1) = by_angle = slopes(w, z, g)
@@ -367,6 +373,11 @@ def newton(
         for leg, t in enumerate((t1, t2, t3)):
             turn(w[leg], z[leg], np.minimum(np.maximum(t, -1.0), 1.0))
         wanting &= largest((t1, t2, t3)) > _LAST_STEP
+
+
+def closing_tolerance(d: Array, g: float, h: float) -> Array:
+    """Return the error of a tip distance with which lengths (3, n) count as closed, (n,), m."""
+    return np.asarray(_ACCURACY * np.maximum(g + h, d.max(axis=0, initial=0.0)))
 
 
 def turn(w: Array, z: Array, t: Array) -> None:
