@@ -27,6 +27,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 
+from rps_pin.errors import InputError
 from rps_pin.rps import leg_equations as eq
 from rps_pin.rps.leg_equations import (
     Array,
@@ -113,15 +114,21 @@ def assembly_modes(length: ArrayLike, base_radius: float, platform_radius: float
     AssemblyModes
         None (k = 0, or `exists` false everywhere) if the lengths cannot close. Every tip distance
         is right to 2.5e-13 of g + h, or of the longest leg if that is longer. No limit of a robot
-        is applied. Legs of more than 100 (g + h) may have more solutions than are found.
+        is applied.
 
     Raises
     ------
     InputError
-        If the lengths have the wrong shape, or a number is not finite and positive.
+        If the lengths have the wrong shape, a number is not finite and positive, or a leg is longer
+        than 100 (g + h): there rounding would hide solutions.
     """
     lengths = checked_lengths(length)
     g, h = checked_radii(base_radius, platform_radius)
+    if lengths.max(initial=0.0) > longest_leg(g, h):
+        raise InputError(
+            f"a leg is {lengths.max():.6g} m long; all solutions can be found up to "
+            f"{longest_leg(g, h):.6g} m, 100 times base_radius + platform_radius"
+        )
     flat = lengths.reshape(-1, 3)
     angle = np.full((len(flat), MOST_MODES, 3), np.nan)
     mirror = np.full((len(flat), MOST_MODES), -1, dtype=np.intp)
@@ -134,6 +141,11 @@ def assembly_modes(length: ArrayLike, base_radius: float, platform_radius: float
     else:
         fields = [field.reshape(*lengths.shape[:-1], *field.shape[1:]) for field in modes]
     return AssemblyModes(*fields)
+
+
+def longest_leg(base_radius: float, platform_radius: float) -> float:
+    """Return the length up to which all solutions are found, m."""
+    return 100 * (base_radius + platform_radius)
 
 
 def eliminant(length: Array, cosine: Array, base_radius: float, platform_radius: float) -> Array:

@@ -27,7 +27,7 @@ from scipy.optimize import least_squares
 
 from rps_pin.errors import ClosureError, InputError, SingularityError
 from rps_pin.rps import leg_equations as eq
-from rps_pin.rps.assembly import assembly_modes
+from rps_pin.rps.assembly import assembly_modes, longest_leg
 from rps_pin.rps.leg_equations import (
     Array,
     checked_lengths,
@@ -369,7 +369,7 @@ def _refuse(
     asked = f"leg lengths ({goal[0]:.6g}, {goal[1]:.6g}, {goal[2]:.6g}) m"
     if where:
         asked += f" (entry {where if len(where) > 1 else where[0]})"
-    if not len(assembly_modes(goal, g, h).angle):
+    if goal.max() <= longest_leg(g, h) and not len(assembly_modes(goal, g, h).angle):
         best = least_squares(_residuals_of, angle, args=(goal, g, h))
         gap = float(np.abs(best.fun).max())
         raise ClosureError(
@@ -380,7 +380,7 @@ def _refuse(
     raise SingularityError(
         f"{asked} cannot be reached from the pose given: after {fraction:.4%} of the way a "
         f"parallel singularity is met (condition {condition:.3g}, limit {limit:.3g}). "
-        "assembly_modes lists the poses that have these lengths",
+        "assembly_modes lists the poses that have such lengths",
         float(condition),
         limit,
     )
