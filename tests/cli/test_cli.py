@@ -208,6 +208,29 @@ def test_view_serves_this_machine_until_ctrl_c(arguments: list[str]) -> None:
     assert errors == ""
 
 
+@pytest.mark.parametrize("arguments", [["--robot", "micro"], ["--mechanism", "delta"]])
+def test_view_interactive_serves_this_machine_until_ctrl_c(arguments: list[str]) -> None:
+    command = [sys.executable, "-u", "-c", "from rps_pin.cli import main; main()", "view", "-i"]
+    process = subprocess.Popen(
+        [*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        address = line.split()[1]
+        assert line.startswith("Open http://127.0.0.1:")
+        with urllib.request.urlopen(address, timeout=60) as page:
+            assert "viser" in page.read().decode().lower()
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 0
+    assert "ended" in output
+    assert errors == ""
+
+
 def test_ik_prints_lengths_and_refuses_what_is_out_of_reach() -> None:
     pose = ("--pose", "0.22", "0.1", "-0.05")
     answer = json.loads(rps_pin("ik", "--robot", "micro", *pose, "--json").stdout)

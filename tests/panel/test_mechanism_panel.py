@@ -48,3 +48,35 @@ def test_what_cannot_be_closed_is_said_and_the_last_stays() -> None:
         assert not panel.move("joints", values)
         assert panel.trouble[0].startswith("not followed: ")
         np.testing.assert_array_equal(panel.configuration, before)
+
+
+def test_a_passive_joint_beyond_its_limit_is_shown_and_said(tmp_path: Path) -> None:
+    """The coupler of this four-bar must stay below 0.2 rad; it cannot where the crank is low."""
+    text = (URDF / "four_bar.urdf").read_text("utf-8")
+    crank, coupler = text.split('<joint name="coupler_joint"')
+    coupler = coupler.replace('lower="-6.283185307179586"', 'lower="-2.0"', 1)
+    coupler = coupler.replace('upper="6.283185307179586"', 'upper="0.2"', 1)
+    (tmp_path / "four_bar.urdf").write_text(f'{crank}<joint name="coupler_joint"{coupler}')
+    (tmp_path / "four_bar.yaml").write_text((URDF / "four_bar.yaml").read_text("utf-8"))
+    panel = MechanismPanel(ClosedLoopModel.load(tmp_path / "four_bar.yaml"))
+    assert panel.trouble == []
+    assert panel.move("joints", [0.056])
+    assert panel.configuration[1] > 0.8
+    (words,) = panel.trouble
+    assert words.startswith("joint 'coupler_joint' at 0.81")
+    assert panel.mechanism.loop_gap(panel.configuration) < 1e-9
+    assert panel.move("joints", [1.0])
+    assert panel.trouble == []
+
+
+def test_an_actuator_that_is_too_weak_to_hold_it_is_said() -> None:
+    mechanism = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    joint = mechanism.model.joints[mechanism.model.getJointId("crank_joint")]
+    mechanism.model.upperEffortLimit[joint.idx_v] = 1e-3
+    mechanism.model.lowerEffortLimit[joint.idx_v] = -1e-3
+    panel = MechanismPanel(mechanism)
+    still = np.zeros(mechanism.model.nv)
+    (needed,) = mechanism.inverse_dynamics(panel.configuration, still, still).tau
+    assert abs(needed) > 1e-3
+    (words,) = panel.trouble
+    assert words == f"joint 'crank_joint' would need {needed:.6g} N m (-0.001 to 0.001)"

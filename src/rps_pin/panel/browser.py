@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import threading
 from typing import Any, Self
 
@@ -9,9 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.errors import RPSPinError
-from rps_pin.panel.sliders import Panel
+from rps_pin.panel.sliders import Panel, as_html
 
 HOST = "127.0.0.1"
+_STYLE = "font-size: 85%; line-height: 1.3; margin: 0 0.8em 0.8em"
 
 
 class BrowserPanel:
@@ -45,7 +48,10 @@ class BrowserPanel:
                 "the panel in the browser needs viser: pip install 'rps-pin[panel]'"
             ) from None
         self._panel, self._lock, self._following = panel, threading.RLock(), False
-        self._server: Any = viser.ViserServer(host=HOST, port=port or 8080, verbose=False)
+        with contextlib.redirect_stdout(io.StringIO()):  # the address is ours to tell
+            self._server: Any = viser.ViserServer(host=HOST, port=port or 8080, verbose=False)
+        # A page can ask viser for a tunnel to the world: there is none from here.
+        self._server.request_share_url = lambda *_, **__: None
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
         self.url = f"http://{HOST}:{self._server.get_port()}"
         self._show_robot()
@@ -54,7 +60,7 @@ class BrowserPanel:
             group: [self._slider(group, k) for k in range(len(sliders))]
             for group, sliders in panel.groups.items()
         }
-        self._text = self._server.gui.add_markdown("")
+        self._text = self._server.gui.add_html("")
         self._update()
 
     def __enter__(self) -> Self:
@@ -65,7 +71,7 @@ class BrowserPanel:
 
     @property
     def text(self) -> str:
-        """What is read out, as Markdown."""
+        """What is read out, as HTML."""
         return str(self._text.content)
 
     def move(self, group: str, shown: list[float]) -> None:
@@ -88,6 +94,13 @@ class BrowserPanel:
         points = np.array([place.translation for place in data.oMf])
         middle, size = points.mean(axis=0), float(np.ptp(points, axis=0).max()) or 1.0
         scene = self._server.scene
+        # No shadows nor reflections: without a GPU they take half of the page's frames.
+        scene.configure_default_lights(enabled=False)
+        scene.configure_environment_map(None)
+        scene.add_light_hemisphere("/light/sky", intensity=2.0)
+        scene.add_light_directional(
+            "/light/sun", intensity=1.5, position=(1.0, -1.0, 2.0), cast_shadow=False
+        )
         scene.add_grid(
             "/floor",
             width=4 * size,
@@ -124,9 +137,7 @@ class BrowserPanel:
 
     def _update(self, moved: str | None = None) -> None:
         self._robot.display(self._panel.configuration)
-        rows = [f"| {name} | {value} |" for name, value in self._panel.readings()]
-        trouble = [f"**{words}**\n" for words in self._panel.trouble] or ["within all limits\n"]
-        self._text.content = "\n".join(["| | |", "|---|---|", *rows, "", *trouble])
+        self._text.content = f'<div style="{_STYLE}">{as_html(self._panel)}</div>'
         self._following = True
         try:
             for group, handles in self._sliders.items():

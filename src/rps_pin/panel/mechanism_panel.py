@@ -10,6 +10,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.closed_loop.limits import JointLimits
 from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.panel.sliders import Slider, asked_of, told
@@ -21,8 +22,9 @@ _MM, _DEGREE = 1e3, 180.0 / math.pi
 class MechanismPanel:
     """Sliders of a mechanism's actuated joints, in one group, ``"joints"``.
 
-    The loops are closed round what the sliders say. Where they cannot be, the last good
-    configuration stays, and `trouble` says why.
+    The loops are closed round what the sliders say, from where they were. Other joints may go
+    beyond their limits, or actuators need more than theirs: that is shown, and said in `trouble`.
+    Where the loops cannot be closed the last good configuration stays, and `trouble` says why.
 
     Parameters
     ----------
@@ -53,10 +55,11 @@ class MechanismPanel:
                 raise InputError(
                     f"the actuated joint {name!r} has {joint.nq} coordinates; a slider moves one"
                 )
+        self._limits = JointLimits(model)
         self._q: Array = mechanism.close(mechanism.home if q is None else q)
         self._angular = ["P" not in joint.shortname()[10:11] for joint in self._joints]
         self.groups = {"joints": tuple(map(self._slider, range(len(self._joints))))}
-        self.trouble: list[str] = []
+        self._take(self._q)
 
     def values(self, group: str = "joints") -> Array:
         """Return the actuated joints' coordinates, rad or m."""
@@ -67,32 +70,30 @@ class MechanismPanel:
         try:
             asked = asked_of(self.groups, group, values)
             wanted = dict(zip(self.mechanism.actuated, asked.tolist(), strict=True))
-            self._q = self.mechanism.complete(wanted, self._q)
+            closed = self.mechanism.complete(wanted, self._q, within_limits=False)
         except RPSPinError as error:
-            self.trouble = [f"not followed: {error}"]
+            self.trouble = [*self._beyond(), f"not followed: {error}"]
             return False
-        self.trouble = []
+        self._take(closed)
         return True
 
     def readings(self) -> list[tuple[str, str]]:
         """Return the joints, the forces that hold the weight, conditioning and gap."""
-        still = np.zeros(self.mechanism.model.nv)
         rows = [
             (name, told(value, _DEGREE, "degrees") if angular else told(value, _MM, "mm"))
             for name, value, angular in zip(
                 self.mechanism.actuated, self.values(), self._angular, strict=True
             )
         ]
-        try:
-            held = self.mechanism.inverse_dynamics(self._q, still, still)
+        if isinstance(self._held, str):
+            rows.append(("holds", self._held))
+        else:
             rows += [
                 (f"holds: {name}", told(tau, 1.0, "N m" if angular else "N"))
                 for name, tau, angular in zip(
-                    self.mechanism.actuated, held.tau, self._angular, strict=True
+                    self.mechanism.actuated, self._held, self._angular, strict=True
                 )
             ]
-        except RPSPinError as error:
-            rows.append(("holds", str(error)))
         rows.append(("condition of the passive joints", f"{self.mechanism.condition(self._q):.3f}"))
         rows.append(("largest loop gap", f"{self.mechanism.loop_gap(self._q):.1e} m"))
         return rows
@@ -105,6 +106,34 @@ class MechanismPanel:
     def visual_model(self) -> pin.GeometryModel:
         """Return its shapes."""
         return skeleton(self.mechanism) if self._visual is None else self._visual
+
+    def _take(self, q: Array) -> None:
+        """Stand in a closed configuration."""
+        still = np.zeros(self.mechanism.model.nv)
+        self._q = q
+        self._held: Array | str
+        try:
+            self._held = self.mechanism.inverse_dynamics(q, still, still).tau
+        except RPSPinError as error:
+            self._held = str(error)
+        self.trouble = self._beyond()
+
+    def _beyond(self) -> list[str]:
+        """Return a sentence for each limit that is broken where the mechanism stands."""
+        words = [f"joint {phrase}" for phrase in self._limits.outside(self._q).values()]
+        if isinstance(self._held, str):
+            return words
+        model = self.mechanism.model
+        for name, joint, tau, angular in zip(
+            self.mechanism.actuated, self._joints, self._held.tolist(), self._angular, strict=True
+        ):
+            low, high = model.lowerEffortLimit[joint.idx_v], model.upperEffortLimit[joint.idx_v]
+            if not low <= tau <= high:
+                unit = "N m" if angular else "N"
+                words.append(
+                    f"joint {name!r} would need {tau:.6g} {unit} ({low:.6g} to {high:.6g})"
+                )
+        return words
 
     def _slider(self, number: int) -> Slider:
         joint, angular = self._joints[number], self._angular[number]

@@ -6,7 +6,7 @@ import html
 from typing import Any, Self
 
 from rps_pin.errors import RPSPinError
-from rps_pin.panel.sliders import Panel
+from rps_pin.panel.sliders import Panel, as_html
 from rps_pin.viewer.scene import Scene
 from rps_pin.viewer.server import LocalViewer
 
@@ -109,14 +109,7 @@ class NotebookPanel:
 
     def _update(self, moved: str | None = None) -> None:
         self._scene.display(self._panel.configuration)
-        rows = "".join(
-            f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
-            for name, value in self._panel.readings()
-        )
-        words = "<br>".join(map(html.escape, self._panel.trouble))
-        colour = "#b00000" if words else "#006000"
-        said = f'<p style="color:{colour}">{words or "within all limits"}</p>'
-        self.text.value = f"<table>{rows}</table>{said}"
+        self.text.value = as_html(self._panel)
         self._following = True
         try:
             for group, handles in self._sliders.items():

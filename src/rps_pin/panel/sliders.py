@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -76,7 +77,20 @@ def asked_of(groups: dict[str, tuple[Slider, ...]], group: str, values: Any) -> 
     return asked
 
 
+def as_html(panel: Panel) -> str:
+    """Return what is read out, what is wrong first: a line, and a table of the readings."""
+    words = "<br>".join(map(html.escape, panel.trouble))
+    colour = "#b00000" if words else "#006000"
+    rows = "".join(
+        f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
+        for name, value in panel.readings()
+    )
+    said = f'<p style="color:{colour}; margin: 0.5em 0">{words or "within all limits"}</p>'
+    return f"{said}<table>{rows}</table>"
+
+
 def told(values: Any, scale: float, unit: str, digits: int = 3) -> str:
     """Return numbers as read out: ``(1.000, 2.000) mm``."""
-    shown = [f"{scale * float(value):.{digits}f}" for value in np.atleast_1d(values)]
+    rounded = np.round(scale * np.atleast_1d(values), digits) + 0.0  # no -0
+    shown = [f"{value:.{digits}f}" for value in rounded.tolist()]
     return (shown[0] if len(shown) == 1 else f"({', '.join(shown)})") + f" {unit}"

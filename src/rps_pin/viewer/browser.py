@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 """Programs that are looked for, after the one that ``RPS_PIN_CHROMIUM`` names."""
-_ARGUMENTS = (
+ARGUMENTS = (
     "--no-sandbox",
     # WebGL without a graphics card: Chromium's own software renderer, the same everywhere.
     "--use-gl=angle",
@@ -73,7 +73,7 @@ def opened_page(text: str, size: tuple[int, int], scale: float) -> Iterator[Page
     with sync_playwright() as playwright:
         try:
             browser = playwright.chromium.launch(
-                executable_path=find_browser(), args=list(_ARGUMENTS)
+                executable_path=find_browser(), args=list(ARGUMENTS)
             )
         except Error as error:
             raise RPSPinError(
