@@ -69,7 +69,7 @@ def test_the_page_is_for_this_machine_only(served: BrowserPanel) -> None:
     with socket.socket() as other:
         other.settimeout(5)
         # 127.0.0.2 is this machine too (Linux), but not the address that is listened on.
-        with pytest.raises(OSError):  # noqa: PT011
+        with pytest.raises(OSError):
             other.connect(("127.0.0.2", served._server.get_port()))
     assert served._server.request_share_url() is None  # viser's tunnel to its makers' site
 

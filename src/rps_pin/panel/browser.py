@@ -51,7 +51,7 @@ class BrowserPanel:
         with contextlib.redirect_stdout(io.StringIO()):  # the address is ours to tell
             self._server: Any = viser.ViserServer(host=HOST, port=port or 8080, verbose=False)
         # A page can ask viser for a tunnel to the world: there is none from here.
-        self._server.request_share_url = lambda *_, **__: None
+        self._server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
         self.url = f"http://{HOST}:{self._server.get_port()}"
         self._show_robot()
