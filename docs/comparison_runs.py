@@ -7,10 +7,12 @@ Run it from the checkout, in an environment with the development dependencies:
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import tempfile
+import venv
 from pathlib import Path
 
 import mujoco
@@ -18,17 +20,19 @@ import numpy as np
 import pinocchio as pin
 from lxml import etree
 from marked import block, replaced
+from simulation_table import comparable_robot
 
 from rps_pin import RPSRobot
 
 PAGE = Path(__file__).parent / "comparison.md"
 POSE, RATE, ACCELERATION = [0.4, 0.05, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.0]
+DRAKE = "drake==1.51.1"
 TOOLBOX = "toolbox-parallel-robots==1.2.0"
 
 
 def main() -> None:
     """Run everything and write the page."""
-    lines = [*pinocchio_alone(), *mujoco_reads(), *toolbox()]
+    lines = [*pinocchio_alone(), *mujoco_reads(), *drake(), *toolbox()]
     text = PAGE.read_text("utf-8")
     PAGE.write_text(replaced(text, "runs", block(lines)), "utf-8")
 
@@ -80,6 +84,48 @@ def mujoco_reads() -> list[str]:
     return [
         f"MuJoCo {mujoco.__version__}: the URDF of the 3-RPS sokolov (the paper's inertias)",
         f"  {answer}",
+    ]
+
+
+def drake() -> list[str]:
+    """How far the 3-RPS's loops gap in Drake, and whether its inverse dynamics knows of them."""
+    robot = comparable_robot()
+    mechanism, model = robot.mechanism, robot.mechanism.model
+    q, v, a = robot.state(POSE, [0.0] * 3, [0.0] * 3)
+    tree = etree.fromstring(robot.urdf.encode())
+    for shape in list(tree.iter("visual", "collision")):
+        shape.getparent().remove(shape)
+    task = {
+        "step": 1e-3,
+        "ticks": 1000,
+        "urdf": etree.tostring(tree, encoding="unicode"),
+        "closures": [[c.frame_a, c.frame_b] for c in mechanism.closures],
+        "forces": dict(
+            zip(mechanism.actuated, mechanism.inverse_dynamics(q, v, a).tau.tolist(), strict=True)
+        ),
+        "joints": {
+            name: float(q[joint.idx_q])
+            for name, joint in zip(model.names, model.joints, strict=True)
+            if joint.nq == 1 and name != "universe"
+        },
+        "platform": q[-7:].tolist(),
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        venv.create(folder, with_pip=True)
+        python = str(Path(folder) / "bin" / "python")
+        subprocess.run([python, "-m", "pip", "install", "--quiet", DRAKE], check=True)
+        told = subprocess.run(
+            [python, str(Path(__file__).with_name("in_drake.py"))],
+            input=json.dumps(task),
+            stdout=subprocess.PIPE,
+            text=True,
+            check=True,
+        )
+    found = json.loads(told.stdout)
+    return [
+        f"{DRAKE}: the 3-RPS with ball constraints, SAP, 1 ms, held still for 1 s",
+        f"  largest gap of the loops: {found['gap']:.0e} m",
+        f"  CalcInverseDynamics pushes the platform with {found['platform']:.2f} N: no loops in it",
     ]
 
 

@@ -1,0 +1,75 @@
+"""The 3-RPS in Drake: how well its loops hold, and what its inverse dynamics takes them for.
+
+Run by docs/comparison_runs.py in an environment of its own, with a task on standard input.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+import numpy as np
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
+from pydrake.multibody.tree import MultibodyForces
+from pydrake.systems.analysis import Simulator
+
+
+def main() -> None:
+    """Simulate, and print the largest gap (m) and the generalised forces that hold it still."""
+    task = json.load(sys.stdin)
+    plant, pairs = closed_plant(task)
+    context = plant.CreateDefaultContext()
+    place(plant, context, task)
+    gravity = MultibodyForces(plant)
+    plant.CalcForceElementsContribution(context, gravity)
+    held = plant.CalcInverseDynamics(context, np.zeros(plant.num_velocities()), gravity)
+    plant.get_actuation_input_port().FixValue(context, list(task["forces"].values()))
+    simulator, largest = Simulator(plant, context), gap(plant, context, pairs)
+    for k in range(task["ticks"]):
+        simulator.AdvanceTo((k + 1) * task["step"])
+        largest = max(largest, gap(plant, context, pairs))
+    platform = plant.GetBodyByName("platform")
+    begin = platform.floating_velocities_start_in_v()
+    print(json.dumps({"gap": largest, "platform": np.abs(held[begin : begin + 6]).max()}))
+
+
+def closed_plant(task: dict[str, Any]) -> tuple[MultibodyPlant, list[Any]]:
+    """Return the plant with ball constraints, and the pairs of bodies that they hold together."""
+    plant = MultibodyPlant(task["step"])
+    plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
+    Parser(plant).AddModelsFromString(task["urdf"], "urdf")
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
+    pairs = [[plant.GetBodyByName(name) for name in pair] for pair in task["closures"]]
+    for a, b in pairs:
+        plant.AddBallConstraint(a, np.zeros(3), b, np.zeros(3))
+    for name in task["forces"]:
+        plant.AddJointActuator(name, plant.GetJointByName(name))
+    plant.Finalize()
+    return plant, pairs
+
+
+def place(plant: MultibodyPlant, context: Any, task: dict[str, Any]) -> None:
+    """Put the joints and the platform where the task has them."""
+    for name, value in task["joints"].items():
+        joint = plant.GetJointByName(name)
+        turns = joint.type_name() == "revolute"
+        (joint.set_angle if turns else joint.set_translation)(context, value)
+    x, y, z, *quaternion = task["platform"]  # Pinocchio's: the real part last
+    turn = RotationMatrix(Quaternion(np.roll(quaternion, 1)))
+    plant.SetFreeBodyPose(context, plant.GetBodyByName("platform"), RigidTransform(turn, [x, y, z]))
+
+
+def gap(plant: MultibodyPlant, context: Any, pairs: list[Any]) -> float:
+    """Return the largest distance between two points that should coincide, m."""
+    between = [
+        plant.CalcRelativeTransform(context, a.body_frame(), b.body_frame()) for a, b in pairs
+    ]
+    return max(float(np.linalg.norm(one.translation())) for one in between)
+
+
+if __name__ == "__main__":
+    main()
