@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from copy import deepcopy
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -48,6 +49,8 @@ Array = NDArray[np.float64]
 
 #: Crank angles, rates and accelerations.
 CRANKS = [(angle, 3.0 - angle, 5.0 * angle - 2.0) for angle in np.linspace(-3, 3, 25)]
+
+URDF = Path(__file__).resolve().parents[2] / "urdf"
 
 
 # The planar four-bar against its closed form ------------------------------------------------------
@@ -207,6 +210,16 @@ def test_any_guess_closes_or_is_refused(angles: list[float]) -> None:
         assert "closure 'knee' stays open by" in str(error)
     else:
         assert mechanism.loop_gap(found) <= 1e-12
+
+
+def test_axes_that_do_not_agree_are_told_from_points_that_do_not_meet() -> None:
+    """A planar four-bar with its knee's axis in the plane: the axes cannot be parallel."""
+    mechanism = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    across = LoopClosure(
+        "coupler_tip", "rocker_tip", "revolute", axis=[0.0, 1.0, 0.0], axis_b=[0.0, 0.999, 0.02]
+    )
+    with pytest.raises(ClosureError, match=r"m between its points, 0\.0\d+ rad between its axes"):
+        ClosedLoopModel(mechanism.model, [across], mechanism.actuated).close(mechanism.home)
 
 
 def test_loop_that_cannot_close_is_named_with_its_gap() -> None:

@@ -277,6 +277,15 @@ class Loops:
                 worst, name = gap, closure.name
         return worst, name
 
+    def parts(self, gaps: Array, name: str) -> str:
+        """Return a closure's gap in words where some of it is of directions; else ""."""
+        rows = self.rows(name)
+        own, angular = gaps[rows], self.angular_rows[rows]
+        turn, apart = float(np.linalg.norm(own[angular])), float(np.linalg.norm(own[~angular]))
+        if not turn * self.length > 0.01 * apart:
+            return ""
+        return f" ({apart:.3g} m between its points, {turn:.3g} rad between its axes)"
+
     def _world_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
         """Return velocity and acceleration of a less those of b, each frame's at its own origin."""
         size = frames.closure.size

@@ -269,13 +269,16 @@ class ClosedLoopPositions:
 
     def _open(self, guess: Array, best: Array, within_limits: bool) -> ClosureError:
         """Return the error that says how far the loops stay open."""
-        gap, closure = self._loops.worst(self._loops.gaps(best))
+        gaps = self._loops.gaps(best)
+        gap, closure = self._loops.worst(gaps)
         before, _ = self._loops.worst(self._loops.gaps(guess))
+        parts = self._loops.parts(gaps, closure)
         reached = self._limits.reached(best) if within_limits else []
         return ClosureError(
             f"the loops do not close from this guess: closure {closure!r} stays open by "
-            f"{gap:.6g} m (largest gap of the guess: {before:.6g} m)"
-            + (f", with {', '.join(reached)}" if reached else ""),
+            f"{gap:.6g} m{parts}"
+            + (f", with {', '.join(reached)}" if reached else "")
+            + f"; largest gap of the guess: {before:.6g} m",
             gap,
         )
 
