@@ -53,12 +53,30 @@ class YamlFile:
             node, line = child
         return f"{self.origin}, line {line + 1}" if line or path else self.origin
 
+    def held(self, path: Sequence[str | int]) -> tuple[str | int, ...]:
+        """Return the beginning of a path that leads somewhere in the file."""
+        values: Any = self.values
+        for depth, part in enumerate(path):
+            in_list = isinstance(values, list) and isinstance(part, int) and part < len(values)
+            if not in_list and not (isinstance(values, Mapping) and part in values):
+                return tuple(path[:depth])
+            values = values[part]
+        return tuple(path)
+
     def part(self, key: str) -> YamlFile:
         """Return a mapping that stands at a key, as a file of its own; lines stay the file's."""
         child = _child(self._root, key)
         if child is None:
             raise KeyError(key)
         return YamlFile(self.values[key], self.origin, child[0])
+
+
+def path_text(path: Sequence[str | int]) -> str:
+    """Return a path as a reader would write it: ``poses[0][2]``, ``faults[0].size``."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
 
 
 def read_yaml(path: str | os.PathLike[str], what: str) -> YamlFile:

@@ -19,17 +19,12 @@ from rps_pin.control.scalar_state import RobotState, state_at
 from rps_pin.control.speed_filter import SpeedFilter
 from rps_pin.control.status import STATUSES, Status
 from rps_pin.control.warm_up import warm_up
-from rps_pin.errors import InputError, SingularityError
-from rps_pin.rps.forward import CONDITION_LIMIT
+from rps_pin.rps.forward import CONDITION_LIMIT, start_of
 from rps_pin.rps.leg_equations import checked_positive
-from rps_pin.rps.legs import leg_angles_and_lengths, tips
-from rps_pin.rps.pose import checked_pose, position, rotation
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.scalar_tracking import (
     Triple,
     Way,
-    condition_of,
-    direction_of_legs,
     follow,
 )
 
@@ -140,21 +135,7 @@ class RealTimeRobot:
 
     def reset(self, near: ArrayLike) -> None:
         """Start anew from a pose, at rest and without forces. Raises what the constructor does."""
-        pose = checked_pose(near, "near")
-        if pose.shape != (3,):
-            raise InputError(f"near has shape {pose.shape}; it must be (3,)")
-        tip = tips(position(pose, self._h), rotation(pose), self._h)
-        length, angle = leg_angles_and_lengths(tip, self._g)
-        (d1, d2, d3), (phi1, phi2, phi3) = length.tolist(), angle.tolist()
-        d, way = (d1, d2, d3), direction_of_legs((phi1, phi2, phi3))
-        condition = condition_of(d, way, self._g, self._h)
-        if condition > CONDITION_LIMIT:
-            raise SingularityError(
-                f"the pose to start from is singular: condition {condition:.3g}, "
-                f"limit {CONDITION_LIMIT:.3g}",
-                condition,
-                CONDITION_LIMIT,
-            )
+        _, d, way, _ = start_of(near, self._g, self._h, CONDITION_LIMIT)
         self.age, self.elapsed, self._fraction = 0, 0.0, 1.0
         self._distance: float | None = None
         self.determinant = 0.0

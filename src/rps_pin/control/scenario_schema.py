@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from rps_pin.control.faults import Kind
 from rps_pin.errors import InputError, shown
-from rps_pin.yaml_files import YamlFile
+from rps_pin.yaml_files import YamlFile, path_text
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -148,14 +148,14 @@ def validated(file: YamlFile) -> ScenarioEntry:
         errors = error.errors(include_url=False)
     # A key that is misspelt is unknown, and the right one missing: the first says more.
     first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
-    path = _held(file.values, first["loc"])
-    inside = _written(path)
+    path = file.held(first["loc"])
+    inside = path_text(path)
     if first["type"] == "missing":
         raise InputError(f"{file.place(path)}: {inside or 'a scenario'} needs {first['loc'][-1]}")
     if first["type"] == "extra_forbidden":
         owner = path[:-1]
         keys = _ENTRIES[tuple(part for part in owner if isinstance(part, str))].model_fields
-        where = f" in {_written(owner)}" if owner else ""
+        where = f" in {path_text(owner)}" if owner else ""
         raise InputError(
             f"{file.place(path)}: unknown key {path[-1]!r}{where}; the keys are: {', '.join(keys)}"
         )
@@ -164,21 +164,3 @@ def validated(file: YamlFile) -> ScenarioEntry:
     value = first["input"]
     said = "" if isinstance(value, dict) else f" = {shown(value)}"
     raise InputError(f"{file.place(path)}: {inside or 'a scenario'}{said}: {rule}")
-
-
-def _held(values: Any, path: tuple[int | str, ...]) -> tuple[int | str, ...]:
-    """Return the beginning of a path that leads somewhere in the values."""
-    for depth, part in enumerate(path):
-        try:
-            values = values[part]
-        except (KeyError, IndexError, TypeError):  # the rest is not of the file
-            return path[:depth]
-    return path
-
-
-def _written(path: tuple[int | str, ...]) -> str:
-    """Return a path as a reader would write it: ``faults[0].size``."""
-    text = ""
-    for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
-    return text

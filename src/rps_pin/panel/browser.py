@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.errors import RPSPinError
-from rps_pin.panel.sliders import Panel, as_html
+from rps_pin.panel.sliders import Panel, as_html, asked_by, show_values
 
 HOST = "127.0.0.1"
 _STYLE = "font-size: 85%; line-height: 1.3; margin: 0 0.8em 0.8em"
@@ -130,9 +130,7 @@ class BrowserPanel:
         with self._lock:
             if self._following:  # these are ours, not someone's
                 return
-            scales = [slider.scale for slider in self._panel.groups[group]]
-            shown = [handle.value for handle in self._sliders[group]]
-            self._panel.move(group, [v / s for v, s in zip(shown, scales, strict=True)])
+            self._panel.move(group, asked_by(self._panel, group, self._sliders[group]))
             self._update(moved=group)
 
     def _update(self, moved: str | None = None) -> None:
@@ -140,13 +138,6 @@ class BrowserPanel:
         self._text.content = f'<div style="{_STYLE}">{as_html(self._panel)}</div>'
         self._following = True
         try:
-            for group, handles in self._sliders.items():
-                if group != moved:
-                    values = self._panel.values(group)
-                    for handle, slider, value in zip(
-                        handles, self._panel.groups[group], values, strict=True
-                    ):
-                        shown = slider.scale * float(value)
-                        handle.value = min(max(shown, handle.min), handle.max)
+            show_values(self._panel, self._sliders, moved)
         finally:
             self._following = False

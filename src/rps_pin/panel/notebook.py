@@ -6,7 +6,7 @@ import html
 from typing import Any, Self
 
 from rps_pin.errors import RPSPinError
-from rps_pin.panel.sliders import Panel, as_html
+from rps_pin.panel.sliders import Panel, as_html, asked_by, show_values
 from rps_pin.viewer.scene import Scene
 from rps_pin.viewer.server import LocalViewer
 
@@ -102,9 +102,7 @@ class NotebookPanel:
         """Follow the sliders of a group."""
         if self._following:  # these are ours, not someone's
             return
-        scales = [slider.scale for slider in self._panel.groups[group]]
-        shown = [handle.value for handle in self._sliders[group]]
-        self._panel.move(group, [v / s for v, s in zip(shown, scales, strict=True)])
+        self._panel.move(group, asked_by(self._panel, group, self._sliders[group]))
         self._update(moved=group)
 
     def _update(self, moved: str | None = None) -> None:
@@ -112,12 +110,6 @@ class NotebookPanel:
         self.text.value = as_html(self._panel)
         self._following = True
         try:
-            for group, handles in self._sliders.items():
-                if group != moved:
-                    sliders = self._panel.groups[group]
-                    values = self._panel.values(group)
-                    for handle, slider, value in zip(handles, sliders, values, strict=True):
-                        shown = slider.scale * float(value)
-                        handle.value = min(max(shown, handle.min), handle.max)
+            show_values(self._panel, self._sliders, moved)
         finally:
             self._following = False

@@ -49,7 +49,7 @@ class RPSPanel:
 
     def __init__(self, robot: RPSRobot, pose: ArrayLike | None = None) -> None:
         self.robot, self.mechanism = robot, robot.mechanism
-        self._free = RPSRobot(_without_limits(robot.parameters)).with_payload(robot.payload)
+        self._free = RPSRobot(robot.parameters.without_limits()).with_payload(robot.payload)
         start = _middle(robot.parameters) if pose is None else checked_pose(pose)
         if start.shape != (3,):
             raise InputError(f"pose has shape {start.shape}; it must be (3,)")
@@ -117,14 +117,6 @@ class RPSPanel:
             if abs(force) > limit
         ]
         return words
-
-
-def _without_limits(parameters: RPSParameters) -> RPSParameters:
-    return parameters.replace(
-        leg_length_limits=(0.0, math.inf),
-        leg_angle_limits=(-math.pi, math.pi),
-        spherical_cone_limit=math.pi,
-    )
 
 
 def _middle(parameters: RPSParameters) -> Array:

@@ -77,6 +77,21 @@ def asked_of(groups: dict[str, tuple[Slider, ...]], group: str, values: Any) -> 
     return asked
 
 
+def asked_by(panel: Panel, group: str, handles: list[Any]) -> list[float]:
+    """Return what the handles of a group ask for, SI units."""
+    sliders = panel.groups[group]
+    return [handle.value / one.scale for handle, one in zip(handles, sliders, strict=True)]
+
+
+def show_values(panel: Panel, handles: dict[str, list[Any]], moved: str | None) -> None:
+    """Put the handles of all groups but the moved one where the panel is, or at their ends."""
+    for group, own in handles.items():
+        if group != moved:
+            sliders, values = panel.groups[group], panel.values(group).tolist()
+            for handle, slider, value in zip(own, sliders, values, strict=True):
+                handle.value = min(max(slider.scale * value, handle.min), handle.max)
+
+
 def as_html(panel: Panel) -> str:
     """Return what is read out, what is wrong first: a line, and a table of the readings."""
     words = "<br>".join(map(html.escape, panel.trouble))

@@ -40,6 +40,7 @@ from rps_pin.rps.pose import checked_pose, position, rotation
 from rps_pin.rps.scalar_tracking import (
     TRUST,
     Lengths,
+    Way,
     condition_of,
     direction_of_legs,
     follow,
@@ -134,6 +135,36 @@ def forward_kinematics(
     )
 
 
+def start_of(
+    near: ArrayLike, g: float, h: float, limit: float
+) -> tuple[Array, Lengths, Way, float]:
+    """Return what following begins with: a pose (3,), lengths, directions, and the condition.
+
+    Raises
+    ------
+    InputError
+        If the pose is not three finite numbers.
+    UnreachableError
+        If a leg has no length in it.
+    SingularityError
+        If its condition is above the limit.
+    """
+    pose = checked_pose(near, "near")
+    if pose.shape != (3,):
+        raise InputError(f"near has shape {pose.shape}; it must be (3,)")
+    length, angle = leg_angles_and_lengths(tips(position(pose, h), rotation(pose), h), g)
+    (d1, d2, d3), (phi1, phi2, phi3) = length.tolist(), angle.tolist()
+    d, way = (d1, d2, d3), direction_of_legs((phi1, phi2, phi3))
+    condition = condition_of(d, way, g, h)
+    if condition > limit:
+        raise SingularityError(
+            f"the pose to start from is singular: condition {condition:.3g}, limit {limit:.3g}",
+            condition,
+            limit,
+        )
+    return pose, d, way, condition
+
+
 class EncoderTracker:
     """Follows the platform from encoder readings, one call a tick, with the same guarantees.
 
@@ -191,23 +222,8 @@ class EncoderTracker:
 
     def reset(self, near: ArrayLike) -> None:
         """Start anew from a pose. Raises what the constructor does."""
-        pose = checked_pose(near, "near")
-        if pose.shape != (3,):
-            raise InputError(f"near has shape {pose.shape}; it must be (3,)")
-        tip = tips(position(pose, self._h), rotation(pose), self._h)
-        length, angle = leg_angles_and_lengths(tip, self._g)
-        (d1, d2, d3), (phi1, phi2, phi3) = length.tolist(), angle.tolist()
-        d, way = (d1, d2, d3), direction_of_legs((phi1, phi2, phi3))
-        condition = condition_of(d, way, self._g, self._h)
-        if condition > self._limit:
-            raise SingularityError(
-                f"the pose to start from is singular: condition {condition:.3g}, "
-                f"limit {self._limit:.3g}",
-                condition,
-                self._limit,
-            )
+        pose, d, way, self.condition = start_of(near, self._g, self._h, self._limit)
         self._length, self._way = d, way
-        self.condition = condition
         self._pose[:] = pose
         # Where functions are compiled, now and not in the loop.
         follow(d, way, d, self._g, self._h, self._limit, self._most)

@@ -265,6 +265,14 @@ class RPSParameters(BaseModel):
         """Return a copy with some fields changed, validated anew."""
         return RPSParameters(**(self._values() | changes))
 
+    def without_limits(self) -> RPSParameters:
+        """Return a copy without limits of lengths, angles and balls, to look beyond them."""
+        return self.replace(
+            leg_length_limits=(0.0, math.inf),
+            leg_angle_limits=(-math.pi, math.pi),
+            spherical_cone_limit=math.pi,
+        )
+
     def _values(self) -> dict[str, Any]:
         return {field: getattr(self, field) for field in type(self).model_fields}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -19,7 +18,7 @@ from pydantic import (
 
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.time_laws import Profile
-from rps_pin.yaml_files import YamlFile
+from rps_pin.yaml_files import YamlFile, path_text
 
 
 def _one_or_three(value: Any) -> Any:
@@ -174,9 +173,9 @@ def validated(file: YamlFile) -> Described:
         errors = error.errors(include_url=False)
     # A key that is misspelt is unknown, and the right one missing: the first says more.
     first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
-    path = _held(file.values, first["loc"])
+    path = file.held(first["loc"])
     if first["type"] == "missing":
-        inside = f"{_written(path)}" if path else f"kind {kind}"
+        inside = path_text(path) if path else f"kind {kind}"
         raise InputError(f"{file.place(path or ('kind',))}: {inside} needs {first['loc'][-1]}")
     if first["type"] == "extra_forbidden":
         keys, owner = (Fastest, "fastest") if path[1:] else (model, f"kind {kind}")
@@ -186,24 +185,4 @@ def validated(file: YamlFile) -> Described:
         )
     rule = first["msg"].removeprefix("Value error, ")
     rule = rule[0].lower() + rule[1:]
-    raise InputError(f"{file.place(path)}: {_written(path)} = {shown(first['input'])}: {rule}")
-
-
-def _held(values: Any, path: Sequence[str | int]) -> tuple[str | int, ...]:
-    """Return the beginning of a path that leads somewhere in the values."""
-    held: list[str | int] = []
-    for part in path:
-        in_list = isinstance(values, list) and isinstance(part, int) and part < len(values)
-        if not in_list and not (isinstance(values, Mapping) and part in values):
-            break
-        values = values[part]
-        held.append(part)
-    return tuple(held)
-
-
-def _written(path: Sequence[str | int]) -> str:
-    """Return a path as a reader would write it: ``poses[0][2]``."""
-    first, *rest = path
-    return str(first) + "".join(
-        f"[{part}]" if isinstance(part, int) else f".{part}" for part in rest
-    )
+    raise InputError(f"{file.place(path)}: {path_text(path)} = {shown(first['input'])}: {rule}")

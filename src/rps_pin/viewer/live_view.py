@@ -12,7 +12,6 @@ processor makes the writes visible; the viewer then looks again at its next pict
 from __future__ import annotations
 
 import contextlib
-import math
 import multiprocessing
 import os
 import signal
@@ -209,7 +208,7 @@ def _serve(
 
     memory, parent = memoryview(slot).cast("B"), os.getppid()
     # Shapes depend on the limits, so the scene is the robot's own.
-    free, still, seen = _unlimited(robot), np.zeros(3), 0.0
+    free, still, seen = RPSRobot(robot.parameters.without_limits()), np.zeros(3), 0.0
     try:
         first = free.state(start, still, still)[0]
         with LocalViewer(port, title=title) as viewer:
@@ -226,17 +225,6 @@ def _serve(
     except (RPSPinError, OSError) as error:
         with contextlib.suppress(OSError):  # nobody listens any more
             line.send(str(error))
-
-
-def _unlimited(robot: RPSRobot) -> RPSRobot:
-    """Return the robot without limits: beyond them is when people look."""
-    return RPSRobot(
-        robot.parameters.replace(
-            leg_length_limits=(0.0, math.inf),
-            leg_angle_limits=(-math.pi, math.pi),
-            spherical_cone_limit=math.pi,
-        )
-    )
 
 
 def _newest(memory: memoryview) -> tuple[float, tuple[float, float, float]] | None:
