@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rps_pin import ClosedLoopModel, RPSRobot, helix
+from rps_pin import ClosedLoopModel, JointCoupling, RPSRobot, helix
 from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import InputError
 from rps_pin.rps import joint_reactions
@@ -220,6 +220,22 @@ def test_an_open_closure_shows_its_gap():
     length = np.linalg.norm(placed(recorder)["closures/knee_line"][:3, 2])
     assert length == pytest.approx(four_bar.loop_gap(q), rel=1e-9)
     assert length > 0.01
+
+
+def test_a_coupling_is_drawn_between_its_joints():
+    tree = ClosedLoopModel.load(URDF / "four_bar.yaml").model
+    geared = ClosedLoopModel(
+        tree, [JointCoupling("rocker_joint", "crank_joint", -1.0, name="gear")], ["crank_joint"]
+    )
+    assert "closures" in fitting_layers(geared)
+    _, recorder = shown(geared, layers=["closures"])
+    found, data = placed(recorder), geared.model.createData()
+    pin.forwardKinematics(geared.model, data, geared.home)
+    for side, joint in (("a", "rocker_joint"), ("b", "crank_joint")):
+        place = data.oMi[geared.model.getJointId(joint)].translation
+        np.testing.assert_allclose(found[f"closures/gear_{side}"][:3, 3], place, atol=1e-12)
+    (row,) = (one for one in legend(recorder) if "couplings" in one["text"])
+    assert "closures" in row["text"]
 
 
 def test_a_skeleton_reaches_every_closed_frame():

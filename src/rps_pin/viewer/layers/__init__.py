@@ -60,8 +60,9 @@ def layers_of(given: Sequence[str | Layer]) -> list[Layer]:
 def fitting_layers(mechanism: ClosedLoopModel) -> list[str]:
     """Return the names of the layers that any motion of a mechanism can have, at little cost."""
     closed = any(isinstance(one, LoopClosure) for one in mechanism.closures)
-    of_closures = ["trail", "reactions", "closures"] if closed else []
-    names = ["forces", "limits", "singularity", "frames", *of_closures]
+    of_closures = ["trail", "reactions"] if closed else []
+    held = ["closures"] if mechanism.closures else []
+    names = ["forces", "limits", "singularity", "frames", *of_closures, *held]
     return [name for name in LAYERS if name in names]
 
 
