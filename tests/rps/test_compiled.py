@@ -123,7 +123,7 @@ def test_nothing_is_compiled_in_a_loop() -> None:
         for lengths in (length, length.tolist(), None, length + 1e-6, [1, 2, 3], length):
             for target in (None, (start, still, still), ([1, 0, 0], [0, 0, 0], [0, 0, 0])):
                 controller.tick(lengths, target)
-                controller.tick(reading, target, [0, 0, 0], dt=1)
+                controller.tick(lengths, target, [0, 0, 0], dt=1)
         for _ in range(6):
             controller.tick(None)
         controller.tick(length, None)
