@@ -53,10 +53,8 @@ def measured() -> list[str]:
 
 def by_program(face: BrowserPanel, page: Any) -> float:
     """Return the rate at which the page shows what is set here."""
-    heights, slider = (
-        itertools.cycle([218.0 + 0.1 * k for k in range(120)]),
-        face._sliders["pose"][0],
-    )
+    heights = itertools.cycle([218.0 + 0.1 * k for k in range(120)])
+    slider = face._sliders["pose"][0]
     return rate(page, lambda: setattr(slider, "value", next(heights)))
 
 

@@ -47,8 +47,7 @@ def parts() -> dict[str, Callable[[], object]]:
     for i in range(_HALF_WAY):
         controller.tick(lengths[i], targets[i])
     loop, reading = controller.estimate, lengths[_HALF_WAY]
-    known = loop.known
-    place, rate, speed, _ = known
+    place, rate, speed, _ = loop.known
     d = three_floats(reading)
     assert d is not None
     turned, _, _ = follow(place.length, place.way, d, g, h, 1e6, 20)

@@ -73,11 +73,8 @@ def verdict(found: np.ndarray, right: np.ndarray) -> str:
 
 def mujoco_reads() -> list[str]:
     """Whether MuJoCo takes the preset's URDF as it stands."""
-    robot = etree.fromstring(RPSRobot.from_preset("sokolov").urdf.encode())
-    for visual in robot.iter("visual", "collision"):
-        visual.getparent().remove(visual)
     try:
-        mujoco.MjModel.from_xml_string(etree.tostring(robot, encoding="unicode"))
+        mujoco.MjModel.from_xml_string(without_shapes(RPSRobot.from_preset("sokolov").urdf))
         answer = "is read"
     except ValueError as error:
         answer = f"is refused: {str(error).splitlines()[0]}"
@@ -87,18 +84,23 @@ def mujoco_reads() -> list[str]:
     ]
 
 
+def without_shapes(urdf: str) -> str:
+    """Return a URDF without what is only drawn or collided with."""
+    tree = etree.fromstring(urdf.encode())
+    for shape in list(tree.iter("visual", "collision")):
+        shape.getparent().remove(shape)
+    return str(etree.tostring(tree, encoding="unicode"))
+
+
 def drake() -> list[str]:
     """How far the 3-RPS's loops gap in Drake, and whether its inverse dynamics knows of them."""
     robot = comparable_robot()
     mechanism, model = robot.mechanism, robot.mechanism.model
     q, v, a = robot.state(POSE, [0.0] * 3, [0.0] * 3)
-    tree = etree.fromstring(robot.urdf.encode())
-    for shape in list(tree.iter("visual", "collision")):
-        shape.getparent().remove(shape)
     task = {
         "step": 1e-3,
         "ticks": 1000,
-        "urdf": etree.tostring(tree, encoding="unicode"),
+        "urdf": without_shapes(robot.urdf),
         "closures": [[c.frame_a, c.frame_b] for c in mechanism.closures],
         "forces": dict(
             zip(mechanism.actuated, mechanism.inverse_dynamics(q, v, a).tau.tolist(), strict=True)

@@ -347,8 +347,8 @@ def newton(
     A triple is done when its error is far within the tolerance, or when a step was so small that
     its square, which is what is left, is lost in rounding.
     """
-    within = np.asarray(tolerance)
-    small = 2 * _SQRT3 * h * WITHIN * within
+    tolerance = np.broadcast_to(tolerance, d.shape[1:])
+    small = 2 * _SQRT3 * h * tolerance * WITHIN
     constant = constants(d, g, h)
     wanting = np.ones(d.shape[1], dtype=bool)
     for step in range(iterations):
@@ -360,8 +360,7 @@ def newton(
         if left < _FEW * len(wanting):
             few = np.flatnonzero(wanting)
             w_few, z_few = w[:, few], z[:, few]
-            of_few = within[few] if within.ndim else within
-            newton(d[:, few], w_few, z_few, g, h, of_few, iterations - step)
+            newton(d[:, few], w_few, z_few, g, h, tolerance[few], iterations - step)
             w[:, few], z[:, few] = w_few, z_few
             return
         (a1, a2), (b2, b3), (c3, c1) = by_angle = slopes(w, z, g)
