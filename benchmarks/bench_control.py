@@ -13,10 +13,10 @@ from benchmarks.bench_inverse_dynamics import plain
 from benchmarks.latency import motion
 from rps_pin import RPSRobot
 from rps_pin.control import RealTimeRobot
-from rps_pin.control.constrained_forces import ConstrainedForces
-from rps_pin.rps.forward import EncoderTracker
-from rps_pin.rps.rates import leg_jacobians, platform_twist, pose_rate
-from rps_pin.rps.singularity import singularity_measures
+from rps_pin.control.estimator.constrained_forces import ConstrainedForces
+from rps_pin.rps.kinematics.forward_kinematics import EncoderTracker
+from rps_pin.rps.kinematics.rates import leg_jacobians, platform_twist, pose_rate
+from rps_pin.rps.singularity.measures import singularity_measures
 
 
 @pytest.fixture(scope="module")

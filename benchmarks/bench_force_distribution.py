@@ -18,7 +18,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import lsq_linear
 
 from rps_pin import ClosedLoopModel
-from rps_pin.closed_loop.force_distribution import ForceDistribution
+from rps_pin.closed_loop.dynamics.force_distribution import ForceDistribution
 from tests.closed_loop import mechanisms
 
 Array = NDArray[np.float64]

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import fsolve
 
-from rps_pin.rps.assembly import assembly_modes
-from rps_pin.rps.forward import EncoderTracker, forward_kinematics
-from rps_pin.rps.leg_equations import solve_angles
+from rps_pin.rps.kinematics.assembly_modes import assembly_modes
+from rps_pin.rps.kinematics.forward_kinematics import EncoderTracker, forward_kinematics
+from rps_pin.rps.kinematics.leg_equations import solve_angles
 
 Array = NDArray[np.float64]
 

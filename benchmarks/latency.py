@@ -37,13 +37,13 @@ from benchmarks.bench_inverse_dynamics import plain
 from benchmarks.tick_peers import MujocoTick, PlainTick, QPTick
 from rps_pin import LoopClosure, RPSRobot
 from rps_pin.control import ComputedTorque, Gains, RealTimeRobot, Status
-from rps_pin.control.constrained_forces import ConstrainedForces
-from rps_pin.control.force_limits import ForceLimits
-from rps_pin.control.place import place_of
-from rps_pin.control.reduced_mass import ReducedMass
-from rps_pin.control.scalar_rates import leg_gains
-from rps_pin.control.scalar_state import state_at
-from rps_pin.rps.rates import leg_jacobians
+from rps_pin.control.estimator.constrained_forces import ConstrainedForces
+from rps_pin.control.estimator.effective_inertia import ReducedMass
+from rps_pin.control.estimator.place import place_of
+from rps_pin.control.estimator.scalar_rates import leg_gains
+from rps_pin.control.estimator.scalar_state import state_at
+from rps_pin.control.loop.force_limits import ForceLimits
+from rps_pin.rps.kinematics.rates import leg_jacobians
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from playwright.sync_api import sync_playwright
 
 from rps_pin import RPSRobot
 from rps_pin.panel import BrowserPanel, RPSPanel
-from rps_pin.viewer.browser import ARGUMENTS, find_browser
+from rps_pin.viewer.files.browser import ARGUMENTS, find_browser
 
 SECONDS = 5.0
 #: Counts the heights that the readings show one after the other.

@@ -27,10 +27,10 @@ from rich.table import Table
 from benchmarks.latency import GAINS, PERIOD, machine, motion
 from rps_pin import RPSRobot
 from rps_pin.control import ComputedTorque
-from rps_pin.control.numbers import three_floats
-from rps_pin.control.reading import reading_of
-from rps_pin.control.scalar_state import state_at
-from rps_pin.rps.scalar_tracking import follow
+from rps_pin.control.estimator.numbers import three_floats
+from rps_pin.control.estimator.reading import reading_of
+from rps_pin.control.estimator.scalar_state import state_at
+from rps_pin.rps.kinematics.tracking import follow
 
 _CALLS, _REPEATS = 2000, 15
 _HALF_WAY = 300  # of the motion's ticks

@@ -27,13 +27,13 @@ from matplotlib.figure import Figure
 
 from rps_pin import RPSParameters, RPSRobot, helix
 from rps_pin.control import ComputedTorque, Controller, Gains, PDControl, effective_inertia
-from rps_pin.control.encoders import Encoders
-from rps_pin.control.loop_run import LoopRun, run_loop
-from rps_pin.control.loop_summary import LoopSummary, TrackingErrors, status_name
 from rps_pin.control.margins import loop_margins
-from rps_pin.control.plant import Plant
-from rps_pin.control.scenario import load_scenario
-from rps_pin.control.wrong_parameters import wrong_parameters
+from rps_pin.control.simulation.encoders import Encoders
+from rps_pin.control.simulation.loop_run import LoopRun, run_loop
+from rps_pin.control.simulation.loop_summary import LoopSummary, TrackingErrors, status_name
+from rps_pin.control.simulation.plant import Plant
+from rps_pin.control.simulation.scenario import load_scenario
+from rps_pin.control.simulation.wrong_parameters import wrong_parameters
 from rps_pin.plots import plot_loop_forces, save_figure
 from rps_pin.trajectories import Trajectory
 

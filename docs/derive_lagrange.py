@@ -2,7 +2,7 @@
 
 The Lagrangian is written down from the energies, in the paper's coordinates x = (d, phi), and
 differentiated; no algebra is done by hand. The tests evaluate the same expressions and compare the
-terms of `rps_pin.rps.lagrange_terms` with them. Run it from the checkout (some ten seconds):
+terms of `rps_pin.paper.lagrange_terms` with them. Run it from the checkout (some ten seconds):
 
     .venv/bin/python docs/derive_lagrange.py
 """

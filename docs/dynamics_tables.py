@@ -22,11 +22,11 @@ import numpy as np
 from marked import block, replaced
 
 from rps_pin import RPSRobot, helix
+from rps_pin.paper.three_ways import force_differences
 from rps_pin.plots import STYLE, plot_force_causes
 from rps_pin.rps import Payload, force_causes, time_optimal
-from rps_pin.rps.motion_run import MotionRun, run_motion
-from rps_pin.rps.three_ways import force_differences
-from rps_pin.rps.trajectory_file import load_trajectory
+from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
+from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.trajectories import Trajectory, circle
 
 ROOT = Path(__file__).parent.parent

@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 
 from rps_pin import ClosedLoopModel, RPSRobot, helix, plots
 from rps_pin.control import ComputedTorque, Encoders, Gains, LoopRun, Plant, run_loop
+from rps_pin.paper import paper_comparison
 from rps_pin.rps import ActuatorLimits, Payload, force_causes, size_trajectory
-from rps_pin.rps.motion_run import run_motion
-from rps_pin.rps.workspace import leg_grid, paper_comparison, pose_grid, workspace
+from rps_pin.rps.dynamics.motion_run import run_motion
+from rps_pin.rps.workspace import leg_grid, pose_grid, workspace
 from rps_pin.trajectories import circle
 
 DOCS = Path(__file__).parent

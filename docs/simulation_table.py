@@ -19,7 +19,7 @@ from marked import replaced
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, JointEffects, RPSParameters, RPSRobot
-from rps_pin.closed_loop.simulation import simulate
+from rps_pin.closed_loop.simulation.simulate import simulate
 
 Array = NDArray[np.float64]
 

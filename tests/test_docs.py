@@ -113,8 +113,8 @@ def exists(dotted: str) -> bool:
 
 
 def test_what_does_not_exist_is_found_out() -> None:
-    assert exists("rps_pin.rps.legs.tips") and exists("rps_pin.rps.RPSRobot.state")
-    assert not exists("rps_pin.rps.legs.toes") and not exists("rps_pin.rps.limbs")
+    assert exists("rps_pin.rps.kinematics.legs.tips") and exists("rps_pin.rps.RPSRobot.state")
+    assert not exists("rps_pin.rps.kinematics.legs.toes") and not exists("rps_pin.rps.limbs")
 
 
 @pytest.mark.parametrize("package", PUBLIC)

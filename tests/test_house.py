@@ -81,13 +81,13 @@ def test_the_changelog_keeps_its_form() -> None:
 def test_dependencies_point_one_way() -> None:
     """Of `rps_pin.closed_loop` and `rps_pin.rps` on what is built on them."""
     below = {
-        "closed_loop": ("errors", "files", "yaml_files", "closed_loop"),
-        "trajectories": ("errors", "files", "yaml_files", "trajectories", "rps"),
-        "rps": ("errors", "files", "yaml_files", "closed_loop", "trajectories", "rps"),
+        "closed_loop": ("errors", "files", "config", "closed_loop"),
+        "trajectories": ("errors", "files", "config", "trajectories", "rps"),
+        "rps": ("errors", "files", "config", "closed_loop", "trajectories", "rps"),
         "control": (
             "errors",
             "files",
-            "yaml_files",
+            "config",
             "closed_loop",
             "trajectories",
             "rps",

@@ -1,4 +1,4 @@
-from . import closed_loop, control, errors, panel, plots, reproduction, rps, trajectories, viewer
+from . import closed_loop, control, errors, panel, paper, plots, rps, trajectories, viewer
 from .closed_loop import (
     ClosedLoopModel,
     ForceBound,
@@ -47,8 +47,8 @@ __all__ = [
     "errors",
     "helix",
     "panel",
+    "paper",
     "plots",
-    "reproduction",
     "rps",
     "trajectories",
     "viewer",

@@ -10,8 +10,7 @@ import reprlib
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from rps_pin.arrays import Array
 
 _LONGEST = 400
 _REPR = reprlib.Repr()
@@ -181,7 +180,7 @@ class InfeasibleError(RPSPinError, ArithmeticError):
         self,
         message: str,
         violations: Sequence[LimitExcess] = (),
-        unproduced: NDArray[np.float64] | None = None,
+        unproduced: Array | None = None,
     ) -> None:
         self.violations = tuple(violations)
         self.unproduced = unproduced

@@ -12,7 +12,7 @@ import pytest
 from packaging.requirements import Requirement
 
 from rps_pin.cli.doctor import _BROWSERS, PARTS, _browser
-from rps_pin.viewer.browser import BROWSERS
+from rps_pin.viewer.files.browser import BROWSERS
 
 ROOT = Path(__file__).resolve().parents[2]
 #: A stranger's Python in which a package cannot be imported.

@@ -10,10 +10,10 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from rps_pin.cli.reproduce import reproduce_command
-from rps_pin.reproduction import compute, write
-from rps_pin.reproduction.figures import pictures
-from rps_pin.reproduction.page import render
-from rps_pin.reproduction.reading_tables import readings_csv
+from rps_pin.paper import compute, write
+from rps_pin.paper.figures import pictures
+from rps_pin.paper.page import render
+from rps_pin.paper.reading_tables import readings_csv
 
 app = typer.Typer()
 app.command()(reproduce_command)

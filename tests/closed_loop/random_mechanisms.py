@@ -18,7 +18,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, JointCoupling, JointEffects, LoopClosure
-from rps_pin.closed_loop.closure import KINDS, Closure
+from rps_pin.closed_loop.constraints.closures import KINDS, Closure
 from tests.strategies import rigid_body_inertia
 
 Array = NDArray[np.float64]

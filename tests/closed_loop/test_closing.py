@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rps_pin.closed_loop.closing import close_gaps
+from rps_pin.closed_loop.assembly.closing import close_gaps
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from rps_pin import JointCoupling, LoopClosure, MechanismError
-from rps_pin.closed_loop.closure import KINDS
+from rps_pin.closed_loop.constraints.closures import KINDS
 from tests.closed_loop.mechanisms import FourBar
 
 

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import LoopClosure
-from rps_pin.closed_loop.closure import KINDS
-from rps_pin.closed_loop.closure_rows import ParallelRows, across, rows_of
+from rps_pin.closed_loop.constraints.closures import KINDS
+from rps_pin.closed_loop.constraints.rows import ParallelRows, across, rows_of
 from tests.closed_loop.random_mechanisms import (
     allowed_placement,
     joint_of,

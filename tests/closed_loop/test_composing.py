@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import InputError, MechanismError
-from rps_pin.closed_loop.composing import Part, body, compose
+from rps_pin.closed_loop.editing.compose import Part, body, compose
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import pinocchio as pin
 import pytest
 
 from rps_pin import ClosedLoopModel, InputError, LoopClosure, MechanismError
-from rps_pin.closed_loop.closure import JointCoupling
-from rps_pin.closed_loop.description import parts_from_yaml
+from rps_pin.closed_loop.constraints.closures import JointCoupling
+from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from tests.closed_loop.mechanisms import FOUR_BAR, joint, link, robot
 
 FOUR_BAR_FILE = """\

@@ -18,8 +18,8 @@ from rps_pin import (
     MechanismError,
     RPSRobot,
 )
-from rps_pin.closed_loop.force_bounds import ForceBound, friction_pyramid
-from rps_pin.closed_loop.force_distribution import DistributedForces, ForceDistribution
+from rps_pin.closed_loop.dynamics.force_bounds import ForceBound, friction_pyramid
+from rps_pin.closed_loop.dynamics.force_distribution import DistributedForces, ForceDistribution
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import GRAVITY, State, joint, link, robot
 

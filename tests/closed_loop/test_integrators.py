@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from rps_pin.closed_loop.integrators import AdaptiveStepper, rk4_step, times
+from rps_pin.closed_loop.simulation.integrators import AdaptiveStepper, rk4_step, times
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, RPSRobot, SingularityError
-from rps_pin.closed_loop.by_motions import solve_by_allowed_motions
-from rps_pin.closed_loop.inverse_dynamics import allowed_motions, condition_number
+from rps_pin.closed_loop.dynamics.inverse_dynamics import allowed_motions, condition_number
+from rps_pin.closed_loop.dynamics.null_space_solution import solve_by_allowed_motions
 from tests import strategies
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import loop_jacobian

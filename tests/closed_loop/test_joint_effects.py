@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, InputError, JointEffects, MechanismError
-from rps_pin.closed_loop.joint_effects import coordinate_indices
+from rps_pin.closed_loop.dynamics.passive_joint_forces import coordinate_indices
 from tests.closed_loop.mechanisms import joint, link, robot
 from tests.closed_loop.random_mechanisms import slopes
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import SingularityError
-from rps_pin.closed_loop.least_effort import (
+from rps_pin.closed_loop.dynamics.least_effort import (
     least_effort,
     refuse_nearly_singular,
     unproduced_force,

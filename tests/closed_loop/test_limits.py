@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from rps_pin.closed_loop.limits import JointLimits
+from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 
 Array = NDArray[np.float64]
 

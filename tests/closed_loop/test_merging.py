@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import InputError, MechanismError
-from rps_pin.closed_loop.merging import JointMerge, merged, merged_configuration
+from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
 
 Array = NDArray[np.float64]
 

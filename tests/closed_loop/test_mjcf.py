@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import InputError, LoopClosure, MechanismError
-from rps_pin.closed_loop.closure import JointCoupling
-from rps_pin.closed_loop.mjcf import parts_from_mjcf
-from rps_pin.closed_loop.parts import MechanismParts
+from rps_pin.closed_loop.constraints.closures import JointCoupling
+from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
+from rps_pin.closed_loop.io.parts import MechanismParts
 
 Array = NDArray[np.float64]
 

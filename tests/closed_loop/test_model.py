@@ -22,7 +22,7 @@ from rps_pin import (
     RPSRobot,
     SingularityError,
 )
-from rps_pin.closed_loop.inverse_dynamics import allowed_motions
+from rps_pin.closed_loop.dynamics.inverse_dynamics import allowed_motions
 from tests import strategies
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import (

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rps_pin import InputError, MechanismError
-from rps_pin.closed_loop.reading import model_from_urdf
+from rps_pin.closed_loop.io.urdf import model_from_urdf
 from tests.closed_loop.mechanisms import FOUR_BAR, build
 
 

@@ -25,9 +25,9 @@ from rps_pin import (
     RPSParameters,
     RPSRobot,
 )
-from rps_pin.closed_loop.closed_manifold import ClosedManifold
-from rps_pin.closed_loop.simulated_motion import Simulation
-from rps_pin.closed_loop.simulation import simulate
+from rps_pin.closed_loop.simulation.manifold import ClosedManifold
+from rps_pin.closed_loop.simulation.result import Simulation
+from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.errors import ClosureError, InputError, SingularityError
 from tests.closed_loop.mechanisms import ALL, FOUR_BAR, GRAVITY, joint, link, robot, state
 

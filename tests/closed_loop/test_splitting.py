@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import MechanismError
-from rps_pin.closed_loop.merging import JointMerge, merged
-from rps_pin.closed_loop.splitting import split
+from rps_pin.closed_loop.editing.merge import JointMerge, merged
+from rps_pin.closed_loop.editing.split import split
 
 Array = NDArray[np.float64]
 Maker = Callable[[np.random.Generator], Any]

@@ -8,8 +8,8 @@ from pathlib import Path
 import pinocchio as pin
 import pytest
 
-from rps_pin.closed_loop.reading import model_from_urdf, xml_root, xml_text
-from rps_pin.closed_loop.urdf_check import refuse_mistakes
+from rps_pin.closed_loop.io.urdf import model_from_urdf, xml_root, xml_text
+from rps_pin.closed_loop.io.urdf_check import refuse_mistakes
 from rps_pin.errors import MechanismError
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rps_pin.control.speed_filter import SpeedFilter
+from rps_pin.control.loop.speed_filter import SpeedFilter
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from rps_pin.control.axis_loop import AxisLoop, axis_loop
-from rps_pin.control.speed_filter import SpeedFilter
+from rps_pin.control.loop.speed_filter import SpeedFilter
 from tests.control.axis_ticks import Axis, random_axis
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from rps_pin.control.clock import RESOLUTION, LoopClock
+from rps_pin.control.loop.clock import RESOLUTION, LoopClock
 from rps_pin.errors import InputError
 
 T = 0.25  # exact in binary, and so are its multiples: deadlines can be compared with ==

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.control import ComputedTorque, Gains, Status
-from rps_pin.control.controller import Space
-from rps_pin.rps.loads import Payload
+from rps_pin.control.loop.controller import Space
+from rps_pin.rps.dynamics.loads import Payload
 from tests import strategies
 
 Array = NDArray[np.float64]

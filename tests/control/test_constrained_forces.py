@@ -7,11 +7,11 @@ import pinocchio as pin
 import pytest
 
 from rps_pin import RPSParameters, RPSRobot
-from rps_pin.control.constrained_forces import ConstrainedForces
-from rps_pin.control.place import place_of, turning_determinant
-from rps_pin.control.scalar_state import RobotState, state_at
-from rps_pin.rps import leg_equations as eq
-from rps_pin.rps.loads import Payload
+from rps_pin.control.estimator.constrained_forces import ConstrainedForces
+from rps_pin.control.estimator.place import place_of, turning_determinant
+from rps_pin.control.estimator.scalar_state import RobotState, state_at
+from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.kinematics import leg_equations as eq
 from tests import strategies
 
 FRICTION = {

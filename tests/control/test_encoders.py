@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import kstest, norm
 
-from rps_pin.control.encoders import Encoders
+from rps_pin.control.simulation.encoders import Encoders
 from rps_pin.errors import InputError
 from tests.strategies import floats, vectors
 

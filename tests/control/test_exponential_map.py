@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from rps_pin.control.exponential_map import coefficients
-from rps_pin.rps.pose import exp_coefficients, exp_slopes
+from rps_pin.control.estimator.exponential_map import coefficients
+from rps_pin.rps.kinematics.pose import exp_coefficients, exp_slopes
 
 SQUARES = [0.0, 1e-300, 1e-12, 1e-3, 0.3, 1 - 1e-15, 1.0, 1.5, 4.0, math.pi**2, 30.0]
 

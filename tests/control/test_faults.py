@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rps_pin.control.faults import Fault, Faults
+from rps_pin.control.simulation.faults import Fault, Faults
 from rps_pin.errors import InputError
 from tests.strategies import floats
 

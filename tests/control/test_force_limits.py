@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from rps_pin import RPSRobot
-from rps_pin.control.force_limits import ForceLimits
-from rps_pin.control.place import place_of
-from rps_pin.control.reduced_mass import ReducedMass
-from rps_pin.control.scalar_rates import LegGains, leg_gains
+from rps_pin.control.estimator.effective_inertia import ReducedMass
+from rps_pin.control.estimator.place import place_of
+from rps_pin.control.estimator.scalar_rates import LegGains, leg_gains
+from rps_pin.control.loop.force_limits import ForceLimits
 from tests import strategies
 
 Array = NDArray[np.float64]

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.control import ComputedTorque, Controller, Gains, PDControl, Status, effective_inertia
-from rps_pin.control import loop_run as loop_run_module
-from rps_pin.control.encoders import Encoders
-from rps_pin.control.faults import Fault, Faults
-from rps_pin.control.loop_run import LoopRun, run_loop, write_loop_csv
-from rps_pin.control.paced import PacedTrajectory
-from rps_pin.control.plant import Plant, platform_pose
-from rps_pin.control.status import KEPT
+from rps_pin.control.loop.paced_trajectory import PacedTrajectory
+from rps_pin.control.loop.status import KEPT
+from rps_pin.control.simulation import loop_run as loop_run_module
+from rps_pin.control.simulation.encoders import Encoders
+from rps_pin.control.simulation.faults import Fault, Faults
+from rps_pin.control.simulation.loop_run import LoopRun, run_loop, write_loop_csv
+from rps_pin.control.simulation.plant import Plant, platform_pose
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.trajectories.path import PathSample, Trajectory
 from rps_pin.trajectories.point_to_point import point_to_point

@@ -17,10 +17,10 @@ from scipy.spatial.transform import Rotation
 
 from rps_pin import RPSRobot
 from rps_pin.control import ComputedTorque, Gains, Status
-from rps_pin.control.faults import Fault
-from rps_pin.control.loop_run import LoopRun, run_loop
-from rps_pin.control.loop_summary import LoopSummary, TrackingErrors, status_name
-from rps_pin.control.plant import Plant
+from rps_pin.control.simulation.faults import Fault
+from rps_pin.control.simulation.loop_run import LoopRun, run_loop
+from rps_pin.control.simulation.loop_summary import LoopSummary, TrackingErrors, status_name
+from rps_pin.control.simulation.plant import Plant
 from rps_pin.errors import InputError
 from rps_pin.trajectories.point_to_point import point_to_point
 from tests import strategies

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rps_pin.control.matched_rate import MatchedRate
-from rps_pin.control.speed_filter import SpeedFilter
+from rps_pin.control.loop.matched_rate import MatchedRate
+from rps_pin.control.loop.speed_filter import SpeedFilter
 
 
 @pytest.mark.parametrize("cut_off", [5.0, 50.0, np.inf])

@@ -7,10 +7,10 @@ import pytest
 
 from rps_pin import InputError, RPSRobot, helix
 from rps_pin.control import ComputedTorque, Gains
-from rps_pin.control.loop_run import run_loop
-from rps_pin.control.loop_summary import LoopSummary
-from rps_pin.control.paced import PacedTrajectory
-from rps_pin.control.plant import Plant
+from rps_pin.control.loop.paced_trajectory import PacedTrajectory
+from rps_pin.control.simulation.loop_run import run_loop
+from rps_pin.control.simulation.loop_summary import LoopSummary
+from rps_pin.control.simulation.plant import Plant
 from rps_pin.trajectories import circle
 
 PERIOD = 1e-3

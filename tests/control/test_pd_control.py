@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSRobot
 from rps_pin.control import Gains, PDControl, Status, effective_inertia
-from rps_pin.control.controller import Space
-from rps_pin.control.pd_control import Compensation
-from rps_pin.rps.rates import leg_jacobians
+from rps_pin.control.loop.controller import Space
+from rps_pin.control.loop.pd_control import Compensation
+from rps_pin.rps.kinematics.rates import leg_jacobians
 from tests import strategies
 
 Array = NDArray[np.float64]

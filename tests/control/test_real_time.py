@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSParameters, RPSRobot, SingularityError
 from rps_pin.control import Answers, RealTimeRobot, Status
-from rps_pin.rps import rates
-from rps_pin.rps.singularity import singularity_measures
+from rps_pin.rps.kinematics import rates
+from rps_pin.rps.singularity.measures import singularity_measures
 from tests import strategies
 
 Array = NDArray[np.float64]

@@ -8,9 +8,9 @@ import pytest
 
 from rps_pin import InputError, RPSParameters, RPSRobot, SingularityError
 from rps_pin.control import effective_inertia
-from rps_pin.control.place import place_of
-from rps_pin.control.reduced_mass import ReducedMass
-from rps_pin.rps.loads import Payload
+from rps_pin.control.estimator.effective_inertia import ReducedMass
+from rps_pin.control.estimator.place import place_of
+from rps_pin.rps.dynamics.loads import Payload
 from tests import strategies
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from rps_pin.control.rejoining import SHORTEST, Rejoining, rejoining_time
+from rps_pin.control.loop.rejoining import SHORTEST, Rejoining, rejoining_time
 
 RNG = np.random.default_rng(3)
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSRobot, SingularityError, helix
 from rps_pin.control import ComputedTorque, Controller, Gains, PDControl, Status, effective_inertia
-from rps_pin.control.faults import Fault
-from rps_pin.control.loop_run import LoopRun, run_loop
-from rps_pin.control.loop_summary import LoopSummary
-from rps_pin.control.plant import Plant
-from rps_pin.control.rejoining import SHORTEST
+from rps_pin.control.loop.rejoining import SHORTEST
+from rps_pin.control.simulation.faults import Fault
+from rps_pin.control.simulation.loop_run import LoopRun, run_loop
+from rps_pin.control.simulation.loop_summary import LoopSummary
+from rps_pin.control.simulation.plant import Plant
 from rps_pin.trajectories import circle
 
 Array = NDArray[np.float64]

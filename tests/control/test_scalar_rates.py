@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from rps_pin.control.exponential_map import coefficients
-from rps_pin.control.scalar_rates import (
+from rps_pin.control.estimator.exponential_map import coefficients
+from rps_pin.control.estimator.scalar_rates import (
     LeastGain,
     force_of_wrench,
     leg_gains,
@@ -17,11 +17,11 @@ from rps_pin.control.scalar_rates import (
     pose_rate,
     wrench_of_force,
 )
-from rps_pin.rps import rates
-from rps_pin.rps.legs import RADIAL
-from rps_pin.rps.pose import rotation
-from rps_pin.rps.scalar_tracking import direction_of_legs
-from rps_pin.rps.singularity import singularity_measures
+from rps_pin.rps.kinematics import rates
+from rps_pin.rps.kinematics.legs import RADIAL
+from rps_pin.rps.kinematics.pose import rotation
+from rps_pin.rps.kinematics.tracking import direction_of_legs
+from rps_pin.rps.singularity.measures import singularity_measures
 from tests import strategies
 
 

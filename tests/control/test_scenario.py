@@ -10,8 +10,8 @@ import pytest
 
 from rps_pin import InputError, RPSParameters, RPSRobot
 from rps_pin.control import ComputedTorque, Gains, PDControl, effective_inertia
-from rps_pin.control.scenario import load_scenario
-from rps_pin.control.wrong_parameters import wrong_parameters
+from rps_pin.control.simulation.scenario import load_scenario
+from rps_pin.control.simulation.wrong_parameters import wrong_parameters
 from rps_pin.errors import RPSPinError
 
 ROOT = Path(__file__).resolve().parents[2]

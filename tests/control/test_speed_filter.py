@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rps_pin.control.speed_filter import SpeedFilter
+from rps_pin.control.loop.speed_filter import SpeedFilter
 
 Triple = tuple[float, float, float]
 

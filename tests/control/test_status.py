@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rps_pin.control.status import STATUSES, Status
+from rps_pin.control.loop.status import STATUSES, Status
 
 
 def test_table_holds_every_combination_at_its_number() -> None:

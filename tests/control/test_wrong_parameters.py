@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rps_pin import RPSParameters, RPSRobot
-from rps_pin.control.wrong_parameters import wrong_parameters
+from rps_pin.control.simulation.wrong_parameters import wrong_parameters
 from rps_pin.errors import InputError, ParameterError
 from tests import strategies
 

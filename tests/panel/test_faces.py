@@ -15,7 +15,7 @@ from PIL import Image
 
 from rps_pin import RPSPinError, RPSRobot
 from rps_pin.panel import BrowserPanel, NotebookPanel, RPSPanel
-from rps_pin.viewer.browser import ARGUMENTS
+from rps_pin.viewer.files.browser import ARGUMENTS
 
 MICRO = RPSRobot.from_preset("micro")
 BROWSER = os.environ.get("RPS_PIN_CHROMIUM", "chromium")

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rps_pin import InputError, RPSParameters
 from rps_pin.plots import plot_height_conditioning, plot_tilt_conditioning
-from rps_pin.rps.singularity import singularity_measures
+from rps_pin.rps.singularity.measures import singularity_measures
 
 SOKOLOV = RPSParameters.from_preset("sokolov")
 TILTS = np.linspace(-1.2, 1.2, 41)

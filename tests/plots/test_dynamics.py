@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSParameters, RPSRobot, helix
 from rps_pin.plots import plot_force_causes, plot_sizing
-from rps_pin.rps.force_causes import ForceCauses, force_causes
-from rps_pin.rps.loads import Payload
-from rps_pin.rps.sizing import size_trajectory
-from rps_pin.rps.sizing_sheet import ActuatorLimits, SizingSheet
+from rps_pin.rps.dynamics.force_causes import ForceCauses, force_causes
+from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.dynamics.sizing import size_trajectory
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, SizingSheet
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from rps_pin import RPSRobot, helix
 from rps_pin.plots import plot_forces, plot_lengths, plot_path, save_figure
-from rps_pin.rps.motion_run import MotionRun, run_motion
+from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
 
 
 @pytest.fixture(scope="module")

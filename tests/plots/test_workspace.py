@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.errors import InputError
+from rps_pin.paper import paper_comparison
 from rps_pin.plots import (
     plot_assembly_modes,
     plot_comparison,
@@ -20,7 +21,7 @@ from rps_pin.plots import (
     plot_theoretical,
     plot_views,
 )
-from rps_pin.rps.workspace import Workspace, leg_grid, paper_comparison, pose_grid, workspace
+from rps_pin.rps.workspace import Workspace, leg_grid, pose_grid, workspace
 
 
 @pytest.fixture(scope="module")

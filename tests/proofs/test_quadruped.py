@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import null_space
 
 from rps_pin import ClosedLoopModel, InfeasibleError, LoopClosure
-from rps_pin.closed_loop.force_bounds import ForceBound, friction_pyramid
-from rps_pin.closed_loop.force_distribution import DistributedForces, ForceDistribution
+from rps_pin.closed_loop.dynamics.force_bounds import ForceBound, friction_pyramid
+from rps_pin.closed_loop.dynamics.force_distribution import DistributedForces, ForceDistribution
 from tests.closed_loop import mechanisms
 from tests.proofs import common, optima, robot_data
 

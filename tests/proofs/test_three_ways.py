@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import RPSRobot, helix
-from rps_pin.rps.lagrange import lagrange_forces
-from rps_pin.rps.time_optimal import time_optimal
-from rps_pin.rps.trajectory_file import load_trajectory
-from rps_pin.rps.virtual_work import virtual_work_forces
+from rps_pin.paper.lagrange import lagrange_forces
+from rps_pin.paper.virtual_work import virtual_work_forces
+from rps_pin.rps.motion.time_optimal import time_optimal
+from rps_pin.rps.motion.trajectory_file import load_trajectory
 from tests.reference import newton_euler as ne
 from tests.strategies import Motion, random_motions, random_parameters
 

@@ -16,9 +16,9 @@ from scipy.linalg import null_space
 from scipy.optimize import minimize
 
 from rps_pin import ClosedLoopModel, InfeasibleError, LoopClosure
-from rps_pin.closed_loop.composing import Part, body, compose
-from rps_pin.closed_loop.force_bounds import ForceBound
-from rps_pin.closed_loop.force_distribution import ForceDistribution
+from rps_pin.closed_loop.dynamics.force_bounds import ForceBound
+from rps_pin.closed_loop.dynamics.force_distribution import ForceDistribution
+from rps_pin.closed_loop.editing.compose import Part, body, compose
 from tests.closed_loop import mechanisms
 from tests.proofs import common, optima, robot_data
 

@@ -20,8 +20,8 @@ from rps_pin import (
     SingularityError,
     UnreachableError,
 )
-from rps_pin.rps import actuator_forces as module
-from rps_pin.rps.loads import Payload
+from rps_pin.rps.dynamics import actuator_forces as module
+from rps_pin.rps.dynamics.loads import Payload
 from tests import strategies
 from tests.reference import newton_euler as ne
 from tests.strategies import Motion, relative_error

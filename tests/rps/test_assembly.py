@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from rps_pin import InputError
-from rps_pin.rps import assembly
-from rps_pin.rps import leg_equations as eq
-from rps_pin.rps.assembly import assembly_modes
-from rps_pin.rps.legs import leg_angles_and_lengths, tips
-from rps_pin.rps.pose import position, rotation
+from rps_pin.rps.kinematics import assembly_modes as assembly
+from rps_pin.rps.kinematics import leg_equations as eq
+from rps_pin.rps.kinematics.assembly_modes import assembly_modes
+from rps_pin.rps.kinematics.legs import leg_angles_and_lengths, tips
+from rps_pin.rps.kinematics.pose import position, rotation
 from tests.strategies import LEG_ANGLES
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rps_pin import InputError, UnreachableError
-from rps_pin.rps import pose as native
-from rps_pin.rps.conversions import (
+from rps_pin.rps.kinematics import pose as native
+from rps_pin.rps.kinematics.conversions import (
     angles_from_pose,
     parasitic_motion,
     pose_from_angles,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rps_pin.rps import ActuatorLimits, Payload, RPSParameters, RPSRobot
-from rps_pin.rps.curve_dynamics import CurveDynamics
+from rps_pin.rps.motion.curve_dynamics import CurveDynamics
 from rps_pin.trajectories.spline import ChordSpline
 
 MICRO = RPSParameters.from_preset("micro")

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.errors import InfeasibleError, InputError, SingularityError, UnreachableError
 from rps_pin.rps import ActuatorLimits, RPSRobot
-from rps_pin.rps.curve_refusal import ends_at_rest
-from rps_pin.rps.time_optimal import time_optimal
+from rps_pin.rps.motion.curve_refusal import ends_at_rest
+from rps_pin.rps.motion.time_optimal import time_optimal
 from rps_pin.trajectories.curve import CurveSample
 from rps_pin.trajectories.point_to_point import LineCurve
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from rps_pin.errors import InputError
-from rps_pin.rps.fastest_profile import ProfileLimits, fastest_profile
-from rps_pin.rps.speed_profile import SpeedProfile
+from rps_pin.rps.motion.fastest_profile import ProfileLimits, fastest_profile
+from rps_pin.rps.motion.speed_profile import SpeedProfile
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import RPSParameters, RPSRobot, SingularityError
-from rps_pin.rps.force_causes import force_causes
-from rps_pin.rps.loads import Payload
+from rps_pin.rps.dynamics.force_causes import force_causes
+from rps_pin.rps.dynamics.loads import Payload
 from tests import strategies
 from tests.reference import newton_euler as ne
 from tests.strategies import Motion, relative_error

@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosureError, InputError, SingularityError, UnreachableError
-from rps_pin.rps import leg_equations as eq
-from rps_pin.rps.forward import EncoderTracker, forward_kinematics
-from rps_pin.rps.legs import leg_angles_and_lengths, tips
-from rps_pin.rps.pose import position, rotation
+from rps_pin.rps.kinematics import leg_equations as eq
+from rps_pin.rps.kinematics.forward_kinematics import EncoderTracker, forward_kinematics
+from rps_pin.rps.kinematics.legs import leg_angles_and_lengths, tips
+from rps_pin.rps.kinematics.pose import position, rotation
 from tests import strategies
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import InputError
-from rps_pin.rps import leg_equations as eq
-from rps_pin.rps.legs import RADIAL, leg_angles_and_lengths, tips
-from rps_pin.rps.pose import position, rotation
+from rps_pin.rps.kinematics import leg_equations as eq
+from rps_pin.rps.kinematics.legs import RADIAL, leg_angles_and_lengths, tips
+from rps_pin.rps.kinematics.pose import position, rotation
 from tests import strategies
 
 Array = NDArray[np.float64]

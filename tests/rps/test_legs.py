@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rps_pin import RPSParameters, UnreachableError
-from rps_pin.rps import legs
-from rps_pin.rps.pose import platform_motion, position, rotation
+from rps_pin.rps.kinematics import legs
+from rps_pin.rps.kinematics.pose import platform_motion, position, rotation
 from tests import strategies
 from tests.reference import newton_euler as ne
 from tests.strategies import LEG_ANGLES

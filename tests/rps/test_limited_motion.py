@@ -7,8 +7,8 @@ import pytest
 
 from rps_pin.errors import InputError
 from rps_pin.rps import ActuatorLimits, RPSRobot
-from rps_pin.rps.limited_motion import SIDES, LimitedMotion
-from rps_pin.rps.time_optimal import time_optimal
+from rps_pin.rps.motion.limited_motion import SIDES, LimitedMotion
+from rps_pin.rps.motion.time_optimal import time_optimal
 from rps_pin.trajectories.point_to_point import LineCurve
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from rps_pin import InputError, RPSRobot
 from rps_pin.errors import ParameterError
-from rps_pin.rps.loads import Payload, checked_wrench
+from rps_pin.rps.dynamics.loads import Payload, checked_wrench
 from tests import strategies
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rps_pin import RPSRobot, helix
-from rps_pin.rps import motion_csv
-from rps_pin.rps.motion_run import MotionRun, run_motion
+from rps_pin.rps.dynamics import motion_csv
+from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
 
 
 @pytest.fixture(scope="module")

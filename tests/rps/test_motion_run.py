@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from rps_pin import InputError, RPSRobot, SingularityError, UnreachableError, helix
-from rps_pin.rps.motion_run import MotionRun, run_motion, sample_times, summarise
+from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion, sample_times, summarise
 from rps_pin.trajectories import HelixPath
 from tests.reference import newton_euler
 

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from rps_pin import InputError, RPSParameters, RPSRobot, helix
-from rps_pin.rps.legs import cone_angles
-from rps_pin.rps.path_check import PathCheck, check_path
+from rps_pin.rps.kinematics.legs import cone_angles
+from rps_pin.rps.singularity.path_check import PathCheck, check_path
 from rps_pin.trajectories.path import PathSample, Trajectory
 from tests.strategies import random_parameters
 

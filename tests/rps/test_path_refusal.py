@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq, minimize_scalar
 
 from rps_pin import RPSRobot, SingularityError, UnreachableError, helix
-from rps_pin.rps.path_refusal import require_clear
+from rps_pin.rps.singularity.path_refusal import require_clear
 from rps_pin.trajectories import circle, point_to_point
 
 

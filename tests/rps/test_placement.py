@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rps_pin import ClosureError, InputError
-from rps_pin.rps import pose as native
-from rps_pin.rps.placement import constraint_residuals, pose_from_placement
+from rps_pin.rps.kinematics import pose as native
+from rps_pin.rps.kinematics.placement import constraint_residuals, pose_from_placement
 from tests.strategies import LEG_ANGLES, matrices, random_poses, vectors
 
 Array = NDArray[np.float64]

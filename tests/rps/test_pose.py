@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rps_pin import InputError
-from rps_pin.rps.conversions import pose_from_angles
-from rps_pin.rps.pose import (
+from rps_pin.rps.kinematics.conversions import pose_from_angles
+from rps_pin.rps.kinematics.pose import (
     checked_motion,
     checked_pose,
     platform_motion,

@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSParameters, RPSRobot, SingularityError, UnreachableError
-from rps_pin.rps.pose import rotation
-from rps_pin.rps.rates import (
+from rps_pin.rps.kinematics.pose import rotation
+from rps_pin.rps.kinematics.rates import (
     leg_jacobian_rates,
     leg_jacobians,
     platform_twist,

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSParameters, RPSRobot
-from rps_pin.rps.loads import Payload
-from rps_pin.rps.reactions import joint_reactions
+from rps_pin.rps.dynamics.joint_reactions import joint_reactions
+from rps_pin.rps.dynamics.loads import Payload
 from tests import strategies
 from tests.reference import newton_euler as ne
 from tests.strategies import relative_error

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rps_pin.rps import leg_equations as eq
-from rps_pin.rps.forward import forward_kinematics
-from rps_pin.rps.legs import leg_angles_and_lengths, tips
-from rps_pin.rps.pose import position, rotation
-from rps_pin.rps.scalar_tracking import (
+from rps_pin.rps.kinematics import leg_equations as eq
+from rps_pin.rps.kinematics.forward_kinematics import forward_kinematics
+from rps_pin.rps.kinematics.legs import leg_angles_and_lengths, tips
+from rps_pin.rps.kinematics.pose import position, rotation
+from rps_pin.rps.kinematics.tracking import (
     Lengths,
     Way,
     condition_of,

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from rps_pin import InputError, RPSParameters, RPSRobot, UnreachableError
-from rps_pin.rps.rates import leg_jacobians
-from rps_pin.rps.singularity import (
+from rps_pin.rps.kinematics.rates import leg_jacobians
+from rps_pin.rps.singularity.measures import (
     eq8_jacobian,
     measure_rates,
     passive_distance,

@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import quad
 
 from rps_pin import InputError, RPSParameters, RPSRobot, SingularityError, UnreachableError, helix
-from rps_pin.rps.sizing import (
+from rps_pin.rps.dynamics.sizing import (
     positive_area,
     size_actuators,
     size_motion,
     size_trajectory,
     time_above,
 )
-from rps_pin.rps.sizing_sheet import ActuatorLimits, SizingSheet
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, SizingSheet
 from rps_pin.trajectories.path import PathSample
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from rps_pin.errors import InputError
-from rps_pin.rps.speed_profile import SpeedProfile
+from rps_pin.rps.motion.speed_profile import SpeedProfile
 
 
 def random_profile(

@@ -9,16 +9,16 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import InputError, UnreachableError
-from rps_pin.rps import pose as native
-from rps_pin.rps.conversions import (
+from rps_pin.rps.kinematics import pose as native
+from rps_pin.rps.kinematics.conversions import (
     angles_from_pose,
     parasitic_motion,
     pose_from_angles,
     pose_from_position,
     position_from_pose,
 )
-from rps_pin.rps.placement import constraint_residuals, pose_from_placement
-from rps_pin.rps.three_quantities import poses_from
+from rps_pin.rps.kinematics.placement import constraint_residuals, pose_from_placement
+from rps_pin.rps.kinematics.three_quantities import poses_from
 from tests.strategies import LEG_ANGLES, matrices, random_poses
 
 Array = NDArray[np.float64]

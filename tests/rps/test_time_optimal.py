@@ -18,9 +18,9 @@ from scipy.integrate import quad, solve_ivp
 from rps_pin import RPSParameters, RPSRobot, helix
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.rps import ActuatorLimits, Payload, leg_jacobians
-from rps_pin.rps import time_search as search
-from rps_pin.rps.limited_motion import LimitedMotion
-from rps_pin.rps.time_optimal import KEPT, time_optimal
+from rps_pin.rps.motion import time_search as search
+from rps_pin.rps.motion.limited_motion import LimitedMotion
+from rps_pin.rps.motion.time_optimal import KEPT, time_optimal
 from rps_pin.trajectories.curve import Curve, CurveSample, TimedCurve
 from rps_pin.trajectories.path import PathSample
 from rps_pin.trajectories.point_to_point import LineCurve

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rps_pin.rps.tip_rings import Ring, Tips, resultant, tilt_functions, tips_of
+from rps_pin.rps.kinematics.tip_rings import Ring, Tips, resultant, tilt_functions, tips_of
 from tests import strategies
 from tests.reference import newton_euler as ne
 

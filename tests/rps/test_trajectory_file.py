@@ -13,13 +13,13 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from rps_pin import InputError, RPSPinError, RPSRobot, helix
-from rps_pin.rps.sizing_sheet import ActuatorLimits
-from rps_pin.rps.trajectory_file import load_trajectory
-from rps_pin.rps.trajectory_schema import KINDS
+from rps_pin.config import read_yaml
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
+from rps_pin.rps.motion.trajectory_file import load_trajectory
+from rps_pin.rps.motion.trajectory_schema import KINDS
 from rps_pin.trajectories import circle, lissajous, point_to_point, spline
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.path import Trajectory
-from rps_pin.yaml_files import read_yaml
 
 ROBOT = RPSRobot.from_preset("micro")
 STEP = "kind: point_to_point\nstart: [0.215, 0, 0]\nend: [0.225, 0.12, 0]\n"
@@ -218,7 +218,7 @@ def test_the_fastest_is_asked_for_with_the_limits(
         asked.append((robot, path.duration, limits.force, limits.speed))
         return circle(height=0.2, tilt=0.1, duration=0.5)
 
-    module = ModuleType("rps_pin.rps.time_optimal")
+    module = ModuleType("rps_pin.rps.motion.time_optimal")
     module.time_optimal = time_optimal  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
     (tmp_path / "path.yaml").write_text(f"{CIRCLE}fastest: {fastest}\n")

@@ -10,8 +10,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from rps_pin import InputError, RPSRobot, helix
-from rps_pin.rps.motion_csv import motion_columns
-from rps_pin.rps.motion_run import run_motion
+from rps_pin.rps.dynamics.motion_csv import motion_columns
+from rps_pin.rps.dynamics.motion_run import run_motion
 from rps_pin.trajectories.csv_columns import IGNORED, READ
 from rps_pin.trajectories.csv_file import read_csv
 from tests.trajectories.csv_files import QUANTITIES, SI, good_lines, refuse, save, swings

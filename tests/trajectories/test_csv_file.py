@@ -15,8 +15,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSPinError, RPSRobot, helix
-from rps_pin.rps.motion_csv import write_csv
-from rps_pin.rps.motion_run import MotionRun, run_motion
+from rps_pin.rps.dynamics.motion_csv import write_csv
+from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.helix import HelixPath
 from tests.trajectories.csv_files import SI, good_lines, read, refuse, save, swings

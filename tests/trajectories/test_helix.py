@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSRobot, helix
-from rps_pin.rps.pose import rotation
+from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.trajectories import HelixPath
 from rps_pin.trajectories.helix import PAPER_DURATION
 

@@ -12,11 +12,11 @@ import pinocchio as pin
 import pytest
 import umsgpack
 
-import rps_pin.viewer.html as html_module
+import rps_pin.viewer.files.html as html_module
 from rps_pin.errors import InputError
 from rps_pin.viewer import write_html
-from rps_pin.viewer.html import motion_page
-from rps_pin.viewer.page import inline_script, licences
+from rps_pin.viewer.files.html import motion_page
+from rps_pin.viewer.files.page import inline_script, licences
 
 FLOAT32_ARRAY = 0x17
 

@@ -20,7 +20,8 @@ from tornado.websocket import websocket_connect
 
 from rps_pin import RPSRobot
 from rps_pin.errors import InputError, RPSPinError
-from rps_pin.viewer import LiveView, LocalViewer, Recorder, Scene, live_view
+from rps_pin.viewer import LiveView, LocalViewer, Recorder, Scene
+from rps_pin.viewer.server.local_viewer import live_view
 
 POSE = (0.22, 0.0, 0.0)
 PLATFORM = "/world/robot/platform"
@@ -324,7 +325,7 @@ SCRIPT = """
     import sys
 
     from rps_pin import RPSRobot
-    from rps_pin.control.clock import LoopClock
+    from rps_pin.control.loop.clock import LoopClock
     from rps_pin.viewer import LiveView
 
     if __name__ == "__main__":

@@ -14,7 +14,7 @@ from PIL import Image, ImageSequence
 from rps_pin import ClosedLoopModel, RPSRobot, helix
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.viewer import save_html, save_png, save_video
-from rps_pin.viewer.browser import find_browser
+from rps_pin.viewer.files.browser import find_browser
 from tests.viewer.conftest import Watched
 
 STORED = Path(__file__).with_name("pictures")

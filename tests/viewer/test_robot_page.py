@@ -7,7 +7,7 @@ import pytest
 
 from rps_pin import RPSRobot, helix
 from rps_pin.cli.motion_report import write_motion
-from rps_pin.rps.motion_run import MotionRun, run_motion
+from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
 
 
 @pytest.fixture(scope="module")

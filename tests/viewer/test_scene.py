@@ -7,7 +7,7 @@ import pytest
 
 from rps_pin.errors import InputError
 from rps_pin.viewer import Recorder, Scene
-from rps_pin.viewer.stage import grid_spacing
+from rps_pin.viewer.scene.stage import grid_spacing
 from tests.viewer.robots import Sample, build, sample_robot
 
 ROBOT = "/world/robot"

@@ -1,6 +1,6 @@
 """What a new tab is told."""
 
-from rps_pin.viewer.store import SceneStore
+from rps_pin.viewer.server.store import SceneStore
 
 
 def apply(store: SceneStore, kind: str, path: str, packed: bytes, **more: object) -> None:

@@ -21,8 +21,8 @@ from rps_pin.cli.helix_options import (
     RadiusOption,
     chosen_helix,
 )
-from rps_pin.rps.path_check import check_path
-from rps_pin.rps.path_events import LimitEvent, SingularityEvent
+from rps_pin.rps.singularity.path_check import check_path
+from rps_pin.rps.singularity.path_events import LimitEvent, SingularityEvent
 from rps_pin.trajectories.helix import PAPER_DURATION
 
 

@@ -15,9 +15,9 @@ from rps_pin.cli.motion_report import print_files
 from rps_pin.errors import RPSPinError
 
 if TYPE_CHECKING:
-    from rps_pin.control.loop_run import LoopRun
-    from rps_pin.control.loop_summary import LoopSummary
-    from rps_pin.control.scenario import Scenario
+    from rps_pin.control.simulation.loop_run import LoopRun
+    from rps_pin.control.simulation.loop_summary import LoopSummary
+    from rps_pin.control.simulation.scenario import Scenario
 
 
 #: Changes of the status that are printed.
@@ -50,8 +50,8 @@ def control_command(
 
     - `rps-pin control docs/scenarios/micro_helix.yaml`
     """
-    from rps_pin.control.loop_summary import LoopSummary, status_name
-    from rps_pin.control.scenario import load_scenario
+    from rps_pin.control.simulation.loop_summary import LoopSummary, status_name
+    from rps_pin.control.simulation.scenario import load_scenario
 
     loaded = load_scenario(scenario)
     console = Console(quiet=as_json)
@@ -111,8 +111,8 @@ def _write(
     window: float,
 ) -> list[Path]:
     """Write everything into a folder; return the files."""
-    from rps_pin.control.loop_run import write_loop_csv
-    from rps_pin.control.report import report
+    from rps_pin.control.simulation.loop_run import write_loop_csv
+    from rps_pin.control.simulation.report import report
     from rps_pin.files import whole_file
     from rps_pin.plots import save_figure
     from rps_pin.plots.control import plot_loop_forces, plot_tracking

@@ -19,13 +19,13 @@ from rps_pin.cli.motion_report import (
     write_motion,
 )
 from rps_pin.errors import InputError
-from rps_pin.rps.loads import Payload
-from rps_pin.rps.motion_run import MotionRun, MotionSummary, run_motion, summarise
+from rps_pin.paper.three_ways import force_differences
+from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.dynamics.motion_run import MotionRun, MotionSummary, run_motion, summarise
+from rps_pin.rps.dynamics.sizing import size_actuators
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, SizingSheet
+from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.rps.sizing import size_actuators
-from rps_pin.rps.sizing_sheet import ActuatorLimits, SizingSheet
-from rps_pin.rps.three_ways import force_differences
-from rps_pin.rps.trajectory_file import load_trajectory
 from rps_pin.trajectories.path import Trajectory
 
 Three = tuple[float, float, float]
@@ -151,7 +151,7 @@ def _fastest(
     limits: ActuatorLimits,
     wrench: Six | None,
 ) -> Trajectory:
-    from rps_pin.rps.time_optimal import time_optimal
+    from rps_pin.rps.motion.time_optimal import time_optimal
 
     with console.status("finding the shortest time"):
         found = time_optimal(robot, path, limits=limits, wrench=wrench)
@@ -173,7 +173,7 @@ def _write(
     from rps_pin.files import whole_file
     from rps_pin.plots import save_figure
     from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
-    from rps_pin.rps.force_causes import force_causes
+    from rps_pin.rps.dynamics.force_causes import force_causes
 
     title = f"3-RPS {robot.parameters.name} along {trajectory.name}"
     files = write_motion(folder, "dynamics", title, robot, run, wrench)

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rps_pin.cli.console import RobotOption, load_robot
-from rps_pin.rps.assembly import AssemblyModes
+from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
 from rps_pin.rps.robot import RPSRobot
 
 Triple = tuple[float, float, float]

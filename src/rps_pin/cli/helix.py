@@ -29,7 +29,7 @@ from rps_pin.cli.motion_report import (
     sample_progress,
     write_motion,
 )
-from rps_pin.rps.motion_run import MotionSummary, run_motion, summarise
+from rps_pin.rps.dynamics.motion_run import MotionSummary, run_motion, summarise
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.helix import PAPER_DURATION, HelixPath
 

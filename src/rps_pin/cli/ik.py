@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 from typing import Annotated
 
-import numpy as np
 import typer
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from rps_pin.arrays import Array
 from rps_pin.cli.console import RobotOption, load_robot
 from rps_pin.errors import LimitViolation, UnreachableError
-from rps_pin.rps.legs import cone_angles
+from rps_pin.rps.kinematics.legs import cone_angles
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 
@@ -72,9 +71,9 @@ def _violations(robot: RPSRobot, pose: tuple[float, float, float]) -> tuple[Limi
 
 def _table(
     parameters: RPSParameters,
-    length: NDArray[np.float64],
-    angle: NDArray[np.float64],
-    cone: NDArray[np.float64],
+    length: Array,
+    angle: Array,
+    cone: Array,
 ) -> Table:
     table = Table("", "leg 1", "leg 2", "leg 3", "limits", "unit")
     for column in table.columns[1:4]:

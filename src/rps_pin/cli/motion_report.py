@@ -10,8 +10,8 @@ from rich.progress import track
 from rich.table import Table
 
 from rps_pin.cli.layer_options import chosen_layers
-from rps_pin.rps.motion_csv import write_csv
-from rps_pin.rps.motion_run import ActuatorSummary, MotionRun, MotionSummary
+from rps_pin.rps.dynamics.motion_csv import write_csv
+from rps_pin.rps.dynamics.motion_run import ActuatorSummary, MotionRun, MotionSummary
 from rps_pin.rps.robot import RPSRobot
 
 

@@ -12,7 +12,7 @@ from rich.progress import track
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from rps_pin.reproduction.compute import Reproduction
+    from rps_pin.paper.compute import Reproduction
 
 
 def reproduce_command(
@@ -34,8 +34,8 @@ def reproduce_command(
 
     Example: `rps-pin reproduce --quick -o paper`
     """
-    from rps_pin.reproduction.compute import compute
-    from rps_pin.reproduction.write import write
+    from rps_pin.paper.compute import compute
+    from rps_pin.paper.write import write
 
     console = Console()
     tracked = _tracker(console)
@@ -58,7 +58,7 @@ def _tracker(console: Console) -> Callable[[Iterable[Any], str], Iterator[Any]]:
 
 
 def _summary(found: Reproduction) -> Table:
-    from rps_pin.reproduction.page import summary_lines
+    from rps_pin.paper.page import summary_lines
 
     table = Table(show_header=False)
     for name, value in summary_lines(found):

@@ -9,11 +9,11 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from rps_pin.arrays import Array
 from rps_pin.cli.layer_options import LayersOption, chosen_layers
 from rps_pin.cli.mechanism_options import (
     FileArgument,
@@ -22,10 +22,8 @@ from rps_pin.cli.mechanism_options import (
     mechanism_file,
 )
 from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.closed_loop.simulated_motion import Simulation
+from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.errors import InputError
-
-Array = NDArray[np.float64]
 
 _MOST_NOTES = 3
 
@@ -91,7 +89,7 @@ def simulate_command(
 
     - `rps-pin simulate delta --hold --speed arm_1_joint=0.5`
     """
-    from rps_pin.closed_loop.simulation import simulate
+    from rps_pin.closed_loop.simulation.simulate import simulate
 
     file = mechanism_file(file)
     mechanism = load_mechanism(file)

@@ -14,15 +14,14 @@ from rich.table import Table
 
 from rps_pin.cli.console import RobotOption, load_robot
 from rps_pin.errors import InputError
+from rps_pin.paper import PaperComparison, paper_comparison
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.workspace import (
-    PaperComparison,
     Reason,
     Workspace,
     boundary,
     largest_tilt_range,
     leg_grid,
-    paper_comparison,
     save_mesh,
     save_workspace,
     volume,

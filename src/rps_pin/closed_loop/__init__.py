@@ -6,19 +6,19 @@ Nothing here draws, controls or plans in time: those are `rps_pin.viewer`, `rps_
 `rps_pin.control` and `rps_pin.trajectories`.
 """
 
-from rps_pin.closed_loop.closure import JointCoupling, LoopClosure
-from rps_pin.closed_loop.composing import Part, body, compose
-from rps_pin.closed_loop.force_bounds import ForceBound, friction_pyramid
-from rps_pin.closed_loop.force_distribution import DistributedForces, ForceDistribution
-from rps_pin.closed_loop.inverse_dynamics import InverseDynamics
-from rps_pin.closed_loop.joint_effects import JointEffects
-from rps_pin.closed_loop.loops import LoopErrors
-from rps_pin.closed_loop.merging import JointMerge, merged
-from rps_pin.closed_loop.mobility import MechanismDescription
+from rps_pin.closed_loop.constraints.closures import JointCoupling, LoopClosure
+from rps_pin.closed_loop.constraints.loops import LoopErrors
+from rps_pin.closed_loop.describe import MechanismDescription
+from rps_pin.closed_loop.dynamics.force_bounds import ForceBound, friction_pyramid
+from rps_pin.closed_loop.dynamics.force_distribution import DistributedForces, ForceDistribution
+from rps_pin.closed_loop.dynamics.inverse_dynamics import InverseDynamics
+from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
+from rps_pin.closed_loop.editing.compose import Part, body, compose
+from rps_pin.closed_loop.editing.merge import JointMerge, merged
 from rps_pin.closed_loop.model import ClosedLoopModel
-from rps_pin.closed_loop.simulated_motion import JointLimitPassed, Simulation
-from rps_pin.closed_loop.simulation import simulate
-from rps_pin.closed_loop.stepping import Stepper
+from rps_pin.closed_loop.simulation.result import JointLimitPassed, Simulation
+from rps_pin.closed_loop.simulation.simulate import simulate
+from rps_pin.closed_loop.simulation.stepper import Stepper
 
 __all__ = [
     "ClosedLoopModel",

@@ -8,10 +8,13 @@ from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rps_pin.closed_loop.closure import Closure
-from rps_pin.closed_loop.derivatives import (
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.closures import Closure
+from rps_pin.closed_loop.constraints.loops import Loops
+from rps_pin.closed_loop.describe import MechanismDescription, describe
+from rps_pin.closed_loop.dynamics.derivatives import (
     Following,
     ForwardDynamicsDerivatives,
     InverseDynamicsDerivatives,
@@ -22,24 +25,20 @@ from rps_pin.closed_loop.derivatives import (
     inverse_derivatives,
     linearisation,
 )
-from rps_pin.closed_loop.description import parts_from_yaml
-from rps_pin.closed_loop.dynamics import ClosedLoopDynamics
-from rps_pin.closed_loop.inverse_dynamics import pseudo_inverse
-from rps_pin.closed_loop.joint_effects import FRICTION_SPEED, JointEffects
-from rps_pin.closed_loop.kinematics import MAX_CONDITION
-from rps_pin.closed_loop.loops import Loops
-from rps_pin.closed_loop.mjcf import parts_from_mjcf
-from rps_pin.closed_loop.mobility import MechanismDescription, describe
-from rps_pin.closed_loop.parts import MechanismParts
-from rps_pin.closed_loop.reading import model_from_urdf
-from rps_pin.closed_loop.simulated_motion import Simulation
-from rps_pin.closed_loop.simulation import simulate
-from rps_pin.closed_loop.splitting import split
+from rps_pin.closed_loop.dynamics.dynamics import ClosedLoopDynamics
+from rps_pin.closed_loop.dynamics.inverse_dynamics import pseudo_inverse
+from rps_pin.closed_loop.dynamics.kinematics import MAX_CONDITION
+from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED, JointEffects
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
+from rps_pin.closed_loop.editing.split import split
+from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
+from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
+from rps_pin.closed_loop.io.parts import MechanismParts
+from rps_pin.closed_loop.io.urdf import model_from_urdf
+from rps_pin.closed_loop.simulation.result import Simulation
+from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.closed_loop.vectors import checked_vector
-from rps_pin.closed_loop.wrenches import Wrenches, closure_wrenches, forces_on_joints
 from rps_pin.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 class ClosedLoopModel(ClosedLoopDynamics):

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg.blas import dasum
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def checked_vector(value: ArrayLike, size: int, name: str) -> Array:

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from pinocchio import coal
 
-from rps_pin.closed_loop.closure import LoopClosure
-from rps_pin.closed_loop.description_schema import validated
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.closures import LoopClosure
+from rps_pin.closed_loop.io.mechanism_schema import validated
 from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.config import read_yaml
 from rps_pin.errors import MechanismError
-from rps_pin.yaml_files import read_yaml
 
 
 def visual_model(path: str | os.PathLike[str], model: pin.Model) -> pin.GeometryModel | None:
@@ -59,7 +59,7 @@ def skeleton(mechanism: ClosedLoopModel) -> pin.GeometryModel:
     of any length.
     """
     model = mechanism.model
-    ends: list[tuple[int, NDArray[np.float64]]] = []
+    ends: list[tuple[int, Array]] = []
     for joint in range(1, model.njoints):
         ends.append((int(model.parents[joint]), np.array(model.jointPlacements[joint].translation)))
     for closure in mechanism.closures:
@@ -96,7 +96,7 @@ def _add(
     joint: int,
     placement: pin.SE3,
     shape: coal.CollisionGeometry,
-    colour: NDArray[np.float64],
+    colour: Array,
 ) -> None:
     item = pin.GeometryObject(name, joint, placement, shape)
     item.meshColor = colour

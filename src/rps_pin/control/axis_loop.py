@@ -18,11 +18,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rps_pin.arrays import Array, ComplexArray
 from rps_pin.errors import InputError, shown
-
-Array = NDArray[np.float64]
 
 _LONGEST_DELAY = 200
 _SLOWEST = 1e-11  # 1 / tick: poles closer to z = 1 are hidden by rounding
@@ -41,7 +39,7 @@ class AxisLoop(NamedTuple):
     share: float | None
     """s of the filter; None with measured speed."""
 
-    def response(self, t: Array) -> NDArray[np.complex128]:
+    def response(self, t: Array) -> ComplexArray:
         """Return -L(exp(j t)) at angles t (rad a tick, 0 < t <= pi, any shape)."""
         sine, cosine = np.sin(t / 2), np.cos(t / 2)
         # P_x = -exp(-j t/2) cos(t/2) / (4 sin^2(t/2));  z / (z - 1) = exp(j t/2) / (2j sin(t/2))
@@ -53,7 +51,7 @@ class AxisLoop(NamedTuple):
             top = self.share * 2j * sine * np.exp(0.5j * t)
             speed = cosine * top / (2j * sine * np.exp(0.5j * t) + self.share)
         lag = np.exp(-1j * (0.5 + self.delay) * t)
-        value: NDArray[np.complex128] = lag * (position + self.kd * speed) / (4 * sine**2)
+        value: ComplexArray = lag * (position + self.kd * speed) / (4 * sine**2)
         # cos(pi / 2) is not 0 in floating point: at t = pi, L is real, and 0 without P_v.
         end = 0.0 if self.share is not None else 0.5 * self.kd * (-1.0) ** self.delay
         return np.where(t == np.pi, end, value)

@@ -16,13 +16,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, minimize_scalar
 
+from rps_pin.arrays import Array, ComplexArray
 from rps_pin.control.axis_loop import axis_loop
 
-Array = NDArray[np.float64]
-Response = Callable[[Array], NDArray[np.complex128]]
+Response = Callable[[Array], ComplexArray]
 
 
 class LoopMargins(NamedTuple):
@@ -133,13 +132,13 @@ def _roots(function: Callable[[Array], Array], t: Array, values: Array) -> Array
     return np.array([brentq(scalar, t[i], t[i + 1], xtol=1e-15, rtol=1e-13) for i in below])
 
 
-def _unit_gain(response: Response, t: Array, value: NDArray[np.complex128]) -> Array:
+def _unit_gain(response: Response, t: Array, value: ComplexArray) -> Array:
     """Angles where abs(L) = 1, rising; t = pi too where the curve ends outside the unit circle."""
     roots = _roots(lambda angle: np.abs(response(angle)) - 1, t, np.abs(value) - 1)
     return np.append(roots, np.pi) if abs(value[-1]) >= 1 else roots
 
 
-def _critical_factors(response: Response, t: Array, value: NDArray[np.complex128]) -> Array:
+def _critical_factors(response: Response, t: Array, value: ComplexArray) -> Array:
     """Factors of the loop gain that put a pole on the unit circle: 1 / abs(L) where L < 0."""
     roots = _roots(lambda angle: response(angle).imag, t, value.imag)
     real = response(np.append(roots, np.pi)).real
@@ -147,7 +146,7 @@ def _critical_factors(response: Response, t: Array, value: NDArray[np.complex128
     return factors
 
 
-def _modulus(response: Response, t: Array, value: NDArray[np.complex128]) -> float:
+def _modulus(response: Response, t: Array, value: ComplexArray) -> float:
     distance = np.abs(1 - value)
     i = int(distance.argmin())
     found = minimize_scalar(
@@ -159,10 +158,10 @@ def _modulus(response: Response, t: Array, value: NDArray[np.complex128]) -> flo
     return float(min(found.fun, distance[i]))
 
 
-def _bandwidth(response: Response, t: Array, value: NDArray[np.complex128]) -> float:
+def _bandwidth(response: Response, t: Array, value: ComplexArray) -> float:
     """First angle where abs(L / (1 + L)) = 1 / sqrt(2); pi if it never falls so far."""
 
-    def excess(minus_l: NDArray[np.complex128]) -> Array:
+    def excess(minus_l: ComplexArray) -> Array:
         gain: Array = np.abs(minus_l / (1 - minus_l)) - math.sqrt(0.5)
         return gain
 

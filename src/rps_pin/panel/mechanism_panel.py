@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.closed_loop.limits import JointLimits
+from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.panel.sliders import Slider, asked_of, told
 
-Array = NDArray[np.float64]
 _MM, _DEGREE = 1e3, 180.0 / math.pi
 
 

@@ -7,8 +7,8 @@ from typing import Any, Self
 
 from rps_pin.errors import RPSPinError
 from rps_pin.panel.sliders import Panel, as_html, asked_by, show_values
-from rps_pin.viewer.scene import Scene
-from rps_pin.viewer.server import LocalViewer
+from rps_pin.viewer.scene.scene import Scene
+from rps_pin.viewer.server.local_viewer import LocalViewer
 
 _HEIGHT = 480
 

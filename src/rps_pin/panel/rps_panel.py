@@ -7,17 +7,16 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.panel.sliders import Slider, asked_of, told
-from rps_pin.rps.legs import cone_angles, violations
+from rps_pin.rps.kinematics.legs import cone_angles, violations
+from rps_pin.rps.kinematics.pose import checked_pose
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import checked_pose
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.rps.singularity import singularity_measures
-
-Array = NDArray[np.float64]
+from rps_pin.rps.singularity.measures import singularity_measures
 
 _MM, _DEGREE = 1e3, 180.0 / math.pi
 _STILL = np.zeros(3)

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 from rps_pin.rps.checks import finite_entries
@@ -36,7 +36,7 @@ class Panel(Protocol):
     trouble: list[str]
     """What is wrong where the sliders are, in words: limits, or why they were not followed."""
 
-    def values(self, group: str) -> NDArray[np.float64]:
+    def values(self, group: str) -> Array:
         """Return where a group's sliders stand, SI units."""
 
     def move(self, group: str, values: Any) -> bool:
@@ -46,14 +46,14 @@ class Panel(Protocol):
         """Return names and values to read out."""
 
     @property
-    def configuration(self) -> NDArray[np.float64]:
+    def configuration(self) -> Array:
         """Where the mechanism stands, shape (nq,)."""
 
     def visual_model(self) -> pin.GeometryModel:
         """Return its shapes."""
 
 
-def asked_of(groups: dict[str, tuple[Slider, ...]], group: str, values: Any) -> NDArray[np.float64]:
+def asked_of(groups: dict[str, tuple[Slider, ...]], group: str, values: Any) -> Array:
     """Return values that a group's sliders can take.
 
     Raises

@@ -1,7 +1,7 @@
 """Figures, by Matplotlib: axes with units, colours told apart by all, nothing that opens a window.
 
 Each function draws on axes (or a figure) of your own, or makes a figure, and returns it. Figures
-that compare with the paper stand in ``rps_pin.reproduction``; the 3D viewer is `rps_pin.viewer`.
+that compare with the paper stand in ``rps_pin.paper``; the 3D viewer is `rps_pin.viewer`.
 """
 
 from rps_pin.plots.conditioning import plot_height_conditioning, plot_tilt_conditioning

@@ -8,15 +8,15 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.plots.style import COLOUR_MAP, STYLE, figure_of
 from rps_pin.rps.checks import finite_entries
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.singularity import singularity_measures
+from rps_pin.rps.singularity.measures import singularity_measures
 
-Array = NDArray[np.float64]
 Measure = Literal["type_ii", "constraint", "determinant"]
 _LABELS = {
     "type_ii": "distance to type II (0 singular, 1 at best)",

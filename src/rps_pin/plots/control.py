@@ -12,11 +12,11 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from rps_pin.control.loop_run import LoopRun
-from rps_pin.control.loop_summary import TrackingErrors, status_name
-from rps_pin.control.status import Status
+from rps_pin.arrays import Array
+from rps_pin.control.loop.status import Status
+from rps_pin.control.simulation.loop_run import LoopRun
+from rps_pin.control.simulation.loop_summary import TrackingErrors, status_name
 from rps_pin.errors import InputError
 from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of
 
@@ -28,8 +28,6 @@ _LEGEND: Any = {
     "frameon": False,
     "borderaxespad": 0.1,
 }
-
-Array = NDArray[np.float64]
 
 
 def plot_tracking(

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 from rps_pin.errors import InputError
 from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, legend_above
 from rps_pin.rps.checks import finite_entries
-from rps_pin.rps.force_causes import ForceCauses
-from rps_pin.rps.sizing_sheet import SizingSheet
+from rps_pin.rps.dynamics.force_causes import ForceCauses
+from rps_pin.rps.dynamics.sizing_sheet import SizingSheet
 
 #: Okabe and Ito's colours for the causes, told apart by colour-blind readers; and hatches, so that
 #: print without colour will do.

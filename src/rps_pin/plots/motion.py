@@ -8,15 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.axes3d import Axes3D
-from numpy.typing import NDArray
 
+from rps_pin.arrays import Array
 from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, legend_above
-from rps_pin.rps.motion_run import MotionRun
+from rps_pin.rps.dynamics.motion_run import MotionRun
 
 
 def plot_path(run: MotionRun, figure: Figure | None = None) -> Figure:
@@ -70,8 +69,8 @@ def plot_length_phase(run: MotionRun, axes: Axes | None = None) -> Figure:
 
 
 def _over_time(
-    time: NDArray[np.float64],
-    values: NDArray[np.float64],
+    time: Array,
+    values: Array,
     label: str,
     title: str,
     axes: Axes | None,

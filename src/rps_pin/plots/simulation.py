@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.closed_loop.simulated_motion import Simulation
+from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.plots.style import COLOURS, STYLE
 
 #: Further ones where the colours come round again.

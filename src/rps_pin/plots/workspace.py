@@ -16,9 +16,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
-from numpy.typing import NDArray
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.paper.workspace_comparison import PaperComparison
 from rps_pin.plots.style import (
     BLACK,
     BLUE,
@@ -30,14 +31,11 @@ from rps_pin.plots.style import (
     VERMILION,
     YELLOW,
 )
-from rps_pin.rps.legs import RADIAL
+from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.geometry import boundary
-from rps_pin.rps.workspace.paper import PaperComparison
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
-
-Array = NDArray[np.float64]
 
 #: The workspace, the theoretical cylinder, the platform.
 _INSIDE, _CYLINDER, _PLATFORM = BLUE, GREY, ORANGE

@@ -1,5 +1,9 @@
-"""The reproduction of the paper: its equations, figures and tables beside ours, as one page.
+"""The old name of `rps_pin.paper`: it keeps working, and says where it went."""
 
-``rps-pin reproduce`` writes it. The formulas typed here are the paper's, misprints included, to be
-compared; what the library itself uses stands in `rps_pin.rps` and `rps_pin.trajectories`.
-"""
+import sys
+import warnings
+
+import rps_pin.paper
+
+warnings.warn("rps_pin.reproduction has moved to rps_pin.paper", DeprecationWarning, stacklevel=2)
+sys.modules[__name__] = rps_pin.paper

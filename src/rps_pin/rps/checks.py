@@ -8,8 +8,8 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError, shown
-from rps_pin.rps.pose import Array
 
 
 def positive_length(value: float, name: str) -> float:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     BaseModel,
     BeforeValidator,
@@ -26,10 +25,11 @@ from pydantic import (
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 
-from rps_pin.closed_loop.joint_effects import FRICTION_SPEED
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED
+from rps_pin.config import YamlFile, read_yaml
 from rps_pin.errors import InputError, ParameterError
 from rps_pin.files import whole_file
-from rps_pin.yaml_files import YamlFile, read_yaml
 
 #: A printed table rounds its inertias (the paper's Table 1 by 0.5 %): this much of the largest
 #: principal moment may be missing from the triangle inequality.
@@ -40,7 +40,7 @@ def _array(*shape: int) -> BeforeValidator:
     """Return a validator that makes a finite, read-only float array of the given shape."""
     wanted = f"must be {' x '.join(map(str, shape))} numbers, shape {shape}"
 
-    def convert(value: object) -> NDArray[np.float64]:
+    def convert(value: object) -> Array:
         # Looked at before it is converted: a file's nest of aliases can be huge.
         if not _has_shape(value, shape):
             raise ValueError(wanted)
@@ -198,7 +198,7 @@ class RPSParameters(BaseModel):
 
     @field_validator("platform_inertia")
     @classmethod
-    def _inertia_of_a_rigid_body(cls, inertia: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _inertia_of_a_rigid_body(cls, inertia: Array) -> Array:
         scale = float(np.abs(inertia).max())
         if np.abs(inertia - inertia.T).max() > 1e-9 * scale:
             raise ValueError("must be symmetric")

@@ -6,22 +6,21 @@ from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop import ClosedLoopModel, InverseDynamics, LoopClosure
-from rps_pin.closed_loop.reading import model_from_urdf
+from rps_pin.closed_loop.io.urdf import model_from_urdf
 from rps_pin.errors import InputError, UnreachableError, shown
-from rps_pin.rps import actuator_forces as fast_path
-from rps_pin.rps import legs as leg_kinematics
-from rps_pin.rps.assembly import AssemblyModes, assembly_modes
-from rps_pin.rps.force_equations import ForceTerms
-from rps_pin.rps.forward import forward_kinematics
-from rps_pin.rps.friction import friction_effects
-from rps_pin.rps.legs import LegMotion, Legs
-from rps_pin.rps.loads import Payload
-from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import (
-    Array,
+from rps_pin.rps.dynamics import actuator_forces as fast_path
+from rps_pin.rps.dynamics.force_equations import ForceTerms
+from rps_pin.rps.dynamics.friction import friction_effects
+from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.kinematics import legs as leg_kinematics
+from rps_pin.rps.kinematics.assembly_modes import AssemblyModes, assembly_modes
+from rps_pin.rps.kinematics.forward_kinematics import forward_kinematics
+from rps_pin.rps.kinematics.legs import LegMotion, Legs
+from rps_pin.rps.kinematics.pose import (
     PlatformMotion,
     checked_motion,
     checked_pose,
@@ -30,6 +29,7 @@ from rps_pin.rps.pose import (
     quaternion,
     rotation,
 )
+from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.urdf import LEGS, ball_frames, build_urdf
 
 
@@ -37,9 +37,9 @@ class RPSRobot:
     """A 3-RPS parallel robot.
 
     Poses are ``(z, tilt_x, tilt_y)``: the height of the platform's centre (m) and the platform's
-    rotation vector (rad), which lies in the base plane; see `rps_pin.rps.pose`. Arrays of poses
-    carry leading batch dimensions, ``(..., 3)``. Legs are counted 1 to 3 in messages, 0 to 2 in
-    arrays. One object serves one thread (see `ClosedLoopModel`).
+    rotation vector (rad), which lies in the base plane; see `rps_pin.rps.kinematics.pose`. Arrays
+    of poses carry leading batch dimensions, ``(..., 3)``. Legs are counted 1 to 3 in messages, 0 to
+    2 in arrays. One object serves one thread (see `ClosedLoopModel`).
 
     Parameters
     ----------
@@ -207,8 +207,8 @@ class RPSRobot:
         Returns
         -------
         array
-            Poses, shape (..., 3). `rps_pin.rps.forward` has the form that masks what cannot be
-            followed, and a tracker for encoders in a loop.
+            Poses, shape (..., 3). `rps_pin.rps.kinematics.forward_kinematics` has the form that
+            masks what cannot be followed, and a tracker for encoders in a loop.
 
         Raises
         ------
@@ -381,7 +381,7 @@ class RPSRobot:
 
     def _reachable(
         self, pose: Array, length: Array, angle: Array, turn: Array, *, refuse: bool
-    ) -> NDArray[np.bool_]:
+    ) -> Bools:
         """Return whether each pose keeps its limits, or refuse the first that does not."""
         cone = leg_kinematics.cone_angles(angle, turn, self.parameters.spherical_rest_angle)
         reachable = leg_kinematics.within_limits(self.parameters, length, angle, cone)

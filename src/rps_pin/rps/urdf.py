@@ -20,8 +20,8 @@ from typing import TypeAlias
 import numpy as np
 import yourdfpy
 from lxml import etree
-from numpy.typing import NDArray
 
+from rps_pin.arrays import Array
 from rps_pin.rps.parameters import RPSParameters
 
 LEGS = (1, 2, 3)
@@ -216,7 +216,7 @@ def _rod_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfpy.Lin
     return link
 
 
-def _bar_inertia(mass: float, across: float, radius: float) -> NDArray[np.float64]:
+def _bar_inertia(mass: float, across: float, radius: float) -> Array:
     """Return the inertia of a bar along x about its centre of mass, shape (3, 3).
 
     Only the moment across the bar, in the plane the leg moves in, does work; the bar is taken as a
@@ -226,17 +226,13 @@ def _bar_inertia(mass: float, across: float, radius: float) -> NDArray[np.float6
     return np.diag([along, across, across])
 
 
-def _bar_inertial(
-    mass: float, com: float, inertia: NDArray[np.float64]
-) -> yourdfpy.Inertial | None:
+def _bar_inertial(mass: float, com: float, inertia: Array) -> yourdfpy.Inertial | None:
     if mass == 0:
         return None
     return yourdfpy.Inertial(origin=_at(com, 0, 0), mass=mass, inertia=inertia)
 
 
-def _add(
-    link: yourdfpy.Link, name: str, shape: Shape, origin: NDArray[np.float64], paint: Paint
-) -> None:
+def _add(link: yourdfpy.Link, name: str, shape: Shape, origin: Array, paint: Paint) -> None:
     """Give a link a shape, to be seen and to be hit."""
     visual = _decorate(link, name, shape, origin, paint)
     link.collisions.append(
@@ -245,7 +241,7 @@ def _add(
 
 
 def _decorate(
-    link: yourdfpy.Link, name: str, shape: Shape, origin: NDArray[np.float64], paint: Paint
+    link: yourdfpy.Link, name: str, shape: Shape, origin: Array, paint: Paint
 ) -> yourdfpy.Visual:
     """Give a link a shape that is only seen."""
     geometry = yourdfpy.Geometry(**{type(shape).__name__.lower(): shape})
@@ -295,7 +291,7 @@ def _joint(
     kind: str,
     parent: str,
     child: str,
-    origin: NDArray[np.float64] | None = None,
+    origin: Array | None = None,
     axis: Sequence[float] | None = None,
     limit: yourdfpy.Limit | None = None,
 ) -> yourdfpy.Joint:
@@ -317,13 +313,13 @@ def _polar(radius: float, direction: float) -> tuple[float, float, float]:
     return radius * math.cos(direction), radius * math.sin(direction), 0.0
 
 
-def _at(x: float, y: float, z: float) -> NDArray[np.float64]:
+def _at(x: float, y: float, z: float) -> Array:
     placement = np.eye(4)
     placement[:3, 3] = x, y, z
     return placement
 
 
-def _turn(axis_1: int, axis_2: int, angle: float) -> NDArray[np.float64]:
+def _turn(axis_1: int, axis_2: int, angle: float) -> Array:
     """Return the rotation by `angle` that carries axis 1 towards axis 2."""
     placement = np.eye(4)
     cosine, sine = math.cos(angle), math.sin(angle)
@@ -332,7 +328,7 @@ def _turn(axis_1: int, axis_2: int, angle: float) -> NDArray[np.float64]:
     return placement
 
 
-def _turn_x(angle: float) -> NDArray[np.float64]:
+def _turn_x(angle: float) -> Array:
     return _turn(1, 2, angle)
 
 
@@ -340,6 +336,6 @@ def _turn_x(angle: float) -> NDArray[np.float64]:
 _TO_X = _turn(2, 0, math.pi / 2)
 
 
-def _leg_placement(parameters: RPSParameters, direction: float) -> NDArray[np.float64]:
+def _leg_placement(parameters: RPSParameters, direction: float) -> Array:
     """Return the frame of a leg's revolute joint: x towards the base's centre, z up."""
     return _at(*_polar(parameters.base_radius, direction)) @ _turn(0, 1, direction + math.pi)

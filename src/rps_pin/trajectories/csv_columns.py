@@ -43,7 +43,8 @@ READ = {
     for quantity, units in UNITS.items()
     for unit, si in units.items()
 }
-#: What `rps_pin.rps.motion_csv` writes besides: it follows from the motion and is not read.
+#: What `rps_pin.rps.dynamics.motion_csv` writes besides: it follows from the motion and is not
+#: read.
 IGNORED = frozenset(
     ["x_m", "y_m"]
     + [

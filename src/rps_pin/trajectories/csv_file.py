@@ -1,6 +1,6 @@
 """Trajectories from CSV files.
 
-The header names quantities with their units, as `rps_pin.rps.motion_csv` writes them:
+The header names quantities with their units, as `rps_pin.rps.dynamics.motion_csv` writes them:
 
     time_s,z_m,tilt_x_deg,tilt_y_deg
     0.00,0.223,0.0,5.0
@@ -18,11 +18,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.csv_columns import ACCELERATIONS, COORDINATES, RATES, Column, columns_of
 from rps_pin.trajectories.csv_table import Table, read_table
 from rps_pin.trajectories.derivative_check import disagreement
-from rps_pin.trajectories.path import Array
 from rps_pin.trajectories.poses import real
 from rps_pin.trajectories.sampled_path import FEWEST_POSES, SampledPath
 

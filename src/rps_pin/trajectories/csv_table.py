@@ -18,8 +18,8 @@ from typing import BinaryIO, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
-from rps_pin.trajectories.path import Array
 
 #: Most lines of a file, and most bytes of a line, that are read.
 MOST_LINES = 2_000_000

@@ -11,7 +11,8 @@ from typing import NamedTuple, Protocol
 
 from numpy.typing import ArrayLike
 
-from rps_pin.trajectories.path import Array, PathSample, checked_times
+from rps_pin.arrays import Array
+from rps_pin.trajectories.path import PathSample, checked_times
 
 
 class CurveSample(NamedTuple):

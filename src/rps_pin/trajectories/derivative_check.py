@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rps_pin.trajectories.path import Array
+from rps_pin.arrays import Array
 
 #: How far a slope may miss the derivatives, over the column's largest value.
 _GROSS = 0.5

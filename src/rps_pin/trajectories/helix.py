@@ -22,9 +22,10 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample
-from rps_pin.trajectories.path import Array, PathSample, checked_parameters, checked_times
+from rps_pin.trajectories.path import PathSample, checked_parameters, checked_times
 from rps_pin.trajectories.poses import finite_number
 from rps_pin.trajectories.time_laws import positive
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 class PathSample(NamedTuple):

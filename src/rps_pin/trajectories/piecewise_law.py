@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array, Indices
 from rps_pin.trajectories.curve import LawSample
-from rps_pin.trajectories.path import Array, checked_times
+from rps_pin.trajectories.path import checked_times
 
 
 class PiecewiseLaw:
@@ -58,7 +59,7 @@ class PiecewiseLaw:
             self._u[i] + h * (v + h * (a / 2 + h * j / 6)), v + h * (a + h * j / 2), a + h * j
         )
 
-    def _piece(self, times: Array) -> tuple[NDArray[np.intp], Array]:
+    def _piece(self, times: Array) -> tuple[Indices, Array]:
         """Return in which piece times are, and for how long, reckoned from the nearer end."""
         left = self.duration - times
         early = times < left

@@ -7,9 +7,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
-from rps_pin.trajectories.path import Array, checked_parameters
+from rps_pin.trajectories.path import checked_parameters
 from rps_pin.trajectories.poses import checked_pose
 from rps_pin.trajectories.time_laws import Profile, time_law
 

@@ -8,8 +8,8 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
-from rps_pin.trajectories.path import Array
 
 #: No number given to a trajectory is larger (m, rad, s): what is reckoned from them stays finite.
 _LARGEST = 1e50

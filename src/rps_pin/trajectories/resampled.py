@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import make_interp_spline
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample
-from rps_pin.trajectories.path import Array, Trajectory, checked_parameters
+from rps_pin.trajectories.path import Trajectory, checked_parameters
 
 #: Pieces that the way is divided into: at first, and at most (or four to a step between times).
 PIECES, MOST_PIECES = 400, 25_600

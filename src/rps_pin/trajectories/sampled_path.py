@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BPoly, BSpline, make_interp_spline
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.trajectories.path import Array, PathSample, checked_times
+from rps_pin.trajectories.path import PathSample, checked_times
 from rps_pin.trajectories.poses import checked_poses, finite_array, times_from_zero
 from rps_pin.trajectories.resampled import ResampledCurve
 

@@ -18,15 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
-from rps_pin.trajectories.path import (
-    Array,
-    PathSample,
-    Trajectory,
-    checked_parameters,
-    checked_times,
-)
+from rps_pin.trajectories.path import PathSample, Trajectory, checked_parameters, checked_times
 from rps_pin.trajectories.poses import checked_poses, times_from_zero
 from rps_pin.trajectories.resampled import ResampledCurve
 from rps_pin.trajectories.time_laws import Profile, positive, time_law

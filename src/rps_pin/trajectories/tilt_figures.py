@@ -13,9 +13,10 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
-from rps_pin.trajectories.path import Array, checked_parameters
+from rps_pin.trajectories.path import checked_parameters
 from rps_pin.trajectories.poses import finite_array, finite_number
 from rps_pin.trajectories.time_laws import Profile, positive, time_law
 

@@ -4,7 +4,7 @@
 with it; `Scene` and what is below it know Pinocchio models only.
 """
 
-from rps_pin.viewer.html import write_html
+from rps_pin.viewer.files.html import write_html
 from rps_pin.viewer.layers import (
     LAYERS,
     Closures,
@@ -19,15 +19,15 @@ from rps_pin.viewer.layers import (
     WorkspaceSurface,
     fitting_layers,
 )
-from rps_pin.viewer.live_view import LiveView
 from rps_pin.viewer.motion import FRAME_RATE, Motion
-from rps_pin.viewer.playback import play
-from rps_pin.viewer.recorder import Recorder
 from rps_pin.viewer.save import LocalView, save_html, save_png, save_video, show
-from rps_pin.viewer.scene import Scene
-from rps_pin.viewer.server import LocalViewer
+from rps_pin.viewer.scene.scene import Scene
+from rps_pin.viewer.server.live_view import LiveView
+from rps_pin.viewer.server.local_viewer import LocalViewer
+from rps_pin.viewer.server.playback import play
+from rps_pin.viewer.server.recorder import Recorder
+from rps_pin.viewer.server.window import Command, RawCommand, Window
 from rps_pin.viewer.view import View
-from rps_pin.viewer.window import Command, RawCommand, Window
 
 __all__ = [
     "FRAME_RATE",

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 
 FRAME_RATE = 30.0
@@ -20,13 +21,13 @@ _UNIT_TOLERANCE = 1e-3
 class State(NamedTuple):
     """One moment of a motion, as Pinocchio has it."""
 
-    q: NDArray[np.float64]
+    q: Array
     """Configuration, shape (nq,)."""
-    v: NDArray[np.float64]
+    v: Array
     """Velocity, shape (nv,)."""
-    a: NDArray[np.float64]
+    a: Array
     """Acceleration, shape (nv,)."""
-    tau: NDArray[np.float64] | None = None
+    tau: Array | None = None
     """Actuator forces, where they are known, shape (na,); else the motion's inverse dynamics is."""
 
 
@@ -68,7 +69,7 @@ class Motion:
         wrenches: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         self._model = model
-        self.times: NDArray[np.float64] = np.asarray(times, dtype=np.float64)
+        self.times: Array = np.asarray(times, dtype=np.float64)
         self.configurations = checked_configurations(model, configurations)
         if self.times.shape != (len(self.configurations),):
             raise InputError(
@@ -91,7 +92,7 @@ class Motion:
         self.velocities = self._rates(velocities, "velocities")
         self.accelerations = self._rates(accelerations, "accelerations")
 
-    def _rates(self, given: ArrayLike | None, name: str) -> NDArray[np.float64]:
+    def _rates(self, given: ArrayLike | None, name: str) -> Array:
         wanted = (len(self.times), self._model.nv)
         if given is None:
             return np.zeros(wanted)
@@ -105,16 +106,16 @@ class Motion:
         """Time from the first configuration to the last, in seconds."""
         return float(self.times[-1] - self.times[0])
 
-    def at(self, elapsed: float) -> NDArray[np.float64]:
+    def at(self, elapsed: float) -> Array:
         """Return the configuration, shape (nq,), `elapsed` seconds after the first one.
 
         Before the start and after the end it is the first and the last configuration.
         """
         before, fraction = self._place(elapsed)
         if fraction == 0.0:
-            given: NDArray[np.float64] = self.configurations[before]
+            given: Array = self.configurations[before]
             return given
-        between: NDArray[np.float64] = pin.interpolate(
+        between: Array = pin.interpolate(
             self._model, self.configurations[before], self.configurations[before + 1], fraction
         )
         return between
@@ -124,8 +125,8 @@ class Motion:
         before, fraction = self._place(elapsed)
         after = before + (fraction > 0.0)
 
-        def between(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-            row: NDArray[np.float64] = (1.0 - fraction) * rows[before] + fraction * rows[after]
+        def between(rows: Array) -> Array:
+            row: Array = (1.0 - fraction) * rows[before] + fraction * rows[after]
             return row
 
         tau = None if self.forces is None else between(self.forces)
@@ -146,13 +147,13 @@ class Motion:
         for elapsed in self.sample_times(frame_rate):
             yield self.state_at(float(elapsed))
 
-    def sample_times(self, frame_rate: float = FRAME_RATE) -> NDArray[np.float64]:
+    def sample_times(self, frame_rate: float = FRAME_RATE) -> Array:
         """Return the times of `sampled`, in seconds since the first configuration, shape (m,)."""
         check_frame_rate(frame_rate)
         steps = max(1, round(self.duration * frame_rate)) if self.duration > 0.0 else 0
         return np.linspace(0.0, self.duration, steps + 1)
 
-    def sampled(self, frame_rate: float = FRAME_RATE) -> tuple[NDArray[np.float64], ...]:
+    def sampled(self, frame_rate: float = FRAME_RATE) -> tuple[Array, ...]:
         """Return evenly spaced samples, from the first configuration to the last.
 
         Parameters
@@ -182,7 +183,7 @@ def check_frame_rate(frame_rate: float) -> None:
         raise InputError(f"frame_rate = {frame_rate!r}: it must be positive and finite")
 
 
-def checked_configurations(model: pin.Model, configurations: ArrayLike) -> NDArray[np.float64]:
+def checked_configurations(model: pin.Model, configurations: ArrayLike) -> Array:
     """Return configurations as an array of shape (n, nq), n at least one.
 
     Parameters

@@ -16,14 +16,14 @@ from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.viewer.browser import in_own_thread
-from rps_pin.viewer.film import check_film, write_film
-from rps_pin.viewer.html import checked_target, note_of, recorded_page
+from rps_pin.viewer.files.browser import in_own_thread
+from rps_pin.viewer.files.film import check_film, write_film
+from rps_pin.viewer.files.html import checked_target, note_of, recorded_page
+from rps_pin.viewer.files.pictures import Progress, checked_size, take_pictures
 from rps_pin.viewer.layers import Layer
 from rps_pin.viewer.motion import FRAME_RATE, check_frame_rate
-from rps_pin.viewer.pictures import Progress, checked_size, take_pictures
-from rps_pin.viewer.recorder import Recorder
-from rps_pin.viewer.server import LocalViewer
+from rps_pin.viewer.server.local_viewer import LocalViewer
+from rps_pin.viewer.server.recorder import Recorder
 from rps_pin.viewer.view import View
 
 SIZE = (1000, 620)

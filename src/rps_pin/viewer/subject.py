@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.closed_loop.simulated_motion import Simulation
+from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import InputError, shown
-from rps_pin.rps.motion_run import MotionRun, sample_times
+from rps_pin.rps.dynamics.motion_run import MotionRun, sample_times
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.viewer.motion import Motion
 
@@ -98,16 +98,16 @@ def motion_of(subject: Subject, given: Any = None) -> Motion:
     return Motion(model, [0.0], configuration_of(subject, given)[None])
 
 
-def configuration_of(subject: Subject, given: Any) -> NDArray[np.float64]:
+def configuration_of(subject: Subject, given: Any) -> Array:
     """Return the configuration (nq,) that is meant: itself, or a pose (3,) of a 3-RPS."""
     if subject.robot is not None and np.shape(given) == (3,):
         still = np.zeros(3)
-        q: NDArray[np.float64] = subject.robot.state(given, still, still)[0]
+        q: Array = subject.robot.state(given, still, still)[0]
         return q
     return _one(given, subject.model).ravel()
 
 
-def _one(given: Any, model: pin.Model) -> NDArray[np.float64]:
+def _one(given: Any, model: pin.Model) -> Array:
     try:
         q = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):

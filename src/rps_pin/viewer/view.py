@@ -11,22 +11,23 @@ import meshcat
 import meshcat.geometry as mg
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.viewer.animation import Clip
 from rps_pin.viewer.layers import Context, Drawing, Layer, Look, layers_of
-from rps_pin.viewer.legend import legend_command
-from rps_pin.viewer.links import node_name
 from rps_pin.viewer.motion import FRAME_RATE, State
-from rps_pin.viewer.objects import put_object
-from rps_pin.viewer.playback import follow_clock
-from rps_pin.viewer.scene import Scene
-from rps_pin.viewer.stage import WORLD
+from rps_pin.viewer.scene.animation import Clip
+from rps_pin.viewer.scene.legend import legend_command
+from rps_pin.viewer.scene.links import node_name
+from rps_pin.viewer.scene.objects import put_object
+from rps_pin.viewer.scene.scene import Scene
+from rps_pin.viewer.scene.stage import WORLD
+from rps_pin.viewer.server.playback import follow_clock
+from rps_pin.viewer.server.window import RawCommand, Window
 from rps_pin.viewer.subject import configuration_of, motion_of, subject_of
-from rps_pin.viewer.window import RawCommand, Window
 
 LAYERS_NODE = f"{WORLD}/layers"
 """Path of the node that holds the layers: one child each, by the layer's name."""
@@ -166,7 +167,7 @@ class View:
         self.scene.display(state.q)
         self._show(state)
 
-    def _rate(self, given: ArrayLike | None, name: str) -> NDArray[np.float64]:
+    def _rate(self, given: ArrayLike | None, name: str) -> Array:
         nv = self.subject.model.nv
         if given is None:
             return np.zeros(nv)

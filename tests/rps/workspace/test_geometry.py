@@ -11,13 +11,13 @@ import trimesh
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.errors import InputError, UnreachableError
+from rps_pin.paper import paper_comparison
 from rps_pin.rps.workspace import (
     Workspace,
     boundary,
     free_tilt,
     largest_tilt_range,
     leg_grid,
-    paper_comparison,
     pose_grid,
     save_mesh,
     theoretical_cylinder,

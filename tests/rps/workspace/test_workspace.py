@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.errors import InputError, SingularityError, UnreachableError
-from rps_pin.rps.legs import leg_motion
-from rps_pin.rps.pose import platform_motion
+from rps_pin.rps.kinematics.legs import leg_motion
+from rps_pin.rps.kinematics.pose import platform_motion
 from rps_pin.rps.workspace import Reason, Workspace, leg_grid, pose_grid, workspace
 from rps_pin.rps.workspace.jacobian import leg_jacobian
 from rps_pin.rps.workspace.measures import measures

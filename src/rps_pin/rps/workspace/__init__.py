@@ -5,6 +5,7 @@ is inside, or why not (`Reason`), and carries fields over the grid. `workspace_t
 same for grids too large for memory.
 """
 
+from rps_pin.moved import moved_names
 from rps_pin.rps.workspace.compute import workspace
 from rps_pin.rps.workspace.evaluate import Fields
 from rps_pin.rps.workspace.geometry import (
@@ -16,16 +17,18 @@ from rps_pin.rps.workspace.geometry import (
 )
 from rps_pin.rps.workspace.grids import Grid, leg_grid, pose_grid
 from rps_pin.rps.workspace.inscribed import TiltRange, free_tilt, largest_tilt_range
-from rps_pin.rps.workspace.paper import PaperComparison, paper_comparison
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
 from rps_pin.rps.workspace.scale import WorkspaceCounts, workspace_to_file
 from rps_pin.rps.workspace.storage import load_workspace, save_workspace
 
+__getattr__ = moved_names(
+    __name__, {"PaperComparison": "rps_pin.paper", "paper_comparison": "rps_pin.paper"}
+)
+
 __all__ = [
     "Fields",
     "Grid",
-    "PaperComparison",
     "Reason",
     "TiltRange",
     "Volume",
@@ -36,7 +39,6 @@ __all__ = [
     "largest_tilt_range",
     "leg_grid",
     "load_workspace",
-    "paper_comparison",
     "pose_grid",
     "save_mesh",
     "save_workspace",

@@ -5,9 +5,9 @@ robot keeps when its legs go *straight*, in the space of leg lengths, from a sta
 lengths asked for, without meeting a parallel singularity.
 
 A coarse map of the grid is made that way, in short steps, each solved by Newton's method on Eq. 8
-(`rps_pin.rps.leg_equations`). Every other point starts Newton's method from the coarse map's
-angles, interpolated, and must end beside them; the few that cannot are followed from the start
-themselves.
+(`rps_pin.rps.kinematics.leg_equations`). Every other point starts Newton's method from the coarse
+map's angles, interpolated, and must end beside them; the few that cannot are followed from the
+start themselves.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rps_pin.arrays import Array, Bools
 from rps_pin.errors import SingularityError
-from rps_pin.rps.leg_equations import determinant, placement_from_angles, solve_angles
+from rps_pin.rps.kinematics.leg_equations import determinant, placement_from_angles, solve_angles
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import Array
 from rps_pin.rps.workspace.grids import WHOLE, Block, Grid
 from rps_pin.rps.workspace.jacobian import leg_jacobian
 
@@ -39,15 +38,13 @@ _TOLERANCE = 1e-11
 #: A start whose |determinant| is below this decides no mode.
 _SINGULAR_START = 1e-9
 
-Mask = NDArray[np.bool_]
-
 
 class ModePoses(NamedTuple):
     """Poses of one assembly mode."""
 
     pose: Array
     """(z, tilt_x, tilt_y), shape (..., 3), m and rad; zeros where there is none."""
-    found: Mask
+    found: Bools
     """Whether the lengths close in this mode, shape (...)."""
 
 
@@ -88,7 +85,7 @@ class AssemblyMode:
         nodes = np.stack(np.meshgrid(*coarse, indexing="ij"), axis=-1)
         self._map, self._known = self.follow(nodes)
 
-    def follow(self, length: Array) -> tuple[Array, Mask]:
+    def follow(self, length: Array) -> tuple[Array, Bools]:
         """Return leg angles (..., 3) reached straight from the start, and where that works.
 
         A point is given up where Newton's method does not converge, where a leg turns too far in
@@ -109,7 +106,7 @@ class AssemblyMode:
         found[alive] = True
         return angle.reshape(length.shape), found.reshape(length.shape[:-1])
 
-    def angles(self, length: Array, block: Block = WHOLE) -> tuple[Array, Mask]:
+    def angles(self, length: Array, block: Block = WHOLE) -> tuple[Array, Bools]:
         """Return leg angles (..., 3) of a block of the grid, and whether there are any."""
         start, known = self._interpolated(block)
         angle, found = self._solve(length, start, _BESIDE)
@@ -133,7 +130,7 @@ class AssemblyMode:
         pose[~found] = 0.0
         return ModePoses(pose, found)
 
-    def _solve(self, length: Array, start: Array, farthest: float) -> tuple[Array, Mask]:
+    def _solve(self, length: Array, start: Array, farthest: float) -> tuple[Array, Bools]:
         solution = solve_angles(
             length, start, *self._radii, tolerance=self._tolerance, iterations=_ITERATIONS
         )
@@ -142,7 +139,7 @@ class AssemblyMode:
         same_side = solution.determinant * self._side > 0
         return solution.angle, solution.converged & same_side & (turn < farthest)
 
-    def _interpolated(self, block: Block) -> tuple[Array, Mask]:
+    def _interpolated(self, block: Block) -> tuple[Array, Bools]:
         """Return angles interpolated in the coarse map, and where all its corners are known."""
         first, second, third = self._weights
         corners = np.where(self._known[..., None], self._map, 0.0)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError, UnreachableError
+from rps_pin.rps.kinematics.pose import checked_pose
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import Array, checked_pose
 from rps_pin.rps.workspace.assembly_mode import AssemblyMode
 from rps_pin.rps.workspace.evaluate import (
     MIN_CONDITIONING,

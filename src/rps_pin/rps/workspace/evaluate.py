@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rps_pin.arrays import Array, Bools
+from rps_pin.rps.kinematics.pose import position
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import Array, position
-from rps_pin.rps.workspace.assembly_mode import Mask
 from rps_pin.rps.workspace.jacobian import leg_jacobian
 from rps_pin.rps.workspace.measures import measures
 from rps_pin.rps.workspace.reasons import Flags, Reason, broken_limits
@@ -67,7 +67,7 @@ def evaluate(
     pose: Array,
     side: float,
     *,
-    found: Mask | None = None,
+    found: Bools | None = None,
     min_conditioning: float = MIN_CONDITIONING,
 ) -> Fields:
     """Return the fields of poses, and why each is out.

@@ -14,13 +14,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
+from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import Array
-from rps_pin.rps.workspace.assembly_mode import Mask
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
 from rps_pin.rps.workspace.result import Workspace
 
@@ -164,7 +162,7 @@ def save_mesh(
         mesh.export(scratch, file_type=suffix[1:])
 
 
-def _opposite_inside(workspace: Workspace, pose: Array) -> Mask:
+def _opposite_inside(workspace: Workspace, pose: Array) -> Bools:
     """Return whether (z, -tilt) is in the workspace too, and within its grid, shape (n,)."""
     opposite = pose * [1.0, -1.0, -1.0]
     side = side_of_singularity(workspace.parameters, workspace.start)
@@ -183,7 +181,7 @@ def _trapezoid_weights(axis: Array) -> Array:
     return np.concatenate([[0.0], step]) / 2 + np.concatenate([step, [0.0]]) / 2
 
 
-def _outer_faces(inside: Mask) -> NDArray[np.intp]:
+def _outer_faces(inside: Bools) -> Indices:
     """Return the outer faces of the inside cells, shape (n, 4): flat indices of grid points.
 
     Their order is anticlockwise seen from outside in the grid's own coordinates.

@@ -8,9 +8,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import Array
 
 GridKind = Literal["leg lengths", "poses"]
 

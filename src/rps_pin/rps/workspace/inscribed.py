@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, UnreachableError
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import Array
-from rps_pin.rps.workspace.assembly_mode import Mask
 from rps_pin.rps.workspace.compute import checked_start, parameters_of
 from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, evaluate, side_of_singularity
 from rps_pin.rps.workspace.grids import pose_grid
@@ -90,7 +89,7 @@ def free_tilt(
     heights = grid.axes[0]
     way = 2 * np.pi * np.arange(directions) / directions
 
-    def inside(height: Array, angle: Array, size: Array) -> Mask:
+    def inside(height: Array, angle: Array, size: Array) -> Bools:
         pose = np.stack([height, size * np.cos(angle), size * np.sin(angle)], axis=-1)
         fields = evaluate(parameters, pose, side, min_conditioning=min_conditioning)
         return np.asarray(fields.reason == 0)
@@ -173,7 +172,7 @@ def _level_heights(
     first = checked_start(parameters, pose_grid([0.0], [0.0]), start)
     side = side_of_singularity(parameters, first)
 
-    def inside(z: Array) -> Mask:
+    def inside(z: Array) -> Bools:
         pose = np.stack([z, np.zeros_like(z), np.zeros_like(z)], axis=-1)
         reason = evaluate(parameters, pose, side, min_conditioning=min_conditioning).reason
         return np.asarray(reason == 0)

@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rps_pin.rps.legs import RADIAL
-from rps_pin.rps.pose import Array
+from rps_pin.arrays import Array
+from rps_pin.rps.kinematics.legs import RADIAL
 
 #: Q_i as (Q_xx, Q_xy, Q_yy), shape (3 legs, 3).
 _Q = np.stack(

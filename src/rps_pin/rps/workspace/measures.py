@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rps_pin.rps.pose import Array
+from rps_pin.arrays import Array
 
 
 class Measures(NamedTuple):

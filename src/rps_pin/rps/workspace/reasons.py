@@ -7,9 +7,10 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import NDArray
 
-from rps_pin.rps.legs import cone_angles
+from rps_pin.arrays import Array
+from rps_pin.rps.kinematics.legs import cone_angles
+from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import Array, rotation
 
 Flags = NDArray[np.uint16]
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import Array
-from rps_pin.rps.workspace.assembly_mode import Mask
 from rps_pin.rps.workspace.evaluate import Fields
 from rps_pin.rps.workspace.grids import Grid
 from rps_pin.rps.workspace.reasons import Flags, Reason
@@ -75,11 +74,11 @@ class Workspace:
         return self.fields.transmission
 
     @property
-    def inside(self) -> Mask:
+    def inside(self) -> Bools:
         """Whether a point is in the workspace."""
         return np.asarray(self.reason == 0)
 
-    def mask(self, reason: Reason) -> Mask:
+    def mask(self, reason: Reason) -> Bools:
         """Return where any of the given reasons holds; for `Reason.INSIDE`, `inside`."""
         if reason is Reason.INSIDE:
             return self.inside

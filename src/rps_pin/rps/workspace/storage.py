@@ -26,10 +26,10 @@ from typing import Any, Literal
 import h5py
 import numpy as np
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.pose import Array
 from rps_pin.rps.workspace.evaluate import Fields, evaluate
 from rps_pin.rps.workspace.grids import Block, Grid, checked_grid
 from rps_pin.rps.workspace.reasons import Reason

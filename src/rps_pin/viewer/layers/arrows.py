@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.viewer.layers.base import UNSEEN, Array, Context, Drawing, Look, Part
+from rps_pin.viewer.layers.base import UNSEEN, Context, Drawing, Look, Part
 from rps_pin.viewer.layers.shapes import at, css, length_text, pointing, round_number
-from rps_pin.viewer.legend import Key
 from rps_pin.viewer.motion import State
+from rps_pin.viewer.scene.legend import Key
 
 Vectors = Mapping[str, tuple[Array, Array]]
 """By node: where an arrow begins, m, and the force or moment that it shows."""

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rps_pin.viewer.bounds import Box
-from rps_pin.viewer.legend import Key
+from rps_pin.arrays import Array
 from rps_pin.viewer.motion import Motion, State
+from rps_pin.viewer.scene.bounds import Box
+from rps_pin.viewer.scene.legend import Key
 from rps_pin.viewer.subject import Subject
 
-Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
 
 UNSEEN = 1e-6

@@ -13,8 +13,8 @@ from rps_pin.closed_loop import JointCoupling, LoopClosure
 from rps_pin.errors import InputError
 from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
 from rps_pin.viewer.layers.shapes import BLUE, YELLOW, along_z, at, between, css, paint
-from rps_pin.viewer.legend import Key
 from rps_pin.viewer.motion import State
+from rps_pin.viewer.scene.legend import Key
 
 
 @dataclass(frozen=True)

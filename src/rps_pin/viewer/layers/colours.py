@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.colors import Colormap, LinearSegmentedColormap, to_hex
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.viewer.layers.base import Colour
-from rps_pin.viewer.legend import ColourBar
+from rps_pin.viewer.scene.legend import ColourBar
 
 #: From safe to refused: blue, yellow, vermillion (Okabe and Ito's).
 WARNING = LinearSegmentedColormap.from_list("warning", ["#0072B2", "#F0E442", "#D55E00"], N=4096)
@@ -28,7 +29,7 @@ def warning_bar(low: str, high: str) -> ColourBar:
     return _bar(WARNING, low, high)
 
 
-def field_colours(share: ArrayLike) -> NDArray[np.float64]:
+def field_colours(share: ArrayLike) -> Array:
     """Return colours (n, 3) of a field's values, 0 lowest and 1 highest."""
     return np.asarray(FIELD(np.asarray(share)))[:, :3]
 

@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import SingularityError
 from rps_pin.viewer.layers.arrows import Sized, Vectors, arrows_drawing
-from rps_pin.viewer.layers.base import Array, Context, Drawing, Framed
+from rps_pin.viewer.layers.base import Context, Drawing, Framed
 from rps_pin.viewer.layers.shapes import ORANGE, arrow, double_arrow
 from rps_pin.viewer.motion import State
 

@@ -10,9 +10,9 @@ from rps_pin.closed_loop import LoopClosure
 from rps_pin.errors import InputError
 from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
 from rps_pin.viewer.layers.shapes import cross, length_text
-from rps_pin.viewer.legend import Key
-from rps_pin.viewer.links import node_name
 from rps_pin.viewer.motion import State
+from rps_pin.viewer.scene.legend import Key
+from rps_pin.viewer.scene.links import node_name
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,16 @@ import meshcat.geometry as mg
 import numpy as np
 import pinocchio as pin
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.urdf import LEGS
-from rps_pin.viewer.layers.base import Array, Context, Drawing, Part
+from rps_pin.viewer.layers.base import Context, Drawing, Part
 from rps_pin.viewer.layers.shapes import css, paint
-from rps_pin.viewer.legend import Key
-from rps_pin.viewer.links import link_poses, links_of
 from rps_pin.viewer.motion import Motion, checked_configurations
-from rps_pin.viewer.shapes import parts_of
+from rps_pin.viewer.scene.legend import Key
+from rps_pin.viewer.scene.links import link_poses, links_of
+from rps_pin.viewer.scene.shapes import parts_of
 from rps_pin.viewer.subject import Subject
 
 _OPACITY = 0.28

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from rps_pin.rps.legs import cone_angles
+from rps_pin.arrays import Array
+from rps_pin.rps.kinematics.legs import cone_angles
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.urdf import LEGS
-from rps_pin.viewer.layers.base import Array, Context, Drawing, Framed, Look, Part
+from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
 from rps_pin.viewer.layers.colours import warning, warning_bar
 from rps_pin.viewer.layers.shapes import at, ball, css
-from rps_pin.viewer.legend import Key
 from rps_pin.viewer.motion import State
+from rps_pin.viewer.scene.legend import Key
 
 _WIDEST, _TURN = 1e3, 2.0 * np.pi
 """Ranges above this (m, rad), and whole turns, are none."""

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import meshcat.geometry as mg
 import numpy as np
-from numpy.typing import NDArray
 
+from rps_pin.arrays import Array
 from rps_pin.viewer.layers.base import UNSEEN, Part
-
-Array = NDArray[np.float64]
 
 #: Okabe and Ito's colours, told apart by all; each layer has one of its own.
 BLACK, ORANGE, SKY, GREEN = 0x26323F, 0xE69F00, 0x56B4E9, 0x009E73

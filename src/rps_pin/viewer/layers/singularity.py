@@ -11,8 +11,8 @@ import trimesh
 from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
 from rps_pin.viewer.layers.colours import warning, warning_bar
 from rps_pin.viewer.layers.shapes import at, css, paint
-from rps_pin.viewer.legend import Key
 from rps_pin.viewer.motion import State
+from rps_pin.viewer.scene.legend import Key
 
 
 @dataclass(frozen=True)

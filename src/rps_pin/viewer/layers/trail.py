@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop import LoopClosure
 from rps_pin.errors import InputError
-from rps_pin.viewer.layers.base import Array, Context, Drawing, Framed, Look, Part
+from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
 from rps_pin.viewer.layers.shapes import (
     PURPLE,
     at,
@@ -21,8 +22,8 @@ from rps_pin.viewer.layers.shapes import (
     round_number,
     tube,
 )
-from rps_pin.viewer.legend import Key
 from rps_pin.viewer.motion import State
+from rps_pin.viewer.scene.legend import Key
 from rps_pin.viewer.subject import Subject
 
 _SIZE = 0.45

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import meshcat.geometry as mg
 import numpy as np
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.rps.workspace import Workspace, boundary, leg_grid, workspace
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
-from rps_pin.viewer.layers.base import Array, Context, Drawing, Framed, Part
+from rps_pin.viewer.layers.base import Context, Drawing, Framed, Part
 from rps_pin.viewer.layers.colours import field_bar, field_colours
 from rps_pin.viewer.layers.shapes import round_number
-from rps_pin.viewer.legend import Key
+from rps_pin.viewer.scene.legend import Key
 
 _WIDTH = 0.7
 """Width that the surface is magnified to, at most, in radii of the picture."""

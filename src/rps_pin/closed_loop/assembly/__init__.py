@@ -1,0 +1,1 @@
+"""Closed configurations: closing the loops, projection, completion, joint limits."""

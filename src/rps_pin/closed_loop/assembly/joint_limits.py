@@ -1,0 +1,69 @@
+"""Joint limits of a tree: the box of coordinates that closing the loops stays in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.arrays import Array, Bools
+
+#: Relative to the limit: what still counts as standing at it.
+_AT = 1e-12
+
+
+class JointLimits:
+    """Limits of the joints whose coordinates are plain numbers (no balls, free-flyers, full turns).
+
+    Parameters
+    ----------
+    model
+        The tree; its position limits.
+    """
+
+    def __init__(self, model: pin.Model) -> None:
+        joints = [joint for joint in list(model.joints)[1:] if joint.nq == joint.nv]
+        spans = [np.arange(joint.nv) for joint in joints]
+        none = [np.zeros(0, np.intp)]
+        pairs = list(zip(joints, spans, strict=True))
+        self.q = np.concatenate(none + [joint.idx_q + span for joint, span in pairs])
+        self.v = np.concatenate(none + [joint.idx_v + span for joint, span in pairs])
+        self.names = [model.names[joint.id] for joint, span in pairs for _ in span]
+        self.lower = model.lowerPositionLimit[self.q]
+        self.upper = model.upperPositionLimit[self.q]
+        self._nv = model.nv
+
+    def clip(self, q: Array) -> Array:
+        """Return the configuration with every coordinate brought within its limits."""
+        clipped = q.copy()
+        clipped[self.q] = np.clip(q[self.q], self.lower, self.upper)
+        return clipped
+
+    def outside(self, q: Array) -> dict[str, str]:
+        """Return a phrase for each joint outside its limits, by its name."""
+        x = q[self.q]
+        return {
+            self.names[i]: f"{self.names[i]!r} at {x[i]:.6g} ({self.lower[i]:.6g} to "
+            f"{self.upper[i]:.6g})"
+            for i in np.flatnonzero((x < self.lower) | (x > self.upper))
+        }
+
+    def blocked(self, q: Array, step: Array) -> Bools:
+        """Return which velocities, shape (nv,), a step would drive out through a limit at once."""
+        x, outward = q[self.q], step[self.v]
+        blocked = np.zeros(self._nv, dtype=bool)
+        at_lower = x <= self.lower + self._margin(self.lower)
+        at_upper = x >= self.upper - self._margin(self.upper)
+        blocked[self.v] = (at_upper & (outward > 0)) | (at_lower & (outward < 0))
+        return blocked
+
+    def reached(self, q: Array) -> list[str]:
+        """Return a phrase for each joint that stands at a limit."""
+        x = q[self.q]
+        return [
+            f"joint {self.names[i]!r} at its limit {limit[i]:.6g}"
+            for limit in (self.lower, self.upper)
+            for i in np.flatnonzero(np.isfinite(limit) & (np.abs(x - limit) <= self._margin(limit)))
+        ]
+
+    def _margin(self, limit: Array) -> Array:
+        return _AT * np.where(np.isfinite(limit), np.abs(limit), 0.0)

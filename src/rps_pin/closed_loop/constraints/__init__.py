@@ -1,0 +1,1 @@
+"""Loop closures: their kinds, their rows, and the derivatives of the rows."""

@@ -1,0 +1,247 @@
+"""How the closures' rates, accelerations and forces change with q and v: closed forms.
+
+For a closure of frames a and b let, all in a's axes at a's origin,
+
+- M be b's placement in a, and eta = (B - A) dq its change, dM = eta^ M, with A and B the Jacobians
+  of a and b there;
+- X = nu_a - nu_b the twist of a relative to b, with nu_b = Ad_M (b's own twist);
+- Y = X' = alpha_a - Ad_M (b's own acceleration) + X x nu_a its derivative.
+
+Then, the derivatives of nu and alpha being Pinocchio's and x the cross product of twists,
+
+    dX = dnu_a - Ad_M dnu_b - eta x nu_b
+    dY = dalpha_a - Ad_M dalpha_b - eta x alpha_b + dX x nu_a + X x dnu_a,
+
+and the rows J v = W X and J a + J' v = W Y + W' X, W' = -D X, follow by the product rule from W,
+its slope D and that slope's own (see `closure_rows`). Points in world axes have it simpler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.loops import ClosedFrames, Loops
+
+_LOCAL = pin.ReferenceFrame.LOCAL
+
+
+class ClosureDerivatives(NamedTuple):
+    """Derivatives at one motion; nc rows, nv columns unless said otherwise."""
+
+    rate_q: Array
+    """d(J v)/dq."""
+    acceleration_q: Array
+    """d(J a + J' v)/dq."""
+    acceleration_v: Array
+    """d(J a + J' v)/dv."""
+
+
+class _Frame(NamedTuple):
+    """A frame's motion in its own axes, and its derivatives, shapes (6,) and (6, nv)."""
+
+    placement: pin.SE3
+    twist: Array
+    acceleration: Array
+    jacobian: Array
+    twist_q: Array
+    acceleration_q: Array
+    acceleration_v: Array
+
+
+class FrameMotions:
+    """The motions of frames, and their derivatives, at one motion of the tree.
+
+    Parameters
+    ----------
+    loops
+        The tree; its data are filled.
+    motion
+        q (nq,), v (nv,), a (nv,).
+    """
+
+    def __init__(self, loops: Loops, motion: tuple[Array, Array, Array]) -> None:
+        self.loops = loops
+        self._known: dict[int, _Frame] = {}
+        pin.computeForwardKinematicsDerivatives(loops.model, loops.data, *motion)
+        pin.updateFramePlacements(loops.model, loops.data)
+
+    def __getitem__(self, index: int) -> _Frame:
+        """Return a frame's, by its index; before the data are used for anything else."""
+        if index not in self._known:
+            self._known[index] = _frame(self.loops, index)
+        return self._known[index]
+
+
+def closure_derivatives(motions: FrameMotions) -> ClosureDerivatives:
+    """Return the derivatives of the rows' rates and accelerations."""
+    loops = motions.loops
+    shape = loops.size, loops.model.nv
+    found = ClosureDerivatives(np.zeros(shape), np.zeros(shape), np.zeros(shape))
+    for frames in loops.closed_frames:
+        of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
+        own = (
+            _of_point(of_a, of_b)
+            if frames.closure.kind == "spherical"
+            else _kept(frames, of_a, of_b)
+        )
+        for whole, part in zip(found, own, strict=True):
+            whole[frames.rows] = part
+    return found
+
+
+def closure_force_slope(motions: FrameMotions, multipliers: Array) -> Array:
+    """Return d(J' lambda)/dq beyond that of wrenches fixed in the bodies, shape (nv, nv).
+
+    That part is Pinocchio's: `computeRNEADerivatives` with the wrenches as external forces.
+
+    On a's side acts f = W' lambda, on b's side -f. With G = sum lambda_k D_k, df = G eta (and, f
+    held in world axes, f turns against a's rotation); b's own frame moving under it by eta adds
+    eta x* f, the cross product of a twist and a wrench.
+    """
+    loops = motions.loops
+    slope = np.zeros((loops.model.nv, loops.model.nv))
+    for frames in loops.closed_frames:
+        own = multipliers[frames.rows]
+        of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
+        if frames.closure.kind == "spherical":
+            slope += world_wrench_slope(of_a, np.concatenate([own, np.zeros(3)]))
+            slope -= world_wrench_slope(of_b, np.concatenate([own, np.zeros(3)]))
+            continue
+        placement = of_a.placement.actInv(of_b.placement)
+        A, B = of_a.jacobian, placement.toActionMatrix() @ of_b.jacobian
+        if frames.in_world:
+            f = (own.reshape(2, 3) @ of_a.placement.rotation).ravel()
+            change = _turned_back(f) @ A
+        else:
+            f = frames.kept.wrenches(placement).T @ own
+            change = np.tensordot(own, frames.kept.slope(placement), 1) @ (B - A)
+        slope += (A - B).T @ change + B.T @ _twist_on_wrench(f) @ (B - A)
+    return slope
+
+
+def world_wrench_slope(frame: _Frame, wrench: Array) -> Array:
+    """Return d(J_f' w)/dq beyond that of a wrench fixed in the body, w fixed in world axes."""
+    local = (wrench.reshape(2, 3) @ frame.placement.rotation).ravel()
+    slope: Array = frame.jacobian.T @ _turned_back(local) @ frame.jacobian
+    return slope
+
+
+def external_force_slope(motions: FrameMotions, wrenches: Mapping[int, Array]) -> Array:
+    """Return the same of external wrenches by frame index, shape (nv, nv)."""
+    nv = motions.loops.model.nv
+    slope = np.zeros((nv, nv))
+    for frame, wrench in wrenches.items():
+        slope += world_wrench_slope(motions[frame], wrench)
+    return slope
+
+
+def _frame(loops: Loops, index: int) -> _Frame:
+    model, data = loops.model, loops.data
+    nv = model.nv
+    twist_q, acceleration_q, acceleration_v, jacobian = (
+        np.asarray(part).reshape(6, nv)
+        for part in pin.getFrameAccelerationDerivatives(model, data, index, _LOCAL)
+    )
+    return _Frame(
+        data.oMf[index],
+        pin.getFrameVelocity(model, data, index, _LOCAL).vector,
+        pin.getFrameAcceleration(model, data, index, _LOCAL).vector,
+        jacobian,
+        twist_q,
+        acceleration_q,
+        acceleration_v,
+    )
+
+
+def _of_point(of_a: _Frame, of_b: _Frame) -> tuple[Array, Array, Array]:
+    """Return the derivatives for two points, in world axes."""
+    a, b = _point(of_a), _point(of_b)
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _point(frame: _Frame) -> tuple[Array, Array, Array]:
+    """Return the derivatives of R v by q, and of R (v' + w x v) by q and v, (3, nv) each."""
+    turn, (v, w) = frame.placement.rotation, frame.twist.reshape(2, 3)
+    along = frame.acceleration[:3] + pin.skew(w) @ v
+    turning = frame.jacobian[3:]
+    rate_q = frame.twist_q[:3] - pin.skew(v) @ turning
+
+    def classical(spatial: Array, twist: Array) -> Array:
+        """Return d(v' + w x v) of d(v', w') and d(v, w)."""
+        result: Array = spatial[:3] + pin.skew(w) @ twist[:3] - pin.skew(v) @ twist[3:]
+        return result
+
+    by_q = classical(frame.acceleration_q, frame.twist_q) - pin.skew(along) @ turning
+    by_v = classical(frame.acceleration_v, frame.jacobian)
+    return turn @ rate_q, turn @ by_q, turn @ by_v
+
+
+def _kept(frames: ClosedFrames, of_a: _Frame, of_b: _Frame) -> tuple[Array, Array, Array]:
+    """Return the derivatives of the rows W X, and W Y + W' X by q and v."""
+    placement = of_a.placement.actInv(of_b.placement)
+    Ad = placement.toActionMatrix()
+    nu_a, nu_b, alpha_b = of_a.twist, Ad @ of_b.twist, Ad @ of_b.acceleration
+    A, B = of_a.jacobian, Ad @ of_b.jacobian
+    eta = B - A
+    X = nu_a - nu_b
+    Y = of_a.acceleration - alpha_b + _cross(X) @ nu_a
+    dX = of_a.twist_q - Ad @ of_b.twist_q + _cross(nu_b) @ eta
+    dY = of_a.acceleration_q - Ad @ of_b.acceleration_q + _cross(alpha_b) @ eta
+    dY += _cross(X) @ of_a.twist_q - _cross(nu_a) @ dX
+    dY_v = of_a.acceleration_v - Ad @ of_b.acceleration_v
+    dY_v += _cross(X) @ A - _cross(nu_a) @ (A - B)
+
+    W, D = frames.kept.wrenches(placement), frames.kept.slope(placement)
+    W_rate = -D @ X
+    of_X = W_rate - np.einsum("kij,i->kj", D, X)  # W' dX + dW' X, where X alone changes
+    D_X, D_Y = np.einsum("kij,i->kj", D, X), np.einsum("kij,i->kj", D, Y)  # (D eta) X, (D eta) Y
+    E_X = np.einsum("kij,i->kj", frames.kept.slope_rate(placement, X), X)
+    rate_q = W @ dX + D_X @ eta
+    by_q = W @ dY + of_X @ dX + (D_Y - E_X) @ eta
+    by_v = W @ dY_v + of_X @ (A - B)
+    if not frames.in_world:
+        return rate_q, by_q, by_v
+    return _in_world(of_a, (W @ X, W @ Y + W_rate @ X), (rate_q, by_q, by_v), W @ (A - B))
+
+
+def _in_world(
+    of_a: _Frame, values: tuple[Array, Array], slopes: tuple[Array, Array, Array], rate_v: Array
+) -> tuple[Array, Array, Array]:
+    """Return the derivatives of R x and R (w x x + y), for a frame's rows x = J v and y = x'."""
+    turn = np.kron(np.eye(2), of_a.placement.rotation)
+    spin = np.kron(np.eye(2), pin.skew(of_a.twist[3:]))
+    x, y = values
+    of_x, by_q, by_v = slopes
+    turning = of_a.jacobian[3:]
+    bend = spin @ x + y
+    rate_q = of_x - _skews(x) @ turning
+    by_q = by_q + spin @ of_x - _skews(x) @ of_a.twist_q[3:] - _skews(bend) @ turning
+    by_v = by_v + spin @ rate_v - _skews(x) @ turning
+    return turn @ rate_q, turn @ by_q, turn @ by_v
+
+
+def _skews(x: Array) -> Array:
+    """Return the skew matrices of both halves of a (6,) vector, one below the other, (6, 3)."""
+    return np.vstack([pin.skew(x[:3]), pin.skew(x[3:])])
+
+
+def _cross(twist: Array) -> Array:
+    """Return the matrix of y -> twist x y."""
+    matrix: Array = pin.Motion(twist).action
+    return matrix
+
+
+def _turned_back(wrench: Array) -> Array:
+    """Return the matrix of twist -> the change of R' w, w fixed in world axes: (R' w) x omega."""
+    return np.hstack([np.zeros((6, 3)), _skews(wrench)])
+
+
+def _twist_on_wrench(wrench: Array) -> Array:
+    """Return the matrix of eta -> eta x* f = (omega x F, omega x T + v x F)."""
+    force, moment = pin.skew(wrench[:3]), pin.skew(wrench[3:])
+    return -np.block([[np.zeros((3, 3)), force], [force, moment]])

@@ -1,0 +1,384 @@
+"""The loops of a tree: how far open they are, and how they change with the joints.
+
+With e(q) the gaps of all closures, one below the other, J v is their rate (in the rows that
+`closure_rows` describes) and J a + J' v their acceleration, J' being the derivative of J.
+
+Rows of spherical and rigid closures are in *world* axes at frame a's origin, those of the other
+kinds in *frame a's* axes at its origin; forces come before moments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.arrays import Array, Bools
+from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure
+from rps_pin.closed_loop.constraints.rows import Rows, rows_of
+from rps_pin.errors import InputError, MechanismError, shown
+
+_WORLD_AXES = ("spherical", "rigid")
+_WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+class LoopErrors(NamedTuple):
+    """How far the loops are from being closed; the rows are those of the closures in order."""
+
+    position: Array
+    """Gaps, shape (nc,), m; for angular rows the rotation vector between the frames, rad."""
+    velocity: Array
+    """Their rates, shape (nc,), m/s and rad/s."""
+    acceleration: Array
+    """Their second derivatives, shape (nc,), m/s^2 and rad/s^2; for angular rows the difference of
+    the frames' angular accelerations, which is that where their angular velocities agree."""
+
+
+class _Coupled(NamedTuple):
+    """Where a coupling's coordinates stand."""
+
+    q: tuple[int, int]
+    v: tuple[int, int]
+    ratio: float
+    offset: float
+
+
+class ClosedFrames(NamedTuple):
+    """A closure of two frames among the loops."""
+
+    closure: LoopClosure
+    rows: slice
+    """Its rows in J."""
+    frame_a: int
+    frame_b: int
+    kept: Rows
+    """Its rows in frame a's axes."""
+    in_world: bool
+    """Whether its rows in J are turned to world axes."""
+    constraint_data: Any
+    """Pinocchio's; holds ``oMc1`` and ``c1Mc2`` once J is computed."""
+
+
+class Loops:
+    """The closures of one model with the scratch memory that evaluating them takes.
+
+    Parameters
+    ----------
+    model
+        The open tree.
+    closures
+        What closes its loops.
+    characteristic_length
+        See `ClosedLoopModel`.
+
+    Attributes
+    ----------
+    size : int
+        Number of rows, nc.
+    length : float
+        The characteristic length, m.
+    row_scale, column_scale : (nc,) and (nv,) arrays
+        ``row_scale[:, None] * J * column_scale`` has entries of one unit: angular rows count with
+        the length as their lever, angular velocities are those of a point at that lever.
+    angular_rows, angular_velocities : (nc,) and (nv,) bool arrays
+        Which they are.
+    data, calls, constraints, constraint_data
+        For calling Pinocchio: `getConstraintsJacobian` reads what each of the `calls` refreshes.
+    plain : bool
+        Whether what it returns is J already; `kept_rows` makes J of it otherwise.
+    closed_frames : list of ClosedFrames
+        The closures of frames; the rest are couplings.
+
+    Raises
+    ------
+    MechanismError
+        If a frame or joint is unknown, or two closures have one name.
+    InputError
+        If the characteristic length is not positive.
+    """
+
+    def __init__(
+        self,
+        model: pin.Model,
+        closures: Sequence[Closure],
+        characteristic_length: float | None = None,
+    ) -> None:
+        _refuse_other_orders(model)
+        self.model = model
+        self.closures = tuple(closures)
+        for closure in self.closures:
+            if not isinstance(closure, (LoopClosure, JointCoupling)):
+                raise InputError(
+                    f"closures are LoopClosure or JointCoupling objects, not {shown(closure)}"
+                )
+        refuse_twice("closure", [closure.name for closure in self.closures])
+        self.size = sum(closure.size for closure in self.closures)
+        self.data = model.createData()
+        self._still = np.zeros(model.nv)
+        self.constraints = pin.StdVec_RigidConstraintModel()
+        self.constraint_data = pin.StdVec_RigidConstraintData()
+        self.closed_frames: list[ClosedFrames] = []
+        self.couplings: list[tuple[int, _Coupled]] = []
+        self._add_couplings()
+        self._add_constraints()
+        # Iterating a StdVec makes new Python objects each time; kept pairs cost a tenth.
+        self.calls = [
+            (constraint.calc, data)
+            for constraint, data in zip(self.constraints, self.constraint_data, strict=True)
+        ]
+        self._add_frames()
+        points = [frames for frames in self.closed_frames if frames.closure.kind == "spherical"]
+        self._points = [(frames.rows, frames.frame_a, frames.frame_b) for frames in points]
+        self._wholes = [frames for frames in self.closed_frames if frames not in points]
+        self.plain = bool(self.closed_frames) and not self.couplings
+        self.plain = self.plain and all(frames.in_world for frames in self.closed_frames)
+        self.length = self._length(characteristic_length)
+        self.angular_velocities = angular = self._is_angular()
+        self.column_scale = np.where(angular, 1 / self.length, 1.0)
+        self.angular_rows = np.zeros(self.size, dtype=bool)
+        for frames in self.closed_frames:
+            self.angular_rows[frames.rows] = frames.kept.angular
+        for row, coupled in self.couplings:
+            self.angular_rows[row] = angular[coupled.v[0]]
+        self.row_scale = np.where(self.angular_rows, self.length, 1.0)
+
+    def _add_couplings(self) -> None:
+        for closure in self.closures:
+            if isinstance(closure, JointCoupling):
+                joints = [self.model.joints[index] for index in closure.joint_ids(self.model)]
+                coupled = _Coupled(
+                    (joints[0].idx_q, joints[1].idx_q),
+                    (joints[0].idx_v, joints[1].idx_v),
+                    closure.ratio,
+                    closure.offset,
+                )
+                self.couplings.append((self.rows(closure.name).start, coupled))
+
+    def _add_constraints(self) -> None:
+        for closure in self.closures:
+            if isinstance(closure, LoopClosure):
+                constraint = closure.constraint_model(self.model)
+                self.constraints.append(constraint)
+                self.constraint_data.append(constraint.createData())
+
+    def _add_frames(self) -> None:
+        closures = [closure for closure in self.closures if isinstance(closure, LoopClosure)]
+        for closure, (_, data) in zip(closures, self.calls, strict=True):
+            self.closed_frames.append(
+                ClosedFrames(
+                    closure,
+                    self.rows(closure.name),
+                    *closure.frame_ids(self.model),
+                    rows_of(closure),
+                    closure.kind in _WORLD_AXES,
+                    data,
+                )
+            )
+
+    def rows(self, closure: str) -> slice:
+        """Return the rows of a closure by its name, or say which there are."""
+        start = 0
+        for candidate in self.closures:
+            if candidate.name == closure:
+                return slice(start, start + candidate.size)
+            start += candidate.size
+        names = ", ".join(candidate.name for candidate in self.closures)
+        raise MechanismError(f"no closure {closure!r}; there are: {names}")
+
+    def jacobian(self, q: Array) -> Array:
+        """Return J at a configuration, shape (nc, nv)."""
+        model, data = self.model, self.data
+        pin.computeJointJacobians(model, data, q)
+        for calc, constraint_data in self.calls:
+            calc(model, data, constraint_data)
+        return self.kept_rows(
+            pin.getConstraintsJacobian(model, data, self.constraints, self.constraint_data)
+        )
+
+    def kept_rows(self, jacobian: Array) -> Array:
+        """Return J, shape (nc, nv), of what Pinocchio's `getConstraintsJacobian` returned."""
+        if self.plain:
+            return jacobian.reshape(self.size, self.model.nv)  # a single row or column comes flat
+        rows = np.zeros((self.size, self.model.nv))
+        whole = jacobian.reshape(-1, self.model.nv)
+        start = 0
+        for frames in self.closed_frames:
+            stop = start + (3 if frames.closure.kind == "spherical" else 6)
+            block = whole[start:stop]
+            rows[frames.rows] = (
+                block
+                if frames.in_world
+                else frames.kept.wrenches(frames.constraint_data.c1Mc2) @ block
+            )
+            start = stop
+        for row, coupled in self.couplings:
+            rows[row, coupled.v[0]], rows[row, coupled.v[1]] = 1.0, -coupled.ratio
+        return rows
+
+    def gaps(self, q: Array) -> Array:
+        """Return e(q), shape (nc,), m and rad."""
+        pin.framesForwardKinematics(self.model, self.data, q)
+        placements = self.data.oMf
+        gaps = np.empty(self.size)
+        for frames in self.closed_frames:
+            a, b = placements[frames.frame_a], placements[frames.frame_b]
+            gap = frames.kept.gap(a.actInv(b))
+            if frames.in_world:
+                gap = (gap.reshape(-1, 3) @ a.rotation.T).ravel()
+            gaps[frames.rows] = gap
+        for row, (at, _, ratio, offset) in self.couplings:
+            gaps[row] = q[at[0]] - ratio * q[at[1]] - offset
+        return gaps
+
+    def errors(self, q: Array, v: Array, a: Array) -> LoopErrors:
+        """Return gaps, their rates and their accelerations."""
+        gaps = self.gaps(q)
+        pin.forwardKinematics(self.model, self.data, q, v, a)
+        rates, accelerations = np.empty(self.size), np.empty(self.size)
+        for frames in self.closed_frames:
+            rates[frames.rows], accelerations[frames.rows] = (
+                self._world_motion(frames) if frames.in_world else self._kept_motion(frames)
+            )
+        for row, (_, at, ratio, _) in self.couplings:
+            rates[row] = v[at[0]] - ratio * v[at[1]]
+            accelerations[row] = a[at[0]] - ratio * a[at[1]]
+        return LoopErrors(gaps, rates, accelerations)
+
+    def drift(self, q: Array, v: Array) -> Array:
+        """Return J' v, shape (nc,): what J a must cancel for the loops to stay closed.
+
+        This is the derivative of J itself, also where the loops are open.
+        """
+        model, data, acceleration = self.model, self.data, pin.getFrameClassicalAcceleration
+        pin.forwardKinematics(model, data, q, v, self._still)
+        drift = np.zeros(self.size)
+        for rows, a, b in self._points:
+            drift[rows] = (
+                acceleration(model, data, a, _WORLD).linear
+                - acceleration(model, data, b, _WORLD).linear
+            )
+        for frames in self._wholes:
+            drift[frames.rows] = self._kept_motion(frames)[1]
+        return drift
+
+    def worst(self, gaps: Array) -> tuple[float, str]:
+        """Return the largest gap (m; angles with the length as lever) and its closure's name."""
+        worst, name = 0.0, ""
+        scaled = self.row_scale * gaps
+        for closure in self.closures:
+            rows = self.rows(closure.name)
+            own, angular = scaled[rows], self.angular_rows[rows]
+            gap = float(max(np.linalg.norm(own[~angular]), np.linalg.norm(own[angular])))
+            if not gap <= worst:
+                worst, name = gap, closure.name
+        return worst, name
+
+    def parts(self, gaps: Array, name: str) -> str:
+        """Return a closure's gap in words where some of it is of directions; else ""."""
+        rows = self.rows(name)
+        own, angular = gaps[rows], self.angular_rows[rows]
+        turn, apart = float(np.linalg.norm(own[angular])), float(np.linalg.norm(own[~angular]))
+        if not turn * self.length > 0.01 * apart:
+            return ""
+        return f" ({apart:.3g} m between its points, {turn:.3g} rad between its axes)"
+
+    def _world_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
+        """Return velocity and acceleration of a less those of b, each frame's at its own origin."""
+        size = frames.closure.size
+        rates, accelerations = (
+            [of(self.model, self.data, frame, _WORLD) for frame in (frames.frame_a, frames.frame_b)]
+            for of in (pin.getFrameVelocity, pin.getFrameClassicalAcceleration)
+        )
+        return (
+            (rates[0] - rates[1]).vector[:size],
+            (accelerations[0] - accelerations[1]).vector[:size],
+        )
+
+    def _kept_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
+        """Return J v and its derivative, J made of W and the twist X of a relative to b.
+
+        They are W X and W A + W' X; turned to world axes by R, R (W X)' + R (w x W X).
+        """
+        placement, twist, acceleration, twist_a = self.relative_motion(frames)
+        wrenches = frames.kept.wrenches(placement)
+        rate = wrenches @ twist
+        bend = wrenches @ acceleration + frames.kept.bend(placement, twist)
+        if not frames.in_world:
+            return rate, bend
+        frame = self.model.frames[frames.frame_a]
+        turn = self.data.oMi[frame.parentJoint].rotation @ frame.placement.rotation
+        rate, bend = rate.reshape(-1, 3), bend.reshape(-1, 3)
+        bend = bend + np.cross(twist_a.angular, rate)
+        return (rate @ turn.T).ravel(), (bend @ turn.T).ravel()
+
+    def relative_motion(self, frames: ClosedFrames) -> tuple[pin.SE3, Array, Array, pin.Motion]:
+        """Return b's placement in a, a's twist X relative to b, its derivative A, and a's twist.
+
+        In a's axes at its origin, after a `forwardKinematics` with velocities and accelerations.
+        """
+        model, data = self.model, self.data
+        own = pin.ReferenceFrame.LOCAL
+        placement_a, placement_b = (
+            data.oMi[model.frames[frame].parentJoint] * model.frames[frame].placement
+            for frame in (frames.frame_a, frames.frame_b)
+        )
+        placement = placement_a.actInv(placement_b)
+        twist_a = pin.getFrameVelocity(model, data, frames.frame_a, own)
+        twist_b = placement.act(pin.getFrameVelocity(model, data, frames.frame_b, own))
+        twist = twist_a - twist_b
+        a = pin.getFrameAcceleration(model, data, frames.frame_a, own)
+        b = placement.act(pin.getFrameAcceleration(model, data, frames.frame_b, own))
+        # d/dt (Ad_M nu_b) = Ad_M nu_b' + xi x (Ad_M nu_b), xi = -X; and X x nu_b = X x nu_a.
+        acceleration = a - b + twist.cross(twist_a)
+        return placement, twist.vector, acceleration.vector, twist_a
+
+    def _length(self, given: float | None) -> float:
+        """Return the given length, or the longest lever of a closure, or 1 m if there is none."""
+        if given is not None:
+            if not (np.isfinite(given) and given > 0):
+                raise InputError(f"characteristic_length = {given}: it must be positive")
+            return float(given)
+        levers = [
+            float(np.linalg.norm(self.model.frames[frame].placement.translation))
+            for frames in self.closed_frames
+            for frame in (frames.frame_a, frames.frame_b)
+            if self.model.frames[frame].parentJoint != 0  # the world is no lever
+        ]
+        return max(levers, default=0.0) or 1.0
+
+    def _is_angular(self) -> Bools:
+        """Return which velocity components are angular: they move joint frames by turning them."""
+        neutral = pin.neutral(self.model)
+        pin.computeJointJacobians(self.model, self.data, neutral)
+        angular = np.zeros(self.model.nv, dtype=bool)
+        for index, joint in enumerate(self.model.joints):
+            if index == 0:
+                continue
+            columns = slice(joint.idx_v, joint.idx_v + joint.nv)
+            local = pin.getJointJacobian(self.model, self.data, index, pin.ReferenceFrame.LOCAL)
+            own = local.reshape(6, self.model.nv)[:, columns]
+            angular[columns] = np.abs(own[3:]).max(axis=0) > 1e-12
+        return angular
+
+
+def _refuse_other_orders(model: pin.Model) -> None:
+    """Raise `MechanismError` unless the joints after any joint's are those that it carries."""
+    for index in range(2, model.njoints):
+        parent, before = model.parents[index], index - 1
+        while before not in (0, parent):
+            before = model.parents[before]
+        if before != parent:
+            raise MechanismError(
+                f"joint {model.names[index]!r} was added after another branch than its own: "
+                "Pinocchio's mass matrix is wrong in such a tree; add each branch to its end "
+                "before the next"
+            )
+
+
+def refuse_twice(what: str, names: Sequence[str]) -> None:
+    """Raise `MechanismError` if a name comes twice."""
+    twice = {name for name in names if list(names).count(name) > 1}
+    if twice:
+        raise MechanismError(f"{what} {min(twice)!r} is named twice")

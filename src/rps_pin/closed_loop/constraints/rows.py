@@ -1,0 +1,342 @@
+"""The rows of a closure as wrenches: how a closure's gap changes with the placement of b in a.
+
+Let M = (R, p) be frame b's placement in frame a, and xi = (linear, angular) the twist of b relative
+to a in a's axes at a's origin, dM/dt = xi^ M. Pinocchio's constraint model of a whole frame gives
+X = J6 v = -xi, the twist of a relative to b. Each row of a closure is a wrench w of that frame,
+
+    rate of the gap = w . X,
+
+and, by duality, the wrench that a unit of its multiplier exerts on a's side, in a's axes at a's
+origin. A `Rows` object stacks some: W(M), shape (k, 6). There are four sorts:
+
+- `PointRows`: p stays in the planes through the origin across directions u fixed in a,
+  gap -u . p, w = (u, p x u): a force along u through b's origin;
+- `AxisRows`: a direction n = R n_b fixed in b stays perpendicular to m fixed in a, gap m . n,
+  w = (0, m x n);
+- `FrameRows`: the frames stay parallel, gap -log(R), w = (0, e_i);
+- `DistanceRows`: |p| stays as it is, gap L - |p|, w = (p / |p|, 0).
+
+Since W depends on M, its derivatives along a twist eta of b relative to a are needed for
+accelerations (first) and for derivatives of the dynamics (first and second).
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.arrays import Array, Bools
+from rps_pin.closed_loop.constraints.closures import LoopClosure
+
+skew = pin.skew
+
+
+class Rows(ABC):
+    """Some rows of a closure; all in frame a's axes."""
+
+    #: Which rows are angular: their gaps in rad, their multipliers in N m.
+    angular: Bools
+
+    @abstractmethod
+    def gap(self, placement: pin.SE3) -> Array:
+        """Return the gaps (k,) where b stands at M in a."""
+
+    @abstractmethod
+    def wrenches(self, placement: pin.SE3) -> Array:
+        """Return W, shape (k, 6), (force, moment) at a's origin."""
+
+    @abstractmethod
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return W' X, shape (k,), where a moves with the twist X relative to b: -(D X) X."""
+
+    @abstractmethod
+    def slope(self, placement: pin.SE3) -> Array:
+        """Return D, shape (k, 6, 6): dW along a relative twist eta is D @ eta."""
+
+    @abstractmethod
+    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return E, shape (k, 6, 6): d(D @ twist) along eta, the twist held, is E @ eta."""
+
+
+class PointRows(Rows):
+    """b's origin stays in planes through a's origin, across the directions (k, 3)."""
+
+    def __init__(self, directions: Array) -> None:
+        self.directions = directions
+        self._at_origin = np.hstack([directions, np.zeros_like(directions)])
+        self.angular = np.zeros(len(directions), dtype=bool)
+        self._cross = np.array([skew(u) for u in directions])
+
+    def gap(self, placement: pin.SE3) -> Array:
+        """Return -u . p."""
+        gap: Array = -self.directions @ placement.translation
+        return gap
+
+    def wrenches(self, placement: pin.SE3) -> Array:
+        """Return (u, p x u)."""
+        wrenches = self._at_origin.copy()
+        wrenches[:, 3:] = -self._cross @ placement.translation
+        return wrenches
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return (u x s) . X_a = u . (s x X_a), s = X_l + X_a x p."""
+        linear, angular = twist[:3], twist[3:]
+        s = linear + skew(angular) @ placement.translation
+        bend: Array = self.directions @ (skew(s) @ angular)
+        return bend
+
+    def slope(self, placement: pin.SE3) -> Array:
+        """Return d(u, p x u) = (0, -u x dp)."""
+        return _angular(-self._cross @ _point_motion(placement.translation))
+
+    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return d(-u x (xi_l + xi_a x p)) = -u x (xi_a x dp)."""
+        return _angular(-self._cross @ skew(twist[3:]) @ _point_motion(placement.translation))
+
+
+class AxisRows(Rows):
+    """Directions fixed in b, n_b (k, 3), stay perpendicular to directions fixed in a, m (k, 3)."""
+
+    def __init__(self, in_a: Array, in_b: Array) -> None:
+        self.in_a, self.in_b = in_a, in_b
+        self.angular = np.ones(len(in_a), dtype=bool)
+        self._cross = np.array([skew(m) for m in in_a])
+
+    def gap(self, placement: pin.SE3) -> Array:
+        """Return m . n."""
+        gap: Array = np.einsum("ij,ij->i", self.in_a, self.in_b @ placement.rotation.T)
+        return gap
+
+    def wrenches(self, placement: pin.SE3) -> Array:
+        """Return (0, m x n)."""
+        wrenches = np.zeros((len(self.in_a), 6))
+        turned = self.in_b @ placement.rotation.T
+        wrenches[:, 3:] = np.matmul(self._cross, turned[:, :, None])[:, :, 0]
+        return wrenches
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return -(m x (X_a x n)) . X_a = -m . ((X_a x n) x X_a)."""
+        spin = skew(twist[3:])
+        turning = self.in_b @ placement.rotation.T @ spin.T  # X_a x n, row by row
+        bend: Array = np.einsum("ij,ij->i", self.in_a, turning @ spin.T)
+        return bend
+
+    def slope(self, placement: pin.SE3) -> Array:
+        """Return d(m x n) = m x (eta_a x n)."""
+        return _angular(self._cross @ self._turning(placement))
+
+    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return d(m x (xi_a x n)) = m x (xi_a x dn)."""
+        return _angular(self._cross @ skew(twist[3:]) @ self._turning(placement))
+
+    def _turning(self, placement: pin.SE3) -> Array:
+        """Return dn = eta_a x n as matrices on eta, shape (k, 3, 6)."""
+        turning = np.zeros((len(self.in_b), 3, 6))
+        turning[:, :, 3:] = [-skew(n) for n in self.in_b @ placement.rotation.T]
+        return turning
+
+
+class ParallelRows(AxisRows):
+    """The direction n_b of b stays parallel to n_a of a, and points the same way.
+
+    With t_1, t_2, n_a a right-handed frame, n stays perpendicular to n_a x t_1 and n_a x t_2: the
+    moments are about t_1 and t_2.
+    """
+
+    def __init__(self, in_a: Array, in_b: Array) -> None:
+        self.axis, self.across = in_a, across(in_a)
+        super().__init__(np.cross(in_a, self.across), np.vstack([in_b, in_b]))
+
+    def gap(self, placement: pin.SE3) -> Array:
+        """Return the rotation vector from n to n_a; it does not vanish where they are opposite."""
+        n = placement.rotation @ self.in_b[0]
+        turn = self.across @ (skew(n) @ self.axis)
+        sine = math.sqrt(turn @ turn)
+        angle = math.atan2(sine, n @ self.axis)
+        gap: Array = angle * (turn / sine if sine > 0 else np.array([1.0, 0.0]))
+        return gap
+
+
+class FrameRows(Rows):
+    """The frames stay parallel."""
+
+    angular = np.ones(3, dtype=bool)
+
+    def gap(self, placement: pin.SE3) -> Array:
+        """Return the rotation vector from b to a."""
+        gap: Array = -pin.log3(placement.rotation)
+        return gap
+
+    def wrenches(self, placement: pin.SE3) -> Array:
+        """Return (0, e_i)."""
+        return np.hstack([np.zeros((3, 3)), np.eye(3)])
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return 0."""
+        return np.zeros(3)
+
+    def slope(self, placement: pin.SE3) -> Array:
+        """Return 0."""
+        return np.zeros((3, 6, 6))
+
+    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return 0."""
+        return np.zeros((3, 6, 6))
+
+
+class DistanceRows(Rows):
+    """The origins stay a distance apart. Its multiplier is the rod's tension."""
+
+    angular = np.zeros(1, dtype=bool)
+
+    def __init__(self, distance: float) -> None:
+        self.distance = distance
+
+    def gap(self, placement: pin.SE3) -> Array:
+        """Return L - |p|."""
+        return np.array([self.distance - np.linalg.norm(placement.translation)])
+
+    def wrenches(self, placement: pin.SE3) -> Array:
+        """Return (u, 0), u = p / |p|."""
+        u, _ = self._direction(placement)
+        wrench = np.zeros((1, 6))
+        wrench[0, :3] = u
+        return wrench
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return -(P s / |p|) . X_l, s = X_l + X_a x p, P = 1 - u u'."""
+        u, length = self._direction(placement)
+        linear = twist[:3]
+        s = linear + skew(twist[3:]) @ placement.translation
+        return np.array([((u @ s) * (u @ linear) - s @ linear) / length])
+
+    def slope(self, placement: pin.SE3) -> Array:
+        """Return du = P dp / |p|, P = 1 - u u'."""
+        u, length = self._direction(placement)
+        across = (np.eye(3) - np.outer(u, u)) / length
+        return _linear((across @ _point_motion(placement.translation))[None])
+
+    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return d(P s / |p|), s = xi_l + xi_a x p, by the product rule; du = P dp / |p|."""
+        u, length = self._direction(placement)
+        motion = _point_motion(placement.translation)
+        s = motion @ twist
+        across = np.eye(3) - np.outer(u, u)
+        of_projection = -((u @ s) * across + np.outer(u, across @ s)) / length  # (dP) s
+        of_point = across @ skew(twist[3:])  # P ds
+        of_length = -np.outer(across @ s, u) / length
+        return _linear(((of_projection + of_point + of_length) / length @ motion)[None])
+
+    def _direction(self, placement: pin.SE3) -> tuple[Array, float]:
+        """Return u and |p|; where the origins coincide, any direction will do."""
+        p = placement.translation
+        length = math.sqrt(p @ p)
+        if length < 1e-12 * self.distance:
+            return np.array([1.0, 0.0, 0.0]), 1e-12 * self.distance
+        return p / length, length
+
+
+class Stack(Rows):
+    """Several sorts of rows, one below the other."""
+
+    def __init__(self, parts: Sequence[Rows]) -> None:
+        self.parts = tuple(parts)
+        self.angular = np.concatenate([part.angular for part in self.parts])
+
+    def gap(self, placement: pin.SE3) -> Array:
+        """Return the parts' gaps."""
+        return np.concatenate([part.gap(placement) for part in self.parts])
+
+    def wrenches(self, placement: pin.SE3) -> Array:
+        """Return the parts' wrenches."""
+        return np.concatenate([part.wrenches(placement) for part in self.parts])
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return the parts' W' X."""
+        return np.concatenate([part.bend(placement, twist) for part in self.parts])
+
+    def slope(self, placement: pin.SE3) -> Array:
+        """Return the parts' slopes."""
+        return np.concatenate([part.slope(placement) for part in self.parts])
+
+    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return the parts' rates of slopes."""
+        return np.concatenate([part.slope_rate(placement, twist) for part in self.parts])
+
+
+class WholeRows(Stack):
+    """The frames coincide. Of all six rows any basis will do: W = 1, Pinocchio's own rows."""
+
+    def __init__(self) -> None:
+        super().__init__([PointRows(np.eye(3)), FrameRows()])
+
+    def wrenches(self, placement: pin.SE3) -> Array:
+        """Return 1."""
+        return np.eye(6)
+
+    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return 0."""
+        return np.zeros(6)
+
+    def slope(self, placement: pin.SE3) -> Array:
+        """Return 0."""
+        return np.zeros((6, 6, 6))
+
+    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return 0."""
+        return np.zeros((6, 6, 6))
+
+
+def rows_of(closure: LoopClosure) -> Rows:
+    """Return the rows of a closure, in frame a's axes, forces before moments."""
+    point = PointRows(np.eye(3))
+    if closure.kind == "spherical":
+        return point
+    if closure.kind == "rigid":
+        return WholeRows()
+    if closure.kind == "distance":
+        assert closure.distance is not None  # its constructor saw to that
+        return DistanceRows(closure.distance)
+    axis = np.array(closure.axis, dtype=np.float64)
+    axis_b = np.array(closure.axis_b or closure.axis, dtype=np.float64)
+    on_line, on_plane = PointRows(across(axis)), PointRows(axis[None])
+    parallel = ParallelRows(axis, axis_b)
+    return {
+        "revolute": Stack([point, parallel]),
+        "prismatic": Stack([on_line, FrameRows()]),
+        "cylindrical": Stack([on_line, parallel]),
+        "universal": Stack([point, AxisRows(axis[None], axis_b[None])]),
+        "planar": Stack([on_plane, parallel]),
+        "point_on_line": on_line,
+        "point_on_plane": on_plane,
+    }[closure.kind]
+
+
+def across(axis: Array) -> Array:
+    """Return t_1 and t_2, shape (2, 3), that make a right-handed frame with a unit axis.
+
+    For the coordinate axes they are the next two in cyclic order: x, y for z.
+    """
+    first = np.roll(np.eye(3)[int(np.argmax(np.abs(axis)))], 1)
+    first = first - (first @ axis) * axis
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first)])
+
+
+def _point_motion(p: Array) -> Array:
+    """Return the matrix of dp = eta_l + eta_a x p on eta, shape (3, 6)."""
+    return np.hstack([np.eye(3), -skew(p)])
+
+
+def _linear(matrices: Array) -> Array:
+    """Return slopes that change forces only, (k, 3, 6) made (k, 6, 6)."""
+    return np.concatenate([matrices, np.zeros_like(matrices)], axis=1)
+
+
+def _angular(matrices: Array) -> Array:
+    """Return slopes that change moments only, (k, 3, 6) made (k, 6, 6)."""
+    return np.concatenate([np.zeros_like(matrices), matrices], axis=1)

@@ -1,0 +1,1 @@
+"""Inverse and forward dynamics, their derivatives, passive joint forces and redundancy."""

@@ -1,0 +1,118 @@
+"""Actuator forces of least effort, and what no actuator can produce.
+
+The motions N that the closures allow (J N = 0) do not feel the closures' forces, and leave of
+S' tau + J' lambda = f only
+
+    (S N)' tau = N' f.
+
+With more actuators than mobility many tau do it: that of least |W tau| is meant. With fewer, or
+with actuators that do not move all of the mechanism, in general none does: then tau misses least.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg.lapack import dgesdd
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.dynamics.inverse_dynamics import RANK_TOLERANCE
+from rps_pin.errors import SingularityError
+
+
+class LeastEffort(NamedTuple):
+    """The actuator forces of least effort, and all others: tau + free y do the same for any y."""
+
+    tau: Array
+    """Shape (na,); of all tau that miss least, that of least |W tau|."""
+    missing: Array
+    """N' f - (S N)' tau, shape (m,): zero but for rounding if the actuators can do it."""
+    free: Array
+    """Basis of the tau that no allowed motion feels, shape (na, na - rank), W free orthonormal."""
+    values: Array
+    """Singular values of W^-1 S N, largest first, shape (min(na, m),)."""
+
+
+def least_effort(
+    actuator_motions: Array, reduced_force: Array, weights: Array | None = None
+) -> LeastEffort:
+    """Return the actuator forces tau with (S N)' tau = N' f and least |W tau|.
+
+    Parameters
+    ----------
+    actuator_motions
+        S N, shape (na, m): what the actuators move by in each allowed motion. Where they cannot do
+        all, tau is the least-squares solution; N should then be orthonormal in comparable units.
+    reduced_force
+        N' f, shape (m,).
+    weights
+        Diagonal of W, shape (na,), positive; one if left out.
+    """
+    weighted = actuator_motions if weights is None else actuator_motions / weights[:, None]
+    left, values, right = full_svd(weighted.T)  # of (S N)' W^-1, which takes W tau to N' f
+    rank = numerical_rank(values)
+    along = (reduced_force @ left[:, :rank]) / values[:rank]
+    tau, free = along @ right[:rank], right[rank:].T
+    if weights is not None:
+        tau, free = tau / weights, free / weights[:, None]
+    missing = reduced_force - tau @ actuator_motions
+    return LeastEffort(tau, missing, free, values)
+
+
+def unproduced_force(motions: Array, missing: Array, scale: Array) -> Array:
+    """Return the smallest generalised force that would have to be added, shape (nv,).
+
+    With D = diag(scale) and tau, lambda that make |D (f - S' tau - J' lambda)| least, this is
+    f - S' tau - J' lambda, where lambda is free to be anything. It is zero on the actuated rows,
+    the allowed motions feel exactly what is missing of it (N' u = missing), and D u is orthogonal
+    to all that actuators and closures can produce.
+
+    Parameters
+    ----------
+    motions
+        N, shape (nv, m), D^-1 N orthonormal (as `ClosedLoopModel.allowed_motions` returns it).
+    missing
+        Of `least_effort`, shape (m,).
+    scale
+        Scaling of the velocities to one unit, shape (nv,): D.
+    """
+    force: Array = (motions @ missing) / scale**2  # D^-1 (D^-1 N) missing
+    return force
+
+
+def refuse_nearly_singular(values: Array, max_condition: float) -> None:
+    """Raise `SingularityError` if a motion is moved by actuators, but hardly.
+
+    Singular values below the rank tolerance are taken as zero: those motions are not actuated.
+    """
+    rank = numerical_rank(values)
+    if rank and not values[0] <= max_condition * values[rank - 1]:
+        condition = float(values[0] / values[rank - 1])
+        raise SingularityError(
+            "the actuators hardly move one of the mechanism's motions here: the condition number "
+            f"is {condition:.3g}, and at most {max_condition:.3g} is accepted",
+            condition,
+            max_condition,
+        )
+
+
+def numerical_rank(values: Array) -> int:
+    """Return how many singular values, given largest first, are not rounding error."""
+    if values.size and values[-1] > RANK_TOLERANCE * values[0]:
+        return values.size
+    return int(np.count_nonzero(values > RANK_TOLERANCE * values[0])) if values.size else 0
+
+
+def full_svd(matrix: Array) -> tuple[Array, Array, Array]:
+    """Return U, the singular values and V' of a matrix, U and V square; finite entries only.
+
+    LAPACK's own routine: NumPy's wrapper costs several times as much on matrices of this size.
+    """
+    rows, columns = matrix.shape
+    if not (rows and columns):
+        return np.eye(rows), np.zeros(0), np.eye(columns)
+    left, values, right, info = dgesdd(matrix)
+    if info:
+        raise np.linalg.LinAlgError(f"LAPACK's dgesdd did not converge (info = {info})")
+    return left, values, right

@@ -1,0 +1,162 @@
+"""What a joint does to its own motion: viscous damping, dry friction, springs.
+
+They resist the motion with the generalised force
+
+    e(q, v) = d v + f tanh(v / v_s) + k (q - q_0),
+
+which adds to what `rnea` returns. Dry friction is smooth: it reaches 76 % of f at the speed v_s,
+and creeps below it instead of sticking. Rotor inertia is no matter of this file: set
+``model.armature``, which Pinocchio's algorithms include.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.vectors import checked_vector
+from rps_pin.errors import InputError, MechanismError
+
+#: rad/s or m/s.
+FRICTION_SPEED = 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class JointEffects:
+    """Damping, friction and springs of a model's joints; see the module's text.
+
+    Parameters
+    ----------
+    damping
+        d, shape (nv,), N m s/rad or N s/m; not negative.
+    friction
+        f, shape (nv,), N m or N; not negative.
+    stiffness
+        k, shape (nv,), N m/rad or N/m; not negative, and zero but for joints of one coordinate.
+    rest
+        q_0, shape (nv,), rad or m.
+    friction_speed
+        v_s, rad/s or m/s; positive.
+
+    Raises
+    ------
+    InputError
+        If a number breaks these rules.
+    """
+
+    damping: Array
+    friction: Array
+    stiffness: Array
+    rest: Array
+    friction_speed: float = FRICTION_SPEED
+
+    def __post_init__(self) -> None:
+        size = np.size(self.damping)
+        for name in ("damping", "friction", "stiffness", "rest"):
+            array = checked_vector(getattr(self, name), size, name).copy()
+            if name != "rest" and (array < 0).any():
+                raise InputError(f"{name} must not be negative: entry {int(array.argmin())} is")
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        if not 0 < self.friction_speed < np.inf:
+            raise InputError(f"friction_speed = {self.friction_speed}: it must be positive")
+
+    @classmethod
+    def named(
+        cls,
+        model: pin.Model,
+        *,
+        damping: Mapping[str, ArrayLike] | None = None,
+        friction: Mapping[str, ArrayLike] | None = None,
+        stiffness: Mapping[str, float] | None = None,
+        rest: Mapping[str, float] | None = None,
+        friction_speed: float = FRICTION_SPEED,
+    ) -> JointEffects:
+        """Return effects given by joint names; joints not named have none.
+
+        Parameters
+        ----------
+        model
+            The tree with these joints.
+        damping, friction
+            A number for all of a joint's velocities, or one for each.
+        stiffness, rest
+            Of joints of one coordinate.
+        friction_speed
+            As for the class.
+
+        Raises
+        ------
+        MechanismError
+            If there is no such joint (lists those there are), or a spring is put on a joint of
+            several coordinates.
+        """
+        given = {
+            "damping": damping,
+            "friction": friction,
+            "stiffness": stiffness,
+            "rest": rest,
+        }
+        arrays = {what: by_joint(model, values or {}, what) for what, values in given.items()}
+        return cls(**arrays, friction_speed=friction_speed)
+
+    def force(self, q: Array, v: Array, q_of_v: Indices) -> Array:
+        """Return e(q, v), shape (nv,); `q_of_v` from `coordinate_indices`."""
+        force = self.damping * v + self.friction * np.tanh(v / self.friction_speed)
+        force += self.stiffness * (q[q_of_v] - self.rest)
+        return force
+
+    def slopes(self, v: Array) -> tuple[Array, Array]:
+        """Return the derivatives of e with respect to q and v, both diagonal, shapes (nv,)."""
+        steep = self.friction / self.friction_speed
+        return self.stiffness, self.damping + steep * (1 - np.tanh(v / self.friction_speed) ** 2)
+
+    def energy(self, q: Array, q_of_v: Indices) -> float:
+        """Return what the springs hold, k (q - q_0)^2 / 2, J."""
+        return float(self.stiffness @ (q[q_of_v] - self.rest) ** 2) / 2
+
+
+def coordinate_indices(model: pin.Model) -> Indices:
+    """Return, for each velocity, the index of its coordinate in q.
+
+    Joints with more coordinates than velocities (balls, free-flyers, unbounded turns) have none:
+    their entries are those of the joint's first coordinate, and mean nothing.
+    """
+    indices = np.zeros(model.nv, dtype=np.intp)
+    for joint in list(model.joints)[1:]:
+        own = np.arange(joint.nv) if joint.nq == joint.nv else np.zeros(joint.nv, np.intp)
+        indices[joint.idx_v : joint.idx_v + joint.nv] = joint.idx_q + own
+    return indices
+
+
+def refuse_springs(model: pin.Model, effects: JointEffects) -> None:
+    """Raise `MechanismError` if a spring acts on a joint of several coordinates."""
+    for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
+        own = effects.stiffness[joint.idx_v : joint.idx_v + joint.nv]
+        if own.any() and not joint.nq == joint.nv == 1:
+            raise MechanismError(f"stiffness: joint {name!r} has {joint.nq} coordinates, not one")
+
+
+def by_joint(model: pin.Model, values: Mapping[str, ArrayLike], what: str) -> Array:
+    """Return values given by joint names as an array of shape (nv,), zero where none is given."""
+    array = np.zeros(model.nv)
+    names = list(model.names)[1:]
+    for name, value in values.items():
+        if name not in names:
+            raise MechanismError(f"{what}: no joint {name!r}; there are: {', '.join(names)}")
+        joint: Any = model.joints[model.getJointId(name)]
+        if what in ("stiffness", "rest") and not joint.nq == joint.nv == 1:
+            raise MechanismError(f"{what}: joint {name!r} has {joint.nq} coordinates, not one")
+        try:
+            array[joint.idx_v : joint.idx_v + joint.nv] = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise MechanismError(
+                f"{what} of joint {name!r} = {value!r}: it must be one number, or {joint.nv}"
+            ) from None
+    return array

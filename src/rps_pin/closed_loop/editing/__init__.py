@@ -1,0 +1,1 @@
+"""Open trees from other trees: merge joints, split joints, compose trees."""

@@ -1,0 +1,349 @@
+"""Merging revolute joints that meet in a point into one spherical or universal joint.
+
+Files describe a ball joint as three revolute joints with massless links between, or a Cardan joint
+as two. Merged, a spherical joint has no gimbal lock, and one quaternion for its coordinates.
+
+The merged joint stands where the last joint of the row stood, turned as that one is when all
+angles are zero; so zero angles are the neutral configuration, and everything the last joint
+carried stays where it was. With P_i the placements of the joints and a_i their axes,
+
+    spherical:  placement P_1 P_2 P_3,  R = (R_1 R_2 R_3)' R_1 exp(a_1 q_1) R_2 exp(a_2 q_2) ...
+    universal:  placement P_1 P_2,      R = exp(R_2' a_1 q_1) exp(a_2 q_2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.editing.joint_properties import copy_joint_properties
+from rps_pin.closed_loop.vectors import checked_vector
+from rps_pin.errors import MechanismError
+
+MergedKind = Literal["spherical", "universal"]
+
+_JOINTS_OF = {"spherical": 3, "universal": 2}
+#: Origins count as coincident below this distance, m; and masses as none below this, kg.
+_COINCIDENT = 1e-9
+_MASSLESS = 1e-12
+#: Axes count as perpendicular below this cosine, and as parallel below this sine.
+_PERPENDICULAR = 1e-6
+_PARALLEL = 1e-3
+
+
+@dataclass(frozen=True)
+class JointMerge:
+    """Revolute joints in a row, named from the base outwards, and the joint they become.
+
+    Parameters
+    ----------
+    joints
+        Three joints for a spherical joint, two for a universal one.
+    into
+        ``"spherical"`` or ``"universal"``.
+    name
+        Name of the merged joint.
+
+    Raises
+    ------
+    MechanismError
+        If the kind is unknown, or the number of joints is not its own.
+    """
+
+    joints: Sequence[str]
+    into: MergedKind
+    name: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "joints", tuple(self.joints))
+        if self.into not in _JOINTS_OF:
+            kinds = ", ".join(get_args(MergedKind))
+            raise MechanismError(f"joints cannot be merged into {self.into!r}; there are: {kinds}")
+        wanted = _JOINTS_OF[self.into]
+        if len(self.joints) != wanted or len(set(self.joints)) != wanted:
+            raise MechanismError(
+                f"merge {self.name!r}: a {self.into} joint is made of {wanted} different joints, "
+                f"not of {', '.join(self.joints) or 'none'}"
+            )
+        if not self.name or self.name == "universe":
+            raise MechanismError(f"a merged joint cannot be called {self.name!r}")
+
+
+def merged(model: pin.Model, merges: Sequence[JointMerge]) -> pin.Model:
+    """Return a model in which rows of revolute joints are single joints.
+
+    Everything else is kept: limits, armature, friction, damping, rotors, frames, gravity,
+    reference configurations. A universal joint has the coordinates of its two joints and keeps
+    what they had. A spherical joint keeps none of the limits, since those of three angles are none
+    of a rotation, and turns every way even if the three could not. Frames on the links between are
+    left out; the frame of the last joint takes the merged joint's name.
+
+    Raises
+    ------
+    MechanismError
+        If a joint is unknown, not revolute, or in two merges; the joints are not in a row; their
+        origins or axes do not fit; or a link between has mass or carries another joint.
+    """
+    rows = [_row(model, merge) for merge in merges]
+    _refuse_shared(model, merges, rows)
+    result = pin.Model()
+    result.name = model.name
+    last = {row[-1]: (merge, row) for merge, row in zip(merges, rows, strict=True)}
+    dropped = {joint for row in rows for joint in row[:-1]}
+    new_ids = {0: 0}
+    for old in range(1, model.njoints):
+        if old in dropped:
+            continue
+        if old in last:
+            new_ids[old] = _add_merged(model, result, *last[old], new_ids)
+        else:
+            new_ids[old] = result.addJoint(
+                new_ids[model.parents[old]],
+                model.joints[old],
+                model.jointPlacements[old],
+                model.names[old],
+            )
+            copy_joint_properties(model, [old], result, new_ids[old])
+    for old, new in new_ids.items():
+        result.inertias[new] = model.inertias[old]
+    renamed = {joint: merge.name for joint, (merge, _) in last.items()}
+    add_frames(model, result, new_ids, renamed)
+    result.gravity = model.gravity
+    for entry in model.referenceConfigurations:
+        result.referenceConfigurations[entry.key()] = merged_configuration(
+            model, merges, entry.data()
+        )
+    return result
+
+
+def merged_configuration(model: pin.Model, merges: Sequence[JointMerge], q: ArrayLike) -> Array:
+    """Return a configuration of the merged model that is one of the model as it was.
+
+    Parameters
+    ----------
+    model
+        The model before merging.
+    merges
+        What `merged` was given.
+    q
+        Configuration of `model`, shape (nq,).
+
+    Raises
+    ------
+    InputError
+        If q has the wrong shape or is not finite.
+    MechanismError
+        As for `merged`.
+    """
+    q = checked_vector(q, model.nq, "q")
+    rows = {row[-1]: row for row in (_row(model, merge) for merge in merges)}
+    dropped = {joint for row in rows.values() for joint in row[:-1]}
+    values = []
+    for joint in range(1, model.njoints):
+        row = rows.get(joint, [joint])
+        if joint in dropped:
+            continue
+        if len(row) == 3:
+            values.append(pin.Quaternion(_turned(model, row, q)).coeffs())
+        else:
+            values += [q[model.idx_qs[i] : model.idx_qs[i] + model.nqs[i]] for i in row]
+    return np.concatenate(values) if values else np.empty(0)
+
+
+def _turned(model: pin.Model, row: list[int], q: Array) -> Array:
+    """Return R of a row of three joints, as the module has it; shape (3, 3)."""
+    straight, turned = np.eye(3), np.eye(3)
+    for joint in row:
+        placed = model.jointPlacements[joint].rotation
+        straight = straight @ placed
+        turned = turned @ placed @ pin.exp3(_axis(model, joint) * q[model.idx_qs[joint]])
+    return np.asarray(straight.T @ turned)
+
+
+def _add_merged(
+    model: pin.Model, result: pin.Model, merge: JointMerge, row: list[int], new_ids: dict[int, int]
+) -> int:
+    placement = pin.SE3.Identity()
+    for joint in row:
+        placement = placement * model.jointPlacements[joint]
+    axes = _axes(model, row)
+    if merge.into == "spherical":
+        _refuse_lost_armature(model, merge, row)
+        kind = pin.JointModelSpherical()
+    else:
+        kind = pin.JointModelUniversal(axes[0], axes[1])
+    new = int(result.addJoint(new_ids[model.parents[row[0]]], kind, placement, merge.name))
+    if merge.into == "universal":
+        copy_joint_properties(model, row, result, new)
+    return new
+
+
+def add_frames(
+    model: pin.Model, result: pin.Model, new_ids: dict[int, int], renamed: dict[int, str]
+) -> None:
+    """Copy the frames of the joints that are left, each below the nearest frame that is.
+
+    Parameters
+    ----------
+    model
+        The model as it was.
+    result
+        The rebuilt model, all its joints in place.
+    new_ids
+        Index in `result` of the joint that carries what each joint of `model` carried, by index
+        in `model`; the frames of joints that are not among them are left out.
+    renamed
+        New names of joint frames, by the joint's index in `model`.
+    """
+    new_frames = {0: 0}
+    for index in range(1, model.nframes):
+        old = model.frames[index]
+        if old.parentJoint not in new_ids:
+            continue
+        parent = old.parentFrame
+        while parent not in new_frames:
+            parent = model.frames[parent].parentFrame
+        frame = pin.Frame(old)
+        frame.parentJoint = new_ids[old.parentJoint]
+        frame.parentFrame = new_frames[parent]
+        if old.type == pin.FrameType.JOINT and old.parentJoint in renamed:
+            frame.name = renamed[old.parentJoint]
+        new_frames[index] = result.addFrame(frame, False)
+
+
+# Checks -------------------------------------------------------------------------------------------
+
+
+def _row(model: pin.Model, merge: JointMerge) -> list[int]:
+    """Return the indices of the joints to merge, which are in a row and meet in a point."""
+    what = f"merge {merge.name!r}"
+    names = list(model.names)[1:]
+    for name in merge.joints:
+        if name not in names:
+            raise MechanismError(f"{what}: no joint {name!r}; there are: {', '.join(names)}")
+    row = [int(model.getJointId(name)) for name in merge.joints]
+    for joint in row:
+        _axis(model, joint, what)
+    for first, second in pairwise(row):
+        _check_link(model, what, first, second)
+    _check_axes(model, what, merge, row)
+    return row
+
+
+def _check_link(model: pin.Model, what: str, first: int, second: int) -> None:
+    """Refuse a link that is more than a point where two joints meet."""
+    before, after = model.names[first], model.names[second]
+    if model.parents[second] != first:
+        raise MechanismError(
+            f"{what}: {after!r} does not follow {before!r}; it follows "
+            f"{model.names[model.parents[second]]!r}. Name them from the base outwards"
+        )
+    others = [model.names[i] for i in range(1, model.njoints) if model.parents[i] == first]
+    if len(others) > 1:
+        others.remove(after)
+        raise MechanismError(
+            f"{what}: the link between {before!r} and {after!r} also carries {', '.join(others)}"
+        )
+    offset = float(np.linalg.norm(model.jointPlacements[second].translation))
+    if offset > _COINCIDENT:
+        raise MechanismError(
+            f"{what}: the origins of {before!r} and {after!r} are {offset:.6g} m apart; "
+            "joints are merged where they meet in a point"
+        )
+    inertia = model.inertias[first]
+    largest = float(np.abs(inertia.inertia).max())
+    if inertia.mass > _MASSLESS or largest > _MASSLESS:
+        raise MechanismError(
+            f"{what}: the link between {before!r} and {after!r} has a mass of "
+            f"{inertia.mass:.6g} kg and a moment of inertia of {largest:.6g} kg m^2; only massless "
+            "links can be left out"
+        )
+
+
+def _check_axes(model: pin.Model, what: str, merge: JointMerge, row: list[int]) -> None:
+    axes = _axes(model, row)
+    for (i, first), (j, second) in pairwise(enumerate(axes)):
+        cosine = abs(float(first @ second))
+        if merge.into == "universal" and cosine > _PERPENDICULAR:
+            raise MechanismError(
+                f"{what}: the axes of {merge.joints[i]!r} and {merge.joints[j]!r} are at "
+                f"{np.degrees(np.arccos(min(cosine, 1.0))):.6g} degrees; those of a universal "
+                "joint are perpendicular"
+            )
+    if merge.into == "spherical":
+        _check_reach(what, axes)
+
+
+def _check_reach(what: str, axes: list[Array]) -> None:
+    """Refuse three joints that cannot turn every way: neighbours must not be parallel."""
+    for first, second in pairwise(axes):
+        if np.linalg.norm(np.cross(first, second)) < _PARALLEL:
+            raise MechanismError(f"{what}: neighbouring axes are parallel; that is no ball joint")
+
+
+def _refuse_shared(model: pin.Model, merges: Sequence[JointMerge], rows: list[list[int]]) -> None:
+    merging = [joint for row in rows for joint in row]
+    for joint in merging:
+        if merging.count(joint) > 1:
+            raise MechanismError(f"joint {model.names[joint]!r} is merged twice")
+    if len(model.mimicking_joints) > 0:
+        raise MechanismError(
+            "a model with mimic joints cannot be merged; couple the joints instead"
+        )
+    kept = {model.names[i] for i in range(model.njoints) if i not in merging}
+    kept |= {
+        frame.name
+        for frame in model.frames
+        if frame.parentJoint not in {joint for row in rows for joint in row[:-1]}
+        and not (frame.type == pin.FrameType.JOINT and frame.parentJoint in merging)
+    }
+    for merge in merges:
+        if merge.name in kept:
+            raise MechanismError(
+                f"a merged joint cannot be called {merge.name!r}: that name is taken"
+            )
+        kept.add(merge.name)
+
+
+def _refuse_lost_armature(model: pin.Model, merge: JointMerge, row: list[int]) -> None:
+    """Refuse rotors about axes that turn in the merged joint: it has no constant place for them."""
+    for joint in row:
+        index = model.idx_vs[joint]
+        for name in ("armature", "rotorInertia"):
+            value = getattr(model, name)[index]
+            if value != 0:
+                raise MechanismError(
+                    f"merge {merge.name!r}: joint {model.names[joint]!r} has {name} = {value:.6g}, "
+                    "for which a spherical joint has no place; set it to 0 first"
+                )
+
+
+def _axes(model: pin.Model, row: list[int]) -> list[Array]:
+    """Return the axes of a row of joints at zero angles, in the last one's frame."""
+    axes = []
+    turn = np.eye(3)
+    for joint in reversed(row):
+        axes.append(turn.T @ _axis(model, joint))
+        turn = model.jointPlacements[joint].rotation @ turn
+    return axes[::-1]
+
+
+def _axis(model: pin.Model, joint: int, what: str = "merge") -> Array:
+    """Return the axis of a revolute joint, in its frame; shape (3,)."""
+    one = model.joints[joint]
+    if one.nq == one.nv == 1:
+        data = one.createData()
+        one.calc(data, np.zeros(model.nq))
+        subspace = np.asarray(data.S).reshape(6)
+        if not subspace[:3].any() and abs(np.linalg.norm(subspace[3:]) - 1) < _PERPENDICULAR:
+            return np.asarray(subspace[3:])
+    raise MechanismError(
+        f"{what}: joint {model.names[joint]!r} ({one.shortname()}) is not revolute with one angle"
+    )

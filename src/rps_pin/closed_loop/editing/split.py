@@ -1,0 +1,187 @@
+"""Splitting joints whose axes turn with their own coordinates into joints whose axes do not.
+
+Pinocchio's derivatives (`pin.computeRNEADerivatives`, `pin.getFrameAccelerationDerivatives` and
+their like) take the motion subspace S of a joint, seen from the body it carries, for constant.
+Those of a universal joint, of one of Z-Y-X angles, and of most composites change with q, and the
+derivatives of a tree with such a joint are wrong without a word. The same tree with joints in a
+row, and massless links between, has constant subspaces, the same q and v, and the same dynamics:
+
+    universal, axes a_1 and a_2:    R = exp(a_1 q_1) exp(a_2 q_2)        two revolute joints
+    Z-Y-X angles:                   R = R_z(q_1) R_y(q_2) R_x(q_3)       three revolute joints
+    composite:                      P_1 M_1(q_1) P_2 M_2(q_2) ...        its joints, placed at P_i
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.editing.joint_properties import copy_joint_properties
+from rps_pin.closed_loop.editing.merge import add_frames
+from rps_pin.errors import MechanismError
+
+_UNIVERSAL = "JointModelUniversal"
+_ZYX = "JointModelSphericalZYX"
+_COMPOSITE = "JointModelComposite"
+#: Change of S, against its largest entry or 1, below which it counts as constant.
+_CONSTANT = 1e-9
+#: Axes count as of unit length within this.
+_UNIT = 1e-9
+#: Configurations at which S is compared with that of the neutral one.
+_SAMPLES = 3
+
+
+class _Part(NamedTuple):
+    """One of the joints in a row that a joint is split into."""
+
+    placement: pin.SE3
+    """Against the part before, or against where the joint itself is placed."""
+    kind: Any
+    """A Pinocchio joint model."""
+
+
+def split(model: pin.Model) -> pin.Model:
+    """Return the same tree with joints of constant motion subspace only.
+
+    q and v keep their entries and order, frames their indices and names, and everything else is
+    kept: inertias, limits, armature, rotors, friction, damping, gravity, reference configurations.
+    The last joint of a row has the name of the joint it comes from, and carries what that one
+    carried; those before are called ``name:1``, ``name:2``. They have no frames.
+
+    Parameters
+    ----------
+    model
+        Any open tree; it is not changed.
+
+    Returns
+    -------
+    pin.Model
+        `model` itself if there is nothing to split.
+
+    Raises
+    ------
+    MechanismError
+        If a joint's subspace changes and it cannot be split (an ellipsoid joint, or a universal
+        one whose axes are not of unit length), if a joint mimics another, or if the name of a new
+        joint is taken.
+    """
+    _refuse_mimics(model)
+    rows = {joint: _row(model, joint) for joint in _changing(model)}
+    if not rows:
+        return model
+    _refuse_taken(model, rows)
+    result = pin.Model()
+    result.name = model.name
+    new_ids = {0: 0}
+    for old in range(1, model.njoints):
+        new = new_ids[model.parents[old]]
+        row = rows.get(old, [_Part(pin.SE3.Identity(), model.joints[old])])
+        names = _names(model.names[old], len(row))
+        for number, (part, name) in enumerate(zip(row, names, strict=True)):
+            base = pin.SE3.Identity() if number else model.jointPlacements[old]
+            new = int(result.addJoint(new, part.kind, base * part.placement, name))
+        new_ids[old] = new
+    for old, new in new_ids.items():
+        result.inertias[new] = model.inertias[old]
+    # All joints at once: from joint 1 on, the coordinates of both models are the same.
+    copy_joint_properties(model, list(range(1, model.njoints)), result, 1)
+    add_frames(model, result, new_ids, {})
+    result.gravity = model.gravity
+    for entry in model.referenceConfigurations:
+        result.referenceConfigurations[entry.key()] = entry.data()
+    return result
+
+
+def _changing(model: pin.Model) -> list[int]:
+    """Return the indices of the joints whose motion subspace depends on q."""
+    neutral = pin.neutral(model)
+    # Tangents with no two entries alike or zero, so that no joint is met at a special angle.
+    tangents = [np.cos(1.0 + k + np.arange(model.nv)) for k in range(_SAMPLES)]
+    samples = [neutral] + [pin.integrate(model, neutral, tangent) for tangent in tangents]
+    joints = range(1, model.njoints)
+    return [joint for joint in joints if not _is_constant(model.joints[joint], samples)]
+
+
+def _is_constant(joint: Any, samples: list[Array]) -> bool:
+    """Return whether S is the same at all configurations q (nq,) of the model."""
+    data = joint.createData()
+    subspaces = []
+    for q in samples:
+        joint.calc(data, q)
+        subspaces.append(np.array(data.S))
+    first = subspaces[0]
+    tolerance = _CONSTANT * max(1.0, float(np.abs(first).max()))
+    return all(float(np.abs(other - first).max()) <= tolerance for other in subspaces[1:])
+
+
+def _row(model: pin.Model, joint: int) -> list[_Part]:
+    """Return the joints in a row that are joint number `joint`."""
+    return list(_parts(model.joints[joint], f"joint {model.names[joint]!r}"))
+
+
+def _parts(joint: Any, what: str) -> Iterator[_Part]:
+    here = pin.SE3.Identity()
+    kind = joint.shortname()
+    if kind == _UNIVERSAL:
+        one = joint.extract()
+        for axis in (one.axis1, one.axis2):
+            length = float(np.linalg.norm(axis))
+            if abs(length - 1) > _UNIT:
+                raise MechanismError(
+                    f"{what} is universal with an axis of length {length:.6g}; axes have length 1"
+                )
+            yield _Part(here, pin.JointModelRevoluteUnaligned(axis))
+    elif kind == _ZYX:
+        for one in (pin.JointModelRZ(), pin.JointModelRY(), pin.JointModelRX()):
+            yield _Part(here, one)
+    elif kind == _COMPOSITE:
+        composite = joint.extract()
+        for placement, member in zip(composite.jointPlacements, composite.joints, strict=True):
+            for number, part in enumerate(_parts(member, f"{what} (Composite)")):
+                yield part if number else _Part(placement * part.placement, part.kind)
+    else:
+        _refuse_indivisible(joint, kind, what)
+        yield _Part(here, joint)
+
+
+def _names(name: str, count: int) -> list[str]:
+    """Return the names of the joints in a row, the last one's being that of the whole."""
+    return [f"{name}:{number}" for number in range(1, count)] + [name]
+
+
+# Checks -------------------------------------------------------------------------------------------
+
+
+def _refuse_mimics(model: pin.Model) -> None:
+    for joint in model.mimicking_joints:
+        raise MechanismError(
+            f"Pinocchio's derivatives are not those of joint {model.names[joint]!r} (Mimic): it "
+            "has none for a model with mimic joints; couple the joints instead"
+        )
+
+
+def _refuse_indivisible(joint: Any, kind: str, what: str) -> None:
+    """Refuse a joint of its own kind whose subspace depends on q; a model of it alone tells."""
+    alone = pin.Model()
+    alone.addJoint(0, joint, pin.SE3.Identity(), "joint")
+    if _changing(alone):
+        raise MechanismError(
+            f"Pinocchio's derivatives are not those of {what} "
+            f"({kind.removeprefix('JointModel')}): its axes turn with its own coordinates, and it "
+            "cannot be split into joints whose axes do not"
+        )
+
+
+def _refuse_taken(model: pin.Model, rows: dict[int, list[_Part]]) -> None:
+    taken = set(model.names)
+    for joint, row in rows.items():
+        for name in _names(model.names[joint], len(row))[:-1]:
+            if name in taken:
+                raise MechanismError(
+                    f"joint {model.names[joint]!r} is split into {len(row)} joints, one of them "
+                    f"called {name!r}; that name is taken"
+                )

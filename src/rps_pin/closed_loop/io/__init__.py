@@ -1,0 +1,1 @@
+"""Mechanisms from files: URDF, YAML descriptions and MJCF."""

@@ -1,0 +1,267 @@
+"""Mechanisms described in a YAML file: a URDF or MJCF, its closures, what drives it.
+
+    urdf: slider_crank.urdf            # or mjcf: a file; relative to this one
+    closures:
+      - {frame_a: knee, frame_b: tip, kind: revolute, axis: [0, 1, 0]}
+    actuated: [crank]
+    home: {crank: 0.5}
+
+All keys are the fields of `Description`. Every message names the file, the line and the key.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure
+from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
+from rps_pin.closed_loop.io.mechanism_schema import Description, validated
+from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
+from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts
+from rps_pin.closed_loop.io.urdf import model_from_urdf
+from rps_pin.config import YamlFile, read_yaml
+from rps_pin.errors import InputError, MechanismError, shown
+
+Made = TypeVar("Made")
+
+#: How far a joint's given coordinates may be from a rotation's (norm of a quaternion, of a cosine
+#: and sine).
+_NORMED = 1e-3
+
+
+def parts_from_yaml(path: str | os.PathLike[str]) -> MechanismParts:
+    """Read a mechanism from its description, a YAML file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not YAML, or a value is not what its key takes.
+    MechanismError
+        If what it describes does not hold together (unknown frame, joint or kind; a bad URDF or
+        MJCF).
+    """
+    file = read_yaml(path, "mechanism file")
+    description = validated(file)
+    tree = _tree(file, description, Path(path))
+    parts = _merged(file, description, tree)
+    parts = _with_effects(file, description, parts)
+    closures = (*parts.closures, *_closures(file, description, parts.model))
+    actuated = parts.actuated if description.actuated is None else tuple(description.actuated)
+    joints = list(parts.model.names)[1:]
+    for index, name in enumerate(actuated):
+        if name not in joints:
+            raise _unknown(file, ("actuated", index), "joint", name, joints)
+    return replace(
+        parts,
+        closures=closures,
+        actuated=actuated,
+        home=_home(file, description, tree, parts),
+        name=description.name or parts.name or Path(path).stem,
+        friction_speed=description.friction_speed,
+        characteristic_length=description.characteristic_length,
+        max_condition=description.max_condition,
+    )
+
+
+# The tree -----------------------------------------------------------------------------------------
+
+
+def _tree(file: YamlFile, description: Description, path: Path) -> MechanismParts:
+    """Return what the URDF or MJCF says, with the description's gravity and no merging yet."""
+    if (description.urdf is None) == (description.mjcf is None):
+        both = description.urdf is not None
+        where = file.place(("mjcf",)) if both else file.origin
+        what = "both were given" if both else "neither was given"
+        raise MechanismError(f"{where}: a mechanism has one of urdf and mjcf; {what}")
+    source = description.urdf or description.mjcf or ""
+    key = "urdf" if description.urdf else "mjcf"
+    if source.lstrip("\ufeff \t\r\n").startswith("<"):
+        raise InputError(f"{file.place((key,))}: {key} must be the name of a file, not its text")
+    if description.mjcf and description.root:
+        raise MechanismError(
+            f"{file.place(('root',))}: root belongs to urdf; an MJCF says itself what is free"
+        )
+    target = path.parent / Path(source).expanduser()
+
+    if description.mjcf:
+        parts = _at(file, (key,), parts_from_mjcf, target, actuated=description.actuated)
+    else:
+        model = _at(file, (key,), model_from_urdf, target, description.root or "fixed")
+        damping, friction = (
+            _losses(model.damping, model),
+            _losses(model.upperDryFrictionLimit, model),
+        )
+        parts = MechanismParts(model, name=model.name, damping=damping, friction=friction)
+    if description.gravity is not None:
+        model = pin.Model(parts.model)
+        model.gravity.linear = np.array(description.gravity)
+        parts = replace(parts, model=model)
+    return parts
+
+
+def _losses(values: Array, model: pin.Model) -> dict[str, float]:
+    """Return the damping or dry friction of a URDF's joints, by name, where there is some."""
+    found = {name: float(values[model.idx_vs[i]]) for i, name in enumerate(model.names) if i}
+    return {name: value for name, value in found.items() if value}
+
+
+def _merged(file: YamlFile, description: Description, tree: MechanismParts) -> MechanismParts:
+    """Merge joints, and let go of what was said about those that are no more."""
+    merges = _merges(file, description)
+    if not merges:
+        return tree
+    model = _at(file, ("merge",), merged, tree.model, merges)
+    kept = set(model.names)
+    changes: dict[str, Any] = {"model": model}
+    for effect in EFFECTS:
+        values = getattr(tree, effect)
+        for merge in merges:
+            lost = [name for name in merge.joints if values.get(name)]
+            if lost and merge.name not in getattr(description, effect):
+                raise MechanismError(
+                    f"{file.place(('merge',))}: joint {lost[0]!r} has {effect} and is merged; say "
+                    f"what {merge.name!r} has, in {effect}"
+                )
+        changes[effect] = {name: value for name, value in values.items() if name in kept}
+    for closure in tree.closures:
+        needed = closure.joint_ids if isinstance(closure, JointCoupling) else closure.frame_ids
+        _at(file, ("merge",), needed, model)
+    return replace(tree, **changes)
+
+
+def _merges(file: YamlFile, description: Description) -> list[JointMerge]:
+    return [
+        _at(file, ("merge", i), JointMerge, **entry.model_dump())
+        for i, entry in enumerate(description.merge)
+    ]
+
+
+# What is said about joints ------------------------------------------------------------------------
+
+
+def _with_effects(
+    file: YamlFile, description: Description, parts: MechanismParts
+) -> MechanismParts:
+    """Lay the description's effects over those of the tree's file; set armature on a copy."""
+    joints = list(parts.model.names)[1:]
+    changes: dict[str, Any] = {}
+    for effect in (*EFFECTS, "armature"):
+        given = getattr(description, effect)
+        for name in given:
+            if name not in joints:
+                raise _unknown(file, (effect, name), "joint", name, joints)
+        if effect != "armature":
+            changes[effect] = {**getattr(parts, effect), **given}
+    if description.armature:
+        model = pin.Model(parts.model)
+        armature = model.armature.copy()
+        for name, value in description.armature.items():
+            joint = model.joints[model.getJointId(name)]
+            armature[joint.idx_v : joint.idx_v + joint.nv] = value
+        model.armature = armature
+        changes["model"] = model
+    return replace(parts, **changes)
+
+
+def _home(
+    file: YamlFile, description: Description, tree: MechanismParts, parts: MechanismParts
+) -> Array | None:
+    """Return the home configuration: of the tree's file, then by joint name, before and after."""
+    if tree.home is None and not description.home:
+        return None
+    merges = _merges(file, description)
+    before = tree.home if tree.home is not None else pin.neutral(tree.model)
+    before, known = before.copy(), {*list(tree.model.names)[1:], *list(parts.model.names)[1:]}
+    for name in description.home:
+        if name not in known:
+            raise _unknown(file, ("home", name), "joint", name, list(parts.model.names)[1:])
+    _set_joints(file, description.home, tree.model, before)
+    q = merged_configuration(tree.model, merges, before) if merges else before
+    new = {name for name in description.home if not tree.model.existJointName(name)}
+    _set_joints(file, {name: description.home[name] for name in new}, parts.model, q)
+    return q
+
+
+def _set_joints(
+    file: YamlFile, values: Mapping[str, float | Sequence[float]], model: pin.Model, q: Array
+) -> None:
+    for name, value in values.items():
+        if not model.existJointName(name):
+            continue
+        given = np.atleast_1d(np.asarray(value, dtype=np.float64))
+        joint = model.joints[model.getJointId(name)]
+        where = file.place(("home", name))
+        if given.size != joint.nq:
+            raise InputError(
+                f"{where}: home of {name!r} ({joint.shortname()}) has {given.size} numbers; "
+                f"it must have {joint.nq}"
+            )
+        own = q.copy()
+        own[joint.idx_q : joint.idx_q + joint.nq] = given
+        whole = pin.normalize(model, own)
+        normed = whole[joint.idx_q : joint.idx_q + joint.nq]
+        near = np.abs(normed - given).max() <= _NORMED
+        if not (near and pin.isNormalized(model, whole, _NORMED)):  # zeros stay zeros
+            raise InputError(
+                f"{where}: home of {name!r} ({joint.shortname()}) = {shown(value)} is no rotation; "
+                "a quaternion (x, y, z, w), or a cosine and a sine, has length 1"
+            )
+        q[joint.idx_q : joint.idx_q + joint.nq] = normed
+
+
+# Closures -----------------------------------------------------------------------------------------
+
+
+def _closures(file: YamlFile, description: Description, model: pin.Model) -> list[Closure]:
+    found: list[Closure] = []
+    frames = [frame.name for frame in model.frames]
+    for i, entry in enumerate(description.closures):
+        for end in ("frame_a", "frame_b"):
+            name = getattr(entry, end)
+            where = ("closures", i, end)
+            if name not in frames:
+                raise _unknown(file, where, "frame", name, frames)
+            if frames.count(name) > 1:
+                raise MechanismError(
+                    f"{file.place(where)}: {end} = {name!r}: {frames.count(name)} frames have "
+                    "this name"
+                )
+        found.append(_at(file, ("closures", i), LoopClosure, **entry.model_dump()))
+    for i, coupled in enumerate(description.couplings):
+        coupling = _at(file, ("couplings", i), JointCoupling, **coupled.model_dump())
+        _at(file, ("couplings", i), coupling.joint_ids, model)
+        found.append(coupling)
+    return found
+
+
+# Messages -----------------------------------------------------------------------------------------
+
+
+def _at(
+    file: YamlFile,
+    path: tuple[str | int, ...],
+    make: Callable[..., Made],
+    *arguments: Any,
+    **options: Any,
+) -> Made:
+    """Return what `make` returns; put the place in the file before what it complains of."""
+    try:
+        return make(*arguments, **options)
+    except InputError as error:
+        raise type(error)(f"{file.place(path)}: {error}") from None
+
+
+def _unknown(
+    file: YamlFile, path: tuple[str | int, ...], what: str, name: str, there: Sequence[str]
+) -> MechanismError:
+    return MechanismError(
+        f"{file.place(path)}: {path[0]}: no {what} {name!r}; there are: {', '.join(there)}"
+    )

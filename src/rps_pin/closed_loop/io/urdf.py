@@ -1,0 +1,97 @@
+"""Open trees from URDF files, and the text of any XML file.
+
+A file is data: it is refused if it declares a document type (no robot needs one, and
+entities are declared there), and read without reaching for anything outside itself.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pinocchio as pin
+from lxml import etree
+
+from rps_pin.closed_loop.io.urdf_check import refuse_mistakes
+from rps_pin.errors import InputError, MechanismError
+
+#: How the root link of a tree may stand in the world.
+ROOTS = ("fixed", "free")
+
+
+def model_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") -> pin.Model:
+    """Return the open tree of a URDF: a file's path, or its text (which begins with ``<``).
+
+    Parameters
+    ----------
+    path_or_xml
+        The file, or its text.
+    root
+        ``"fixed"``: the root link stands in the world. ``"free"``: it floats, on a free-flyer
+        called ``"root_joint"``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or the root is neither of the two.
+    MechanismError
+        If it is no URDF; with the line where that shows.
+    """
+    if root not in ROOTS:
+        raise InputError(f"root = {root!r}: it must be {' or '.join(map(repr, ROOTS))}")
+    text, origin = xml_text(path_or_xml, "URDF")
+    refuse_mistakes(xml_root(text, origin, "URDF"), origin)
+    try:
+        if root == "free":
+            return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+        return pin.buildModelFromXML(text)
+    except (ValueError, RuntimeError) as error:
+        raise MechanismError(f"{origin} is not a valid URDF: {error}") from None
+
+
+def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
+    """Return an XML text, and how to name it in messages.
+
+    Parameters
+    ----------
+    path_or_xml
+        A file's path, or the text itself (which begins with ``<``).
+    form
+        What the text should be: ``"URDF"`` or ``"MJCF"``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    if not isinstance(path_or_xml, (str, os.PathLike)):
+        raise InputError(f"a {form} is given by its path or its text, not by {path_or_xml!r}")
+    text = os.fspath(path_or_xml).lstrip("\ufeff")  # a byte-order mark is no part of the text
+    if text.lstrip().startswith("<"):
+        return text.strip(), f"the {form} text"
+    origin = text
+    try:
+        text = Path(origin).read_text("utf-8-sig")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "not a UTF-8 text"
+        raise InputError(f"cannot read the {form} {origin}: {reason}") from None
+    return text.strip(), origin
+
+
+def xml_root(text: str, origin: str, form: str) -> Any:
+    """Return the root element of an XML text in which nothing is expanded or fetched.
+
+    Raises
+    ------
+    MechanismError
+        If it is no XML, or declares a document type.
+    """
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
+    try:
+        root = etree.fromstring(text.encode(), parser)
+    except etree.XMLSyntaxError as error:
+        raise MechanismError(f"{origin} is not a valid {form}: {error}") from None
+    if root.getroottree().docinfo.doctype:
+        raise MechanismError(f"{origin} declares a document type, which no {form} needs: refused")
+    return root

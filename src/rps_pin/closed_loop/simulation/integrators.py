@@ -1,0 +1,156 @@
+"""Steps in time of a mechanism's state (q, v), q on its configuration manifold.
+
+Both work with the velocity field (v, a(t, q, v)), v in the joints' own axes as Pinocchio has it,
+and move along the manifold by `pin.integrate` alone, written q (+) v here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+from scipy.integrate import DOP853
+
+from rps_pin.arrays import Array
+from rps_pin.errors import SingularityError
+
+
+class Acceleration(Protocol):
+    """What moves the mechanism: (t, q, v) to a, shape (nv,)."""
+
+    def __call__(self, t: float, q: Array, v: Array) -> Array:
+        """Return the acceleration."""
+
+
+def rk4_step(
+    model: pin.Model,
+    acceleration: Acceleration,
+    t: float,
+    state: tuple[Array, Array],
+    step: float,
+    first: Array | None = None,
+) -> tuple[Array, Array]:
+    """Return (q, v) one step later, to order 4.
+
+    The commutator-free method of Celledoni, Marthinsen and Owren (Commutator-free Lie group
+    methods, Future Generation Computer Systems 19, 2003, the method of order 4 with the classical
+    coefficients). For v, which lives in a vector space, it is the classical method of Runge and
+    Kutta. Two short moves at the end, instead of a long one, stand for the commutators.
+
+    Parameters
+    ----------
+    model
+        Its configuration manifold.
+    acceleration
+        The field; called four times (three if `first` is given).
+    t
+        Time at the start, s.
+    state
+        q (nq,) and v (nv,) at the start.
+    step
+        h, s.
+    first
+        The acceleration at the start, if it is known already.
+    """
+    q, v = state
+    h, plus = step, pin.integrate
+    a = acceleration(t, q, v) if first is None else first
+    q2, v2 = plus(model, q, h / 2 * v), v + h / 2 * a
+    a2 = acceleration(t + h / 2, q2, v2)
+    q3, v3 = plus(model, q, h / 2 * v2), v + h / 2 * a2
+    a3 = acceleration(t + h / 2, q3, v3)
+    q4, v4 = plus(model, q2, h * (v3 - v / 2)), v + h * a3
+    a4 = acceleration(t + h, q4, v4)
+    middle = plus(model, q, h / 12 * (3 * v + 2 * v2 + 2 * v3 - v4))
+    end = plus(model, middle, h / 12 * (-v + 2 * v2 + 2 * v3 + 3 * v4))
+    return end, v + h / 6 * (a + 2 * a2 + 2 * a3 + a4)
+
+
+class AdaptiveStepper:
+    """Steps of DOP853 (order 8, error kept by order 5 and 3), each in coordinates of its own.
+
+    Around the configuration q_0 that a step starts from, q = q_0 (+) u, and
+
+        v = D(u) u',  D = d(q_0 (+) u) / du,
+
+    where D is the identity for joints whose coordinates are plain numbers. The length of the last
+    step is where the next one starts from.
+
+    Parameters
+    ----------
+    model
+        Its configuration manifold.
+    tolerance
+        Relative and absolute error of a step, in u and v.
+    first_step
+        Length of the first step that is tried, s.
+    """
+
+    def __init__(self, model: pin.Model, tolerance: float, first_step: float) -> None:
+        self._model, self._tolerance, self._next = model, tolerance, first_step
+        joints = list(model.joints)[1:]
+        self._flat = all(joint.nv in (joint.nq, 1) for joint in joints)
+
+    def step(
+        self,
+        acceleration: Acceleration,
+        t: float,
+        state: tuple[Array, Array],
+        until: float,
+    ) -> tuple[float, Callable[[float], tuple[Array, Array]]]:
+        """Take one step, not beyond `until`; return where it ends and the state at times within.
+
+        Raises
+        ------
+        SingularityError
+            If no step is short enough for the tolerance.
+        """
+        model, nv = self._model, self._model.nv
+        start, v_start = state
+
+        def slope(time: float, y: Array) -> Array:
+            u, v = y[:nv], y[nv:]
+            a = acceleration(time, pin.integrate(model, start, u), v)
+            return np.concatenate([self._chart_rate(start, u, v), a])
+
+        solver = DOP853(
+            slope,
+            t,
+            np.concatenate([np.zeros(nv), v_start]),
+            until,
+            rtol=self._tolerance,
+            atol=self._tolerance,
+            first_step=min(self._next, until - t),
+        )
+        message = solver.step()
+        if solver.status == "failed":
+            raise SingularityError(f"no step is short enough: {message}", np.inf, np.inf)
+        if solver.h_abs >= self._next or solver.t < until:
+            self._next = solver.h_abs  # one cut short by `until` says nothing about the next
+        interpolant = solver.dense_output() if solver.t > t else None
+
+        def at(time: float) -> tuple[Array, Array]:
+            y = solver.y if time == solver.t or interpolant is None else interpolant(time)
+            return pin.integrate(model, start, y[:nv]), np.array(y[nv:])
+
+        return float(solver.t), at
+
+    def _chart_rate(self, start: Array, u: Array, v: Array) -> Array:
+        """Return u' = D(u)^-1 v."""
+        if self._flat:
+            return v
+        slope = pin.dIntegrate(self._model, start, u, pin.ArgumentPosition.ARG1)
+        rate: Array = np.linalg.solve(slope, v)
+        return rate
+
+
+def times(duration: float, step: float) -> Iterator[tuple[int, float]]:
+    """Yield (k, k h) up to the duration, which ends the last, perhaps shorter, step."""
+    ratio = duration / step
+    whole = round(ratio)
+    count = whole if abs(ratio - whole) <= 1e-9 * max(ratio, 1.0) else int(np.ceil(ratio))
+    for k in range(count):
+        yield k, k * step
+    yield count, duration

@@ -1,0 +1,130 @@
+"""A mechanism's motion under its actuators and wrenches, before it is divided into steps.
+
+What `simulation` and `stepping` share: the forces that act, the acceleration they give, and the
+closed state that a motion starts from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.closed_loop.simulation.manifold import ClosedManifold
+from rps_pin.closed_loop.vectors import checked_vector
+from rps_pin.errors import ClosureError, InputError, SingularityError
+
+if TYPE_CHECKING:
+    from rps_pin.closed_loop.model import ClosedLoopModel
+
+State = tuple[Array, Array]
+Controller = Callable[[float, Array, Array], ArrayLike]
+WrenchesInTime = Callable[[float, Array, Array], Wrenches]
+
+#: Gap of an initial configuration, m, and opening rate per speed, above which it is refused.
+OPEN = 1e-9
+_OPENING = 1e-8
+
+
+class Drive:
+    """Actuator forces, held from one command to the next, and wrenches."""
+
+    def __init__(
+        self,
+        mechanism: ClosedLoopModel,
+        controller: Controller | None,
+        tau: ArrayLike | None,
+        wrenches: Wrenches | WrenchesInTime | None,
+    ) -> None:
+        if controller is not None and tau is not None:
+            raise InputError("give a controller or constant forces tau, not both")
+        self._controller, self._size = controller, mechanism.actuated_indices.size
+        given = np.zeros(self._size) if tau is None else tau
+        self.tau = checked_vector(given, self._size, "tau").copy()
+        self._wrenches = wrenches
+
+    def command(self, time: float, q: Array, v: Array) -> None:
+        """Ask the controller, which gets copies of the state."""
+        if self._controller is not None:
+            answer = self._controller(time, q.copy(), v.copy())
+            self.tau = checked_vector(answer, self._size, "the controller's tau").copy()
+
+    def wrenches(self, time: float, q: Array, v: Array) -> Wrenches | None:
+        """Return the wrenches that act now."""
+        given = self._wrenches
+        return given(time, q, v) if callable(given) else given
+
+
+class Motion:
+    """The dynamics under a drive, on a manifold that each finished step returns to."""
+
+    def __init__(self, mechanism: ClosedLoopModel, start: State, drive: Drive, gain: float) -> None:
+        self.model, self._drive, self._gain = mechanism.model, drive, gain
+        self._manifold = ClosedManifold(mechanism, start[0])
+        self.gap = self._manifold.gap
+
+    def acceleration(self, t: float, q: Array, v: Array) -> Array:
+        """Return a, shape (nv,).
+
+        Raises
+        ------
+        SingularityError
+            If the state is not finite, or the motion not determined.
+        """
+        refuse_infinite(q, v)
+        wrenches = self._drive.wrenches(t, q, v)
+        return self._manifold.acceleration(q, v, self._drive.tau, wrenches, self._gain)
+
+    def finish(self, state: State) -> tuple[State, float]:
+        """Return the state projected, unless Baumgarte's way was chosen, and its largest gap.
+
+        Raises
+        ------
+        SingularityError
+            If the state is not finite, or has lost rows.
+        """
+        q, v = state
+        refuse_infinite(q, v)
+        if self._gain:
+            gap = self.gap(q)
+        else:
+            q, v, gap = self._manifold.project(q, v)
+        self._manifold.renew(q)
+        return (q, v), gap
+
+
+def refuse_infinite(q: Array, v: Array) -> None:
+    """Raise `SingularityError` if a state is not finite."""
+    if not math.isfinite(q.dot(q) + v.dot(v)):
+        raise SingularityError(
+            "the motion grows beyond all numbers (unstable control, or too long a step)",
+            np.inf,
+            np.inf,
+        )
+
+
+def closed_start(mechanism: ClosedLoopModel, q: ArrayLike, v: ArrayLike | None) -> State:
+    """Return the initial state closed to rounding error, or say how far open it is."""
+    nv = mechanism.model.nv
+    q_ = checked_vector(q, mechanism.model.nq, "q")
+    v_ = np.zeros(nv) if v is None else checked_vector(v, nv, "v")
+    gap = mechanism.loop_gap(q_)
+    if not gap <= OPEN * max(1.0, mechanism.characteristic_length):
+        raise ClosureError(
+            f"the loops are open by {gap:.3g} m at the start; close them with close() first", gap
+        )
+    rates = mechanism.jacobian(q_) @ v_
+    opening = float(np.abs(rates).max(initial=0.0))
+    if opening > _OPENING * max(1.0, float(np.abs(v_).max(initial=0.0))):
+        raise ClosureError(
+            f"v opens the loops at {opening:.3g} m/s (or rad/s) at the start; make it with "
+            "velocity() first",
+            opening,
+        )
+    q_, v_, _ = ClosedManifold(mechanism, q_).project(q_, v_)
+    return q_.copy(), v_.copy()

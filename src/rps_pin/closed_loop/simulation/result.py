@@ -1,0 +1,191 @@
+"""What a simulation returns: a motion as arrays, a row for each recorded time."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.assembly.joint_limits import JointLimits
+from rps_pin.closed_loop.column_names import column_names
+from rps_pin.files import whole_file
+
+
+class JointLimitPassed(NamedTuple):
+    """A joint that left its limits, when it first did."""
+
+    joint: str
+    """Its name."""
+    time: float
+    """End of the step in which it happened, s."""
+    value: float
+    """Its coordinate then, rad or m."""
+    lower: float
+    """Its lower limit, rad or m."""
+    upper: float
+    """Its upper limit, rad or m."""
+
+    def __str__(self) -> str:
+        return (
+            f"joint {self.joint!r} left its limits {self.lower:.6g} to {self.upper:.6g} at "
+            f"t = {self.time:.6g} s: {self.value:.6g}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A simulated motion; n recorded times.
+
+    Attributes
+    ----------
+    time : (n,) array
+        s.
+    q, v, a : (n, nq), (n, nv), (n, nv) arrays
+        Configurations, velocities and accelerations, as Pinocchio has them; `a` under the `tau` of
+        the same row.
+    tau : (n, na) array
+        Actuator forces from each time on, N or N m.
+    kinetic, potential : (n,) arrays
+        Energies, rotors and springs included, J.
+    gap : (n,) array
+        Largest gap between closed frames, m (see `ClosedLoopModel.loop_gap`).
+    constraint_forces : (n, nc) array, or None
+        The closures' multipliers (see `InverseDynamics`), if they were asked for.
+    limits_passed : tuple of JointLimitPassed
+        The joints that left their limits on the way, which nothing keeps them from, in the order
+        in which they did.
+    q_names, v_names, tau_names : tuples of str
+        What the columns are, for tables.
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+    kinetic: Array
+    potential: Array
+    gap: Array
+    constraint_forces: Array | None
+    limits_passed: tuple[JointLimitPassed, ...]
+    q_names: tuple[str, ...]
+    v_names: tuple[str, ...]
+    tau_names: tuple[str, ...]
+
+    @property
+    def energy(self) -> Array:
+        """Kinetic and potential energy together, shape (n,), J."""
+        total: Array = self.kinetic + self.potential
+        return total
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write all of it as a table with a heading; the file is written whole or not at all.
+
+        Numbers have 17 digits: they read back as they were.
+        """
+        names = [
+            "time",
+            *(f"q_{name}" for name in self.q_names),
+            *(f"v_{name}" for name in self.v_names),
+            *(f"a_{name}" for name in self.v_names),
+            *(f"tau_{name}" for name in self.tau_names),
+            *("kinetic", "potential", "gap"),
+        ]
+        columns = [self.time, self.q, self.v, self.a, self.tau]
+        columns += [self.kinetic, self.potential, self.gap]
+        if self.constraint_forces is not None:
+            names += [f"lambda_{row}" for row in range(self.constraint_forces.shape[1])]
+            columns.append(self.constraint_forces)
+        with whole_file(path) as scratch:
+            table = np.column_stack(columns)
+            heading = ",".join(f'"{name}"' if "," in name else name for name in names)
+            np.savetxt(scratch, table, fmt="%.17g", delimiter=",", header=heading, comments="")
+
+    def to_npz(self, path: str | os.PathLike[str]) -> None:
+        """Write the arrays under their names for `numpy.load`, whole or not at all."""
+        arrays: dict[str, Any] = {
+            name: getattr(self, name)
+            for name in ("time", "q", "v", "a", "tau", "kinetic", "potential", "gap")
+        }
+        if self.constraint_forces is not None:
+            arrays["constraint_forces"] = self.constraint_forces
+        for name in ("q_names", "v_names", "tau_names"):
+            arrays[name] = np.array(getattr(self, name), dtype=str)
+        with whole_file(path) as scratch, scratch.open("wb") as stream:
+            np.savez_compressed(stream, **arrays)
+
+
+class Sample(NamedTuple):
+    """A row of a `Simulation`."""
+
+    time: float
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+    energies: tuple[float, float]
+    gap: float
+    constraint_forces: Array | None
+
+
+class Recorder:
+    """Collects samples and watches the joint limits.
+
+    Parameters
+    ----------
+    model
+        The mechanism's tree.
+    actuated
+        Indices of the actuated velocities.
+    """
+
+    def __init__(self, model: pin.Model, actuated: Indices) -> None:
+        self._model, self._limits = model, JointLimits(model)
+        self._watched = np.ones(self._limits.q.size, dtype=bool)
+        self._passed: list[JointLimitPassed] = []
+        self._samples: list[Sample] = []
+        self._q_names, self._v_names = column_names(model)
+        self._tau_names = tuple(self._v_names[index] for index in actuated)
+
+    def watch(self, time: float, q: Array) -> None:
+        """Note the joints that are outside their limits for the first time."""
+        limits = self._limits
+        x = q.take(limits.q)
+        outside = (x < limits.lower) | (x > limits.upper)
+        if not outside.any():
+            return
+        for index in np.flatnonzero(outside & self._watched):
+            self._watched[index] = False
+            lower, upper = float(limits.lower[index]), float(limits.upper[index])
+            passed = JointLimitPassed(limits.names[index], time, float(x[index]), lower, upper)
+            self._passed.append(passed)
+
+    def add(self, sample: Sample) -> None:
+        """Keep a sample."""
+        self._samples.append(sample)
+
+    def simulation(self) -> Simulation:
+        """Return what was recorded until now."""
+        rows, nv = self._samples, self._model.nv
+        n = len(rows)
+        energies = np.array([row.energies for row in rows]).reshape(n, 2)
+        forces = [row.constraint_forces for row in rows if row.constraint_forces is not None]
+        return Simulation(
+            time=np.array([row.time for row in rows]),
+            q=np.array([row.q for row in rows]).reshape(n, self._model.nq),
+            v=np.array([row.v for row in rows]).reshape(n, nv),
+            a=np.array([row.a for row in rows]).reshape(n, nv),
+            tau=np.array([row.tau for row in rows]).reshape(n, len(self._tau_names)),
+            kinetic=energies[:, 0].copy(),
+            potential=energies[:, 1].copy(),
+            gap=np.array([row.gap for row in rows]),
+            constraint_forces=np.array(forces) if forces else None,
+            limits_passed=tuple(self._passed),
+            q_names=self._q_names,
+            v_names=self._v_names,
+            tau_names=self._tau_names,
+        )

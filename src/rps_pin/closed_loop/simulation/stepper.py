@@ -1,0 +1,95 @@
+"""A mechanism simulated step by step: for loops that belong to someone else."""
+
+from __future__ import annotations
+
+from numbers import Integral
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.closed_loop.simulation.integrators import rk4_step
+from rps_pin.closed_loop.simulation.motion import Drive, Motion, WrenchesInTime, closed_start
+from rps_pin.closed_loop.vectors import checked_vector
+from rps_pin.errors import InputError
+
+if TYPE_CHECKING:
+    from rps_pin.closed_loop.model import ClosedLoopModel
+
+
+class Stepper:
+    """What `simulate` does with fixed steps and projection, one call at a time.
+
+    Parameters
+    ----------
+    mechanism
+        What moves. Its scratch memory is used: one thread at a time.
+    q, v
+        Closed configuration (nq,), and a velocity that keeps it closed (nv,); at rest if left out.
+    wrenches
+        As for `simulate`.
+
+    Attributes
+    ----------
+    time : float
+        Since the start, s.
+    q, v : arrays
+        The state now, shapes (nq,) and (nv,): new arrays at each step.
+    gap : float
+        Largest gap between closed frames, m.
+
+    Raises
+    ------
+    InputError
+        If an argument does not fit.
+    ClosureError
+        If the loops are open, or v opens them.
+    """
+
+    def __init__(
+        self,
+        mechanism: ClosedLoopModel,
+        q: ArrayLike,
+        v: ArrayLike | None = None,
+        *,
+        wrenches: Wrenches | WrenchesInTime | None = None,
+    ) -> None:
+        self._drive = Drive(mechanism, None, None, wrenches)
+        self.q, self.v = closed_start(mechanism, q, v)
+        self._motion = Motion(mechanism, (self.q, self.v), self._drive, 0.0)
+        self.time, self.gap = 0.0, self._motion.gap(self.q)
+
+    def advance(self, tau: ArrayLike, duration: float, steps: int = 1) -> None:
+        """Move on under constant actuator forces.
+
+        Parameters
+        ----------
+        tau
+            Shape (na,), N or N m.
+        duration
+            s; positive.
+        steps
+            Into how many steps of order 4 it is divided.
+
+        Raises
+        ------
+        InputError
+            If an argument does not fit.
+        SingularityError
+            If the motion is not determined any more, or grows beyond all numbers.
+        ClosureError
+            If a step is so long that the loops cannot be closed any more.
+        """
+        if not 0 < duration < np.inf:
+            raise InputError(f"duration = {duration}: it must be positive and finite")
+        if not isinstance(steps, Integral) or isinstance(steps, bool) or steps < 1:
+            raise InputError(f"steps = {steps!r}: it must be a whole number, 1 or more")
+        self._drive.tau = checked_vector(tau, self._drive.tau.size, "tau").copy()
+        motion, step = self._motion, duration / steps
+        start, state, gap = self.time, (self.q, self.v), self.gap
+        with np.errstate(over="ignore", invalid="ignore"):  # refused in words
+            for k in range(steps):
+                moved = rk4_step(motion.model, motion.acceleration, start + k * step, state, step)
+                state, gap = motion.finish(moved)
+        (self.q, self.v), self.gap, self.time = state, gap, start + duration

@@ -1,0 +1,1 @@
+"""The control loop: laws, setpoints, filters, limits, status and clock."""

@@ -1,0 +1,111 @@
+"""Gains of a control law: proportional, derivative and integral, one for each of three errors.
+
+What they multiply, and so their units, is the law's: see `ComputedTorque` and `PDControl`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.errors import InputError
+from rps_pin.rps.checks import finite_entries
+from rps_pin.rps.kinematics.leg_equations import checked_positive
+from rps_pin.rps.kinematics.tracking import Triple
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """Gains, a number for all three errors or three numbers each.
+
+    Parameters
+    ----------
+    proportional
+        Kp, not negative; shape () or (3,), kept as (3,).
+    derivative
+        Kd, likewise.
+    integral
+        Ki, likewise; zero for none, and only with a positive Kd: `tracking_time` follows from both.
+
+    Raises
+    ------
+    InputError
+        If a gain is negative, not finite, or of another shape.
+    """
+
+    proportional: Array | float
+    derivative: Array | float
+    integral: Array | float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("proportional", "derivative", "integral"):
+            given = finite_entries(getattr(self, name), (), f"gain {name}")
+            if given.shape not in ((), (3,)):
+                raise InputError(f"gain {name} has shape {given.shape}; it must be () or (3,)")
+            if (given < 0).any():
+                raise InputError(f"gain {name} = {given.tolist()}: it must not be negative")
+            array = np.broadcast_to(given, 3).copy()
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+        integral, derivative = np.asarray(self.integral), np.asarray(self.derivative)
+        if ((integral > 0) & (derivative == 0)).any():
+            raise InputError("an integral gain needs a derivative gain: without, nothing is damped")
+
+    @classmethod
+    def placed(cls, bandwidth: float, *, damping: float = 1.0, integral: float = 0.0) -> Self:
+        """Return gains for laws that command accelerations (1/s^2, 1/s, 1/s^3).
+
+        With w = 2 pi bandwidth they are Kp = w^2, Kd = 2 damping w and Ki = integral w^3: without
+        integral the error obeys s^2 + 2 damping w s + w^2 = 0. A continuous loop is stable while
+        integral < 2 damping; a sampled one, with a filter and a delay, is looked at by
+        `loop_margins`.
+
+        Parameters
+        ----------
+        bandwidth
+            Hz; positive.
+        damping
+            1 for critical damping; positive.
+        integral
+            How much of the integral action, 0 for none.
+        """
+        w = 2 * math.pi * checked_positive(bandwidth, "bandwidth")
+        return cls(w**2, 2 * checked_positive(damping, "damping") * w, integral * w**3)
+
+    def times(self, inertia: ArrayLike) -> Gains:
+        """Return gains that command forces: these, times an inertia for each error.
+
+        Parameters
+        ----------
+        inertia
+            Shape () or (3,), kg (or kg m^2 for tilts); see `effective_inertia`.
+        """
+        factor = finite_entries(inertia, (), "inertia")
+        return Gains(self.proportional * factor, self.derivative * factor, self.integral * factor)
+
+    @property
+    def rows(self) -> tuple[Triple, Triple, Triple]:
+        """Kp, Kd and Ki as plain floats."""
+        kp, kd, ki = (
+            tuple(np.asarray(one).tolist())
+            for one in (self.proportional, self.derivative, self.integral)
+        )
+        return kp, kd, ki
+
+    @property
+    def tracking_time(self) -> Triple:
+        """Time in which the integral gives way to a force limit, s: sqrt(Kd / Ki).
+
+        The geometric mean of the integral's time Kp / Ki and the derivative's Kd / Kp, as Astrom
+        and Hagglund propose (Advanced PID Control, 2006, 3.5). Infinite without integral.
+        """
+        one, two, three = (
+            math.sqrt(kd / ki) if ki > 0 else math.inf
+            for kd, ki in zip(self.rows[1], self.rows[2], strict=True)
+        )
+        return one, two, three

@@ -1,0 +1,1 @@
+"""Simulated closed loops: plant, encoders, faults, scenarios and reports."""

@@ -1,0 +1,177 @@
+"""What a controlled motion was worth: errors in micrometres and microradians, forces, statuses."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from rps_pin.arrays import Array
+from rps_pin.control.loop.status import STATUSES, Status
+from rps_pin.control.simulation.loop_run import LoopRun
+from rps_pin.errors import InputError
+from rps_pin.rps.kinematics.pose import position, rotation
+
+#: Of a window's ends, s.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingErrors:
+    """How far the plant is from its target, n ticks.
+
+    Attributes
+    ----------
+    centre : (n, 3) array
+        Platform's centre less that of the target, base axes, m.
+    turn : (n,) array
+        Angle between the platform and the target's, rad.
+    length : (n, 3) array
+        Leg lengths less those of the target, m.
+    """
+
+    centre: Array
+    turn: Array
+    length: Array
+
+    @classmethod
+    def of(cls, run: LoopRun) -> TrackingErrors:
+        """Return the errors of every tick."""
+        p = run.parameters
+        h = p.platform_radius
+        centre = run.configuration[:, 6:9] - position(run.target, h)
+        return cls(centre, _turn(run), run.length - _lengths(run.target, p.base_radius, h))
+
+
+def _turn(run: LoopRun) -> Array:
+    """Return the angle of R_target' R, from |R - R_target| = 2 sqrt(2) sin(angle / 2)."""
+    apart = np.linalg.norm(rotation(run.pose) - rotation(run.target), axis=(-2, -1))
+    angle: Array = 2 * np.arcsin(np.minimum(apart / np.sqrt(8.0), 1.0))
+    return angle
+
+
+def _lengths(pose: Array, g: float, h: float) -> Array:
+    from rps_pin.rps.kinematics.legs import leg_angles_and_lengths, tips  # noqa: PLC0415
+
+    return leg_angles_and_lengths(tips(position(pose, h), rotation(pose), h), g)[0]
+
+
+@dataclass(frozen=True)
+class LoopSummary:
+    """Figures of a run over a window of time. SI units, but errors in um and urad.
+
+    Attributes
+    ----------
+    centre_rms, centre_max, centre_end
+        Distance of the platform's centre from the target's, um.
+    turn_rms, turn_max, turn_end
+        Angle between platform and target, urad.
+    length_rms, length_max
+        Over all legs, um.
+    force_peak, force_rms
+        Of the actuators, worst of three, N.
+    saturated
+        Share of ticks at a force limit.
+    nearest_singular
+        Least distance to a singularity, 0 to 1.
+    gap
+        Largest gap of the plant's loops, m.
+    ticks
+        In the window.
+    statuses
+        Ticks by name of each status that came up, over the whole run.
+    first
+        When each first did, s.
+    """
+
+    centre_rms: float
+    centre_max: float
+    centre_end: float
+    turn_rms: float
+    turn_max: float
+    turn_end: float
+    length_rms: float
+    length_max: float
+    force_peak: float
+    force_rms: float
+    saturated: float
+    nearest_singular: float
+    gap: float
+    ticks: int
+    statuses: dict[str, int]
+    first: dict[str, float]
+
+    @classmethod
+    def of(cls, run: LoopRun, *, begin: float = 0.0, end: float = np.inf) -> LoopSummary:
+        """Return the figures of the ticks from `begin` until before `end`, s.
+
+        Raises
+        ------
+        InputError
+            If there is no tick in the window.
+        """
+        here = (run.time >= begin - _ROUNDING) & (run.time < end - _ROUNDING)
+        if not here.any():
+            raise InputError(f"no tick between {begin} and {end} s; the run has {run.time.size}")
+        errors = TrackingErrors.of(run)
+        centre = 1e6 * np.linalg.norm(errors.centre[here], axis=1)
+        turn, length = 1e6 * errors.turn[here], 1e6 * np.abs(errors.length[here])
+        force = run.applied[here]
+        flags = {flag: (run.status & int(flag)) != 0 for flag in Status if flag}
+        return cls(
+            centre_rms=_rms(centre),
+            centre_max=float(centre.max()),
+            centre_end=float(centre[-1]),
+            turn_rms=_rms(turn),
+            turn_max=float(turn.max()),
+            turn_end=float(turn[-1]),
+            length_rms=_rms(length),
+            length_max=float(length.max()),
+            force_peak=float(np.abs(force).max()),
+            force_rms=float(np.sqrt((force**2).mean(axis=0)).max()),
+            saturated=float(flags[Status.SATURATED][here].mean()),
+            nearest_singular=float(run.distance[here].min()),
+            gap=float(run.gap[here].max()),
+            ticks=int(here.sum()),
+            statuses={_name(flag): int(on.sum()) for flag, on in flags.items() if on.any()},
+            first={_name(f): float(run.time[on.argmax()]) for f, on in flags.items() if on.any()},
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data."""
+        return asdict(self)
+
+    def table(self) -> Table:
+        """Return the figures for a terminal."""
+        table = Table("", "RMS", "largest", "at the end", "unit")
+        for column in table.columns[1:4]:
+            column.justify = "right"
+        for name, unit, figures in (
+            ("error of the centre", "um", (self.centre_rms, self.centre_max, self.centre_end)),
+            ("error of the orientation", "urad", (self.turn_rms, self.turn_max, self.turn_end)),
+            ("error of the leg lengths", "um", (self.length_rms, self.length_max)),
+            ("force of an actuator", "N", (self.force_rms, self.force_peak)),
+        ):
+            table.add_row(name, *(f"{f:.4g}" for f in figures), *[""] * (3 - len(figures)), unit)
+        table.add_section()
+        table.add_row("ticks at a force limit", f"{self.saturated:.2%}")
+        table.add_row("least distance to a singularity", f"{self.nearest_singular:.4g}")
+        for name, count in self.statuses.items():
+            table.add_row(name, f"{count} ticks", f"first at {self.first[name]:.6g} s")
+        return table
+
+
+def status_name(number: int) -> str:
+    """Return a status as words, ``"ok"`` or its flags."""
+    status = STATUSES[number]
+    return ", ".join(_name(flag) for flag in Status if flag and flag in status) or "ok"
+
+
+def _name(flag: Status) -> str:
+    return str(flag.name).lower().replace("_", " ")
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

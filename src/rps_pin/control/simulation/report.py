@@ -1,0 +1,104 @@
+"""The report of a control scenario, as Markdown: what it was, its margins, errors and statuses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rps_pin.control.simulation.loop_run import LoopRun
+from rps_pin.control.simulation.loop_summary import LoopSummary, status_name
+from rps_pin.control.simulation.scenario import Scenario
+from rps_pin.errors import InputError
+
+#: Changes of the status that are written out.
+_MOST_SHOWN = 50
+
+
+def report(
+    title: str, scenario: Scenario, run: LoopRun, summary: LoopSummary, figures: Mapping[str, str]
+) -> str:
+    """Return the report.
+
+    Parameters
+    ----------
+    title
+        Of the page.
+    scenario, run, summary
+        What ran, what became of it, and its figures after settling.
+    figures
+        Captions by file name.
+    """
+    entry = scenario.entry
+    lines = [f"# {title}", ""]
+    lines += [
+        f"Robot {scenario.model.parameters.name}; {run.time.size} ticks of "
+        f"{1e3 * entry.period:g} ms, the first {entry.settle:g} s at rest.",
+        "",
+    ]
+    lines += _rows("controller", entry.controller.model_dump(exclude_none=True))
+    lines += _rows("plant", entry.plant.model_dump(exclude_none=True))
+    lines += ["", "## Gains and margins", "", *_gains(scenario), "", _margins(scenario), ""]
+    lines += [f"## Errors, over {summary.ticks} ticks", "", *_errors(summary), ""]
+    lines += ["## Statuses", "", *_statuses(run, summary), ""]
+    if scenario.faults:
+        lines += ["Faults:", "", *(f"- {fault}" for fault in scenario.faults), ""]
+    for name, caption in figures.items():
+        lines += [f"![{caption}]({name})", ""]
+    return "\n".join(lines)
+
+
+def _rows(name: str, values: Mapping[str, Any]) -> list[str]:
+    shown = ", ".join(f"{key} {_plain(value)}" for key, value in values.items() if value != {})
+    return [f"- {name}: {shown or 'as the controller believes'}"]
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, dict):
+        return "(" + ", ".join(f"{key} {_plain(one)}" for key, one in value.items()) + ")"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _gains(scenario: Scenario) -> list[str]:
+    names = ("proportional", "derivative", "integral")
+    return [
+        f"- {name}: {', '.join(f'{value:.6g}' for value in row)}"
+        for name, row in zip(names, scenario.gains.rows, strict=True)
+    ]
+
+
+def _margins(scenario: Scenario) -> str:
+    try:
+        return f"One axis, as the model has it: {scenario.margins()}."
+    except InputError as error:
+        return f"No margins are given: {error}."
+
+
+def _errors(summary: LoopSummary) -> list[str]:
+    s = summary
+    return [
+        "| | RMS | largest | at the end | |",
+        "|---|---:|---:|---:|---|",
+        f"| centre | {s.centre_rms:.4g} | {s.centre_max:.4g} | {s.centre_end:.4g} | um |",
+        f"| orientation | {s.turn_rms:.4g} | {s.turn_max:.4g} | {s.turn_end:.4g} | urad |",
+        f"| leg lengths | {s.length_rms:.4g} | {s.length_max:.4g} | | um |",
+        f"| actuator force | {s.force_rms:.4g} | {s.force_peak:.4g} | | N |",
+        "",
+        f"Ticks at a force limit: {s.saturated:.2%}. Least distance to a singularity: "
+        f"{s.nearest_singular:.4g}. Largest gap of the plant's loops: {s.gap:.2g} m.",
+    ]
+
+
+def _statuses(run: LoopRun, summary: LoopSummary) -> list[str]:
+    lines = [
+        f"- {name}: {count} ticks, first at {summary.first[name]:.6g} s"
+        for name, count in summary.statuses.items()
+    ]
+    if not run.events:
+        return ["ok throughout."]
+    lines += ["", "| t (s) | status | in words |", "|---:|---|---|"]
+    lines += [
+        f"| {event.time:.6g} | {status_name(event.status)} | {event.text} |"
+        for event in run.events[:_MOST_SHOWN]
+    ]
+    more = len(run.events) - _MOST_SHOWN
+    return [*lines, "", f"... and {more} further changes."] if more > 0 else lines

@@ -1,0 +1,199 @@
+"""Control scenarios from files: a robot, a controller, a plant that is not quite it, and faults.
+
+    robot: micro
+    trajectory: {kind: helix, radius: 0.0005, pitch: 0.00033, height: 0.223, duration: 1.0}
+    controller: {law: computed_torque, bandwidth: 15.0, integral: 0.2}
+    plant: {masses: 1.2, delay: 1, encoder_resolution: 5.0e-8}
+    faults: [{kind: lost, start: 1.5, duration: 0.0005}]
+
+`rps_pin.control.simulation.scenario_schema` has all keys; those of the controller and the plant are
+the arguments of what they make.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rps_pin.config import YamlFile, read_yaml
+from rps_pin.control.estimator.effective_inertia import effective_inertia
+from rps_pin.control.loop.computed_torque import ComputedTorque
+from rps_pin.control.loop.controller import Controller
+from rps_pin.control.loop.gains import Gains
+from rps_pin.control.loop.pd_control import PDControl
+from rps_pin.control.margins import LoopMargins, loop_margins
+from rps_pin.control.simulation.encoders import Encoders
+from rps_pin.control.simulation.faults import Fault
+from rps_pin.control.simulation.loop_run import LoopRun, run_loop
+from rps_pin.control.simulation.plant import Plant
+from rps_pin.control.simulation.scenario_schema import Machine, ScenarioEntry, validated
+from rps_pin.control.simulation.wrong_parameters import wrong_parameters
+from rps_pin.errors import InputError
+from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.motion.trajectory_file import described_trajectory, load_trajectory
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.robot_file import load_robot
+from rps_pin.trajectories.path import Trajectory
+
+_OF_LAW = {"law", "bandwidth", "damping", "integral", "gains", "model", "speeds", "paced"}
+_OF_PLANT = {"payload", "delay", "substeps", "encoder_resolution", "encoder_noise", "seed"}
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What a file describes, ready to run; each run starts anew.
+
+    Attributes
+    ----------
+    entry : ScenarioEntry
+        The file's values.
+    model : RPSRobot
+        The robot as its controller believes it to be.
+    machine : RPSRobot
+        As it is.
+    trajectory : Trajectory
+        The targets.
+    gains : Gains
+        Of the controller, in its law's units.
+    faults : tuple of Fault
+        In the file's order.
+    """
+
+    entry: ScenarioEntry
+    model: RPSRobot
+    machine: RPSRobot
+    trajectory: Trajectory
+    gains: Gains
+    faults: tuple[Fault, ...]
+
+    @property
+    def begin(self) -> Any:
+        """The trajectory's first pose, shape (3,)."""
+        return self.trajectory.sample(0.0).pose
+
+    def controller(self) -> Controller:
+        """Return a new controller."""
+        entry = self.entry.controller
+        settings = entry.model_dump(exclude=_OF_LAW, exclude_none=True)
+        law = ComputedTorque if entry.law == "computed_torque" else PDControl
+        return law(self.model, self.begin, self.gains, period=self.entry.period, **settings)
+
+    def plant(self) -> Plant:
+        """Return a new plant."""
+        entry = self.entry.plant
+        settings = entry.model_dump(include={"delay", "substeps"}, exclude_none=True)
+        encoders = Encoders(entry.encoder_resolution, entry.encoder_noise, entry.seed)
+        return Plant(
+            self.machine, self.begin, period=self.entry.period, encoders=encoders, **settings
+        )
+
+    def run(self, progress: Callable[[float], object] | None = None) -> LoopRun:
+        """Return what the controller makes of the plant; see `run_loop`."""
+        return run_loop(
+            self.controller(),
+            self.plant(),
+            self.trajectory,
+            faults=self.faults,
+            duration=self.entry.duration,
+            settle=self.entry.settle,
+            speeds=self.entry.controller.speeds,
+            paced=self.entry.controller.paced,
+            progress=progress,
+        )
+
+    def margins(self) -> LoopMargins:
+        """Return the margins of an axis as far as its inertia is what the law takes it for.
+
+        Computed torque makes all three axes alike where its gains are. Of PD it is so at the start,
+        for its gains were multiplied by the inertia there.
+
+        Raises
+        ------
+        InputError
+            If gains differ from axis to axis, or are forces' own.
+        """
+        entry = self.entry.controller
+        (kp, *_), (kd, *_), (ki, *_) = rows = self._placed().rows
+        if any(len(set(row)) > 1 for row in rows):
+            raise InputError("the margins of one axis need gains that are alike for all three")
+        return loop_margins(
+            kp,
+            kd,
+            ki,
+            period=self.entry.period,
+            delay=self.entry.plant.delay or 0,
+            cut_off=None if entry.speeds == "measured" else entry.cut_off or 100.0,
+        )
+
+    def _placed(self) -> Gains:
+        """Return the gains that command accelerations."""
+        entry = self.entry.controller
+        if entry.gains is not None and entry.law == "pd":
+            raise InputError("gains in N/m have margins by an inertia that is not theirs to say")
+        if entry.gains is not None:
+            return self.gains
+        return _placed(self.entry)
+
+
+def load_scenario(path: str | os.PathLike[str]) -> Scenario:
+    """Read a scenario; names of files in it count from its folder.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or does not describe a scenario; with the line where that shows.
+    RPSPinError
+        If the robot or the trajectory cannot be made.
+    """
+    file = read_yaml(path, "scenario")
+    entry, folder = validated(file), Path(path).parent
+    nominal = load_robot(entry.robot, folder)
+    model = _changed(file, nominal, entry.controller.model, ("controller", "model"))
+    machine = _changed(file, nominal, entry.plant, ("plant",))
+    if entry.plant.payload is not None:
+        machine = machine.with_payload(Payload(entry.plant.payload))
+    if isinstance(entry.trajectory, str):
+        trajectory = load_trajectory(folder / entry.trajectory, nominal)
+    else:
+        trajectory = described_trajectory(file.part("trajectory"), folder, nominal)
+    faults = []
+    for number, one in enumerate(entry.faults):
+        try:
+            faults.append(Fault(**one.model_dump(exclude_none=True)))
+        except InputError as error:
+            raise InputError(f"{file.place(('faults', number))}: {error}") from None
+    gains = _gains(entry, model, trajectory)
+    return Scenario(entry, model, machine, trajectory, gains, tuple(faults))
+
+
+def _changed(
+    file: YamlFile, nominal: RPSRobot, machine: Machine, path: tuple[str, ...]
+) -> RPSRobot:
+    changes = machine.model_dump(exclude=_OF_PLANT, exclude_none=True)
+    try:
+        return RPSRobot(wrong_parameters(nominal.parameters, **changes))
+    except InputError as error:
+        raise InputError(f"{file.place(path)}: {error}") from None
+
+
+def _placed(entry: ScenarioEntry) -> Gains:
+    given = entry.controller
+    assert given.bandwidth is not None  # the schema's rule
+    settings = given.model_dump(include={"damping", "integral"}, exclude_none=True)
+    return Gains.placed(given.bandwidth, **settings)
+
+
+def _gains(entry: ScenarioEntry, model: RPSRobot, trajectory: Trajectory) -> Gains:
+    given = entry.controller
+    if given.gains is not None:
+        return Gains(**{name: np.array(value) for name, value in given.gains.model_dump().items()})
+    placed = _placed(entry)
+    if given.law == "computed_torque":
+        return placed
+    space = given.space or "actuator"
+    return placed.times(effective_inertia(model, trajectory.sample(0.0).pose, space=space))

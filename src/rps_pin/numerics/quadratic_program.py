@@ -1,0 +1,275 @@
+"""The point nearest to the origin that linear limits allow: a quadratic program, solved exactly.
+
+    minimise |x|^2 / 2   subject to   lower <= C x <= upper
+
+At the solution x = -C' z; z, one multiplier a limit, is positive where an upper limit holds x back,
+negative where a lower one does, and zero elsewhere. These are the conditions that make a point the
+solution, and no point is returned for which they were not checked.
+
+In a sequence of similar problems mostly the same limits hold x back. So those of the last solution
+are tried first, and ProxQP, warm-started, says which they are where that fails. From the limits
+alone x follows by a small factorisation, to rounding rather than to ProxQP's tolerance.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import proxsuite
+from scipy.linalg.lapack import dpotrf, dpotrs
+from scipy.optimize import linprog, nnls
+
+from rps_pin.arrays import Array, Bools, Indices
+
+#: How far beyond a limit x may be, relative to the size of the problem.
+EXACT = 1e-10
+#: ProxQP's tolerances, in the same units: enough to tell which limits hold x back.
+_PROXQP_TOLERANCE = 1e-9
+#: ProxQP converges in tens of iterations or not at all.
+_PROXQP_ITERATIONS = 200
+#: How near to a limit ProxQP's answer must be for the limit to be a candidate.
+_TIGHT = 1e-8
+#: Rows whose share in x is below this, relative to the largest, do not depend on x.
+_CONSTANT = 1e-10
+#: Square of the distance from the other rows, relative to the largest, below which a row is taken
+#: to depend on them.
+_DEPENDENT = 1e-14
+
+
+class Held(NamedTuple):
+    """Which limits hold x back, their rows independent."""
+
+    limits: Indices
+    upper: Bools
+    """Whether it is the upper limit, of each of these."""
+
+
+NOTHING = Held(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.bool_))
+
+
+class NearestPoint(NamedTuple):
+    """The solution."""
+
+    x: Array
+    """Shape (n,)."""
+    limits: Indices
+    """Which limits hold it back."""
+    multipliers: Array
+    """z of these limits, positive for upper ones."""
+    iterations: int
+    """Of ProxQP; 0 where it was not needed."""
+
+
+class LeastDistance:
+    """Solves such problems of k limits, one after another; for one thread.
+
+    The ProxQP problem of each number of unknowns is built when it is first met, then updated.
+
+    Parameters
+    ----------
+    limits
+        Number of limits, k.
+    """
+
+    def __init__(self, limits: int) -> None:
+        self._solvers: dict[int, Any] = {}
+        self._multipliers = np.zeros(limits)  # of the scaled problem that ProxQP sees
+        self._held = NOTHING
+
+    def reset(self) -> None:
+        """Forget the last solution: the next problem is solved as if it were the first."""
+        self._solvers.clear()
+        self._multipliers[:] = 0
+        self._held = NOTHING
+
+    def solve(self, rows: Array, lower: Array, upper: Array, size: float) -> NearestPoint | None:
+        """Return the nearest point, or None if none was found that all limits allow.
+
+        Parameters
+        ----------
+        rows
+            C, shape (k, n).
+        lower, upper
+            Shape (k,); infinite where there is no limit.
+        size
+            Of what the limits are compared with, in the unit of x: sets the scale of tolerances.
+        """
+        if self._held.limits.size:
+            point = nearest_held_by(self._held, rows, lower, upper, EXACT * size)
+            if point is not None:
+                return point
+        if max(lower.max(initial=0.0), -upper.min(initial=0.0)) <= EXACT * size:
+            self._held = NOTHING
+            return NearestPoint(np.zeros(rows.shape[1]), NOTHING.limits, np.zeros(0), 0)
+        if not rows.shape[1]:
+            return None
+        scaled = _scaled(rows, lower, upper, size)
+        if scaled is None:
+            return None
+        problem, (of_limits, of_x) = scaled
+        x, iterations = self._by_proxqp(*problem)
+        held = holding(x, *problem)
+        point = nearest_held_by(held, *problem, EXACT)
+        if point is None:  # ProxQP did not converge, rarely; or there is no point
+            held = holding(by_least_squares(*problem), *problem)
+            point = nearest_held_by(held, *problem, EXACT)
+        if point is None:
+            return None
+        self._held = held
+        self._multipliers[:] = 0
+        self._multipliers[held.limits] = point.multipliers
+        multipliers = point.multipliers * of_limits[held.limits]
+        return NearestPoint(of_x * point.x, held.limits, multipliers, iterations)
+
+    def _by_proxqp(self, rows: Array, lower: Array, upper: Array) -> tuple[Array, int]:
+        n = rows.shape[1]
+        solver = self._solvers.get(n)
+        if solver is None:
+            solver = self._solvers[n] = _new_problem(n, len(rows))
+            solver.init(np.eye(n), np.zeros(n), None, None, rows, lower, upper)
+        else:
+            solver.update(None, None, None, None, rows, lower, upper, update_preconditioner=False)
+        solver.solve(-rows.T @ self._multipliers, None, self._multipliers)
+        return np.array(solver.results.x), int(solver.results.info.iter)
+
+
+def nearest_held_by(
+    held: Held, rows: Array, lower: Array, upper: Array, tolerance: float
+) -> NearestPoint | None:
+    """Return the solution if exactly these limits hold it back, None if they do not."""
+    limits = held.limits
+    if not 0 < limits.size <= rows.shape[1]:
+        return None
+    own = rows.take(limits, axis=0)
+    target = np.where(held.upper, upper.take(limits), lower.take(limits))
+    factor, info = dpotrf(own @ own.T)
+    pivots = factor.diagonal().tolist()  # few: quicker in Python, here and below
+    if info or not min(pivots) ** 2 > _DEPENDENT * max(pivots) ** 2:
+        return None
+    pull = dpotrs(factor, target)[0]  # x = C' pull, C x = target
+    pull += dpotrs(factor, target - own @ (pull @ own))[0]  # refined
+    x = pull @ own
+    values = rows @ x
+    beyond = np.maximum(lower - values, values - upper).max()
+    if not beyond <= tolerance:
+        return None
+    for limit, pulls, is_upper in zip(limits, pull.tolist(), held.upper.tolist(), strict=True):
+        # z = -pull has the sign of its limit, unless the limits are one
+        if (pulls > 0) == is_upper and lower[limit] < upper[limit]:
+            return None
+    return NearestPoint(x, limits, -pull, 0)
+
+
+def _scaled(
+    rows: Array, lower: Array, upper: Array, size: float
+) -> tuple[tuple[Array, Array, Array], tuple[Array, float]] | None:
+    """Return the problem with rows of length one and x of the order of one, and the units.
+
+    None if a limit is broken on which x has no influence. The units are what the scaled multipliers
+    and the scaled x are to be multiplied with.
+    """
+    norms = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+    constant = norms <= _CONSTANT * norms.max()
+    beyond = np.maximum(lower, -upper)
+    if beyond.max(where=constant, initial=0.0) > EXACT * size:
+        return None
+    norms[constant] = 1.0
+    size = size + float((beyond / norms).max(where=~constant, initial=0.0))
+    problem = (
+        np.where(constant[:, None], 0.0, rows / norms[:, None]),
+        np.where(constant, -np.inf, lower / (norms * size)),
+        np.where(constant, np.inf, upper / (norms * size)),
+    )
+    return problem, (size / norms, size)
+
+
+def _new_problem(n: int, limits: int) -> Any:
+    """Return an empty ProxQP problem with our settings."""
+    proxqp = proxsuite.proxqp
+    problem = proxqp.dense.QP(n, 0, limits)
+    settings = problem.settings
+    settings.eps_abs, settings.eps_rel = _PROXQP_TOLERANCE, 0.0
+    settings.max_iter = settings.max_iter_in = _PROXQP_ITERATIONS
+    settings.initial_guess = proxqp.InitialGuess.WARM_START
+    # Without it ProxQP takes a warm start that is feasible, but not optimal, for the solution.
+    settings.check_duality_gap = True
+    settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = _PROXQP_TOLERANCE, 0.0
+    return problem
+
+
+def holding(x: Array, rows: Array, lower: Array, upper: Array) -> Held:
+    """Return which limits hold back a point that is near the solution.
+
+    Of those that are tight, a smallest set with x = -C' z.
+    """
+    values = rows @ x
+    tight = _TIGHT * (1 + np.abs(x).max())
+    at_upper, at_lower = upper - values < tight, values - lower < tight
+    columns = np.concatenate([rows[at_upper], -rows[at_lower]]).T
+    if not (columns.size and np.isfinite(x).all()):
+        return NOTHING
+    pushing = nnls(columns, -x)[0] > 0  # its choice is independent
+    limits = np.concatenate([np.flatnonzero(at_upper), np.flatnonzero(at_lower)])
+    is_upper = np.arange(limits.size) < np.count_nonzero(at_upper)
+    return Held(limits[pushing], is_upper[pushing])
+
+
+def by_least_squares(rows: Array, lower: Array, upper: Array) -> Array:
+    """Return the point by Lawson and Hanson's least-distance algorithm: slower, but finite.
+
+    With G x >= h the limits, it is -r / r_h, r and r_h the remainder of the problem
+    min |(G' u, h' u) - (0, 1)|, u >= 0. The limits are widened by half of what counts as exact, so
+    that a single point is found. Without a remainder there is none: the origin is returned.
+    """
+    has_upper, has_lower = np.isfinite(upper), np.isfinite(lower)
+    sides = np.concatenate([-rows[has_upper], rows[has_lower]])
+    bounds = np.concatenate([-upper[has_upper], lower[has_lower]]) - EXACT / 2
+    system = np.vstack([sides.T, bounds])
+    target = np.zeros(len(system))
+    target[-1] = 1.0
+    remainder = system @ nnls(system, target)[0] - target
+    if not abs(remainder[-1]) > np.finfo(np.float64).eps:
+        return np.zeros(rows.shape[1])
+    x: Array = -remainder[:-1] / remainder[-1]
+    return x
+
+
+def least_violation(rows: Array, lower: Array, upper: Array, size: float) -> tuple[Array, Array]:
+    """Return x and how far it is beyond each limit, the sum of which is least.
+
+    A linear program (HiGHS), for saying which limits leave no room: its solutions break few.
+
+    Parameters
+    ----------
+    rows, lower, upper, size
+        As for `LeastDistance.solve`; what is beyond different limits is taken as comparable.
+
+    Returns
+    -------
+    x : (n,) array
+    beyond : (k,) array
+        Positive above the upper limit, negative below the lower.
+    """
+    k, n = rows.shape
+    size = size + float(np.maximum(lower, -upper).max(initial=0.0))
+    has_lower, has_upper = np.isfinite(lower), np.isfinite(upper)
+    slack = np.eye(k)
+    answer = linprog(
+        np.concatenate([np.zeros(n), np.ones(k)]),
+        A_ub=np.vstack(
+            [
+                np.hstack([rows, -slack])[has_upper],  # C x - s <= upper
+                np.hstack([-rows, -slack])[has_lower],  # C x + s >= lower
+            ]
+        ),
+        b_ub=np.concatenate([upper[has_upper], -lower[has_lower]]) / size,
+        bounds=[(None, None)] * n + [(0, None)] * k,
+        method="highs",
+        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+    )
+    if answer.x is None:
+        raise np.linalg.LinAlgError(f"the least violation was not found: {answer.message}")
+    x = size * np.asarray(answer.x[:n], dtype=np.float64)
+    values = rows @ x
+    return x, np.maximum(values - upper, 0.0) - np.maximum(lower - values, 0.0)

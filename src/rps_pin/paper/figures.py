@@ -1,0 +1,83 @@
+"""The reproduction's pictures: the paper's Figures 1 to 9, and those about Table 2."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from rps_pin.files import whole_file
+from rps_pin.paper.compute import Reproduction
+from rps_pin.paper.figure_1 import plot_mechanism
+from rps_pin.paper.table_2_figures import (
+    plot_approach,
+    plot_fit,
+    plot_probes,
+    plot_readings,
+    plot_table_2,
+)
+from rps_pin.plots import STYLE, plot_forces, plot_lengths, plot_path
+from rps_pin.plots.workspace import (
+    plot_assembly_modes,
+    plot_effective,
+    plot_space,
+    plot_theoretical,
+    plot_views,
+)
+from rps_pin.rps.robot import RPSRobot
+
+_DOTS_PER_INCH = 80
+
+
+def pictures(found: Reproduction) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each picture, by the name of its file."""
+    micro = found.workspace.parameters
+    return {
+        "figure_1": lambda: plot_mechanism(RPSRobot.from_preset("sokolov")),
+        "figure_2": lambda: plot_assembly_modes(micro, found.modes),
+        "figure_3": lambda: plot_theoretical(micro),
+        "figure_4": lambda: plot_effective(found.coarse_workspace),
+        "figure_5": lambda: plot_space(found.coarse_workspace),
+        "figure_6": lambda: plot_views(found.workspace),
+        "figure_7": lambda: plot_path(found.runs["+"]),
+        "figure_8": lambda: plot_branches(found, plot_lengths),
+        "figure_9": lambda: plot_branches(found, plot_forces),
+        "approach": lambda: plot_approach(found.approach),
+        "probes": lambda: plot_probes(found.probes),
+        "readings": lambda: plot_readings(found),
+        "table_2": lambda: plot_table_2(found),
+        "fit": lambda: plot_fit(found),
+    }
+
+
+def write_figures(
+    found: Reproduction,
+    folder: Path,
+    track: Callable[[Iterable[str], str], Iterable[str]] = lambda items, _: items,
+) -> list[Path]:
+    """Write every picture as PNG into a folder, each whole or not at all; return the files."""
+    draw = pictures(found)
+    files = []
+    for name in track(list(draw), "pictures"):
+        path = folder / f"{name}.png"
+        with matplotlib.rc_context(STYLE), whole_file(path) as scratch:
+            draw[name]().savefig(scratch, dpi=_DOTS_PER_INCH, metadata={"Software": None})
+        files.append(path)
+    return files
+
+
+def plot_branches(found: Reproduction, plot: Callable[..., Figure]) -> Figure:
+    """Draw a quantity of Table 1's helix over time, the two branches side by side."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(10.4, 3.8), layout="constrained")
+        axes = figure.subplots(1, 2, sharey=True)
+        for one, (branch, run) in zip(axes, found.runs.items(), strict=True):
+            plot(run, one)
+            one.set_title(f"{one.get_title(loc='left')}, branch {branch}", loc="left")
+            one.get_legend().remove()
+        low, high = axes[0].get_ylim()
+        axes[0].set_ylim(low, high + 0.12 * (high - low))
+        axes[0].legend(loc="upper right", ncols=3, frameon=False)
+    return figure

@@ -1,0 +1,72 @@
+"""Work of the constraint models' forces beside the energies of Eq. 13 to 21, as read."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.paper.lagrange_terms import energies
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.trajectories.path import PathSample
+
+
+class PowerBalance(NamedTuple):
+    """Work of the constraint models' forces beside the energies of Eq. 13 to 21."""
+
+    variant: str
+    error: float
+    """Largest difference of power and energy rate, over the largest power."""
+
+
+def power_balances(samples: int = 200) -> list[PowerBalance]:
+    """Return how well each variant of the energies balances the power of the actuators.
+
+    Along a lively motion (`_Lively`), with the forces of the constraint models and the energies'
+    rates by central differences in time.
+    """
+    robot = RPSRobot.from_preset("sokolov")
+    given, path = robot.parameters, _Lively()
+    times = np.linspace(0.1, path.duration - 0.1, samples)
+    q, v, a = robot.state(*path.sample(times))
+    force = np.array([robot.inverse_dynamics(*state).tau for state in zip(q, v, a, strict=True)])
+    power = (force * robot.motion(*path.sample(times))[1].speed).sum(axis=-1)
+    variants: list[tuple[str, RPSParameters, tuple[str, ...]]] = [
+        ("Eq. 13 to 21 corrected", given, ()),
+        ("Eq. 14 as printed", given, ("eq_14",)),
+        ("Eq. 16 as printed", given.replace(leg_inertia_about="com"), ()),
+        ("Eq. 19 as printed", given, ("eq_19",)),
+    ]
+    found = []
+    for name, parameters, printed in variants:
+
+        def energy(
+            t: Array, p: RPSParameters = parameters, as_: tuple[str, ...] = printed
+        ) -> Array:
+            legs = robot.motion(*path.sample(t))[1]
+            parts = energies(
+                p, legs.length, legs.angle, legs.speed, legs.angle_rate, as_printed=as_
+            )
+            return np.asarray(np.sum(parts, axis=0))
+
+        step = 1e-5
+        change = (energy(times + step) - energy(times - step)) / (2 * step)
+        found.append(PowerBalance(name, float(np.abs(change - power).max() / np.abs(power).max())))
+    return found
+
+
+class _Lively:
+    """Heave and tilts that swing at 3, 6 and 9 rad/s."""
+
+    duration = 3.0
+
+    def sample(self, t: ArrayLike) -> PathSample:
+        """Return pose, rate and acceleration at times t, s."""
+        times = np.asarray(t, dtype=np.float64)[..., None]
+        size, middle = np.array([0.05, 0.3, 0.2]), np.array([0.5, 0.0, 0.1])
+        pace = np.array([3.0, 6.0, 9.0])
+        sine, cosine = np.sin(pace * times), np.cos(pace * times)
+        return PathSample(middle + size * sine, size * pace * cosine, -size * pace**2 * sine)

@@ -1,0 +1,230 @@
+"""The tables of what was tried for Table 2, in Markdown, and every reading as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from rps_pin.paper import readings
+from rps_pin.paper.comparison import OUT_OF_REACH, SINGULAR, Comparison, PathResult, distance
+from rps_pin.paper.compute import COLUMNS, Reproduction
+from rps_pin.paper.printing import FORCES, forces, markdown
+from rps_pin.paper.readings import PathReading
+
+#: Readings shown of each list on the page, each path once.
+_SHOWN = 6
+#: Fits shown of each column.
+_FITS = 3
+
+
+def grid() -> str:
+    """Return what each choice of the grid can be."""
+    masses = "; ".join(
+        f"{name} (m = {b.platform_mass:.2f} kg, m_leg = {b.leg_mass:.2f} kg)"
+        for name, b in readings.BODIES.items()
+    )
+    return markdown(
+        ["choice", "values"],
+        [
+            ["z_0 = 0.4 in", ", ".join(readings.UNITS)],
+            ["r_h = 0.75, p_h = 0.5 in", ", ".join(readings.UNITS)],
+            ["460 and 230 mm are", ", ".join(readings.RADII)],
+            ["branch (sign of β)", ", ".join(readings.BRANCHES)],
+            ["Eq. 5", ", ".join(readings.FORMS)],
+            ["Eq. 29", ", ".join(readings.FORMS)],
+            ["masses and Eq. 16", masses],
+            ["gravity and Eq. 19", ", ".join(readings.GRAVITIES)],
+            ["Eq. 14", ", ".join(readings.EQ_14)],
+        ],
+    )
+
+
+def paths(found: Reproduction) -> str:
+    """Return what becomes of the path readings, by the units of z_0 and of r_h and p_h."""
+    groups: dict[tuple[str, str, str], list[PathResult]] = {}
+    for result in found.paths:
+        groups.setdefault(_group(result.reading), []).append(result)
+    rows = []
+    for (height, helix, law), results in groups.items():
+        fate = Counter(result.refused for result in results)
+        mine = [r for r in found.comparisons if _group(r.path) == (height, helix, law)]
+        peaks = [float(np.abs(r.forces.numbers()).max()) for r in mine]
+        rows.append(
+            [
+                f"0.4 {height}",
+                f"0.75, 0.5 {helix}",
+                law,
+                str(len(results)),
+                str(fate[OUT_OF_REACH]),
+                str(fate[SINGULAR]),
+                f"{min(peaks):.3g} to {max(peaks):.3g}" if peaks else "-",
+                f"{min(r.distance for r in mine):.3f}" if mine else "-",
+                f"{min(r.distance_relabelled for r in mine):.3f}" if mine else "-",
+            ]
+        )
+    head = ["z_0", "r_h, p_h", "Eq. 29", "paths", "out of reach", "singular"]
+    last = ["largest force of the rest (N)", "least distance", "legs in any order"]
+    return markdown([*head, *last], rows)
+
+
+def closest(found: Reproduction, *, relabelled: bool) -> str:
+    """Return the closest readings, each path once, with their forces."""
+
+    def key(row: Comparison) -> float:
+        return row.distance_relabelled if relabelled else row.distance
+
+    seen: dict[PathReading, Comparison] = {}
+    for row in sorted(found.comparisons, key=lambda r: round(key(r), 9)):
+        seen.setdefault(row.path, row)
+    return markdown(
+        ["distance", "path", "bodies", "Table 2's d_1, d_2, d_3", *FORCES],
+        [
+            [
+                f"{key(row):.3f}",
+                path_words(row.path),
+                bodies_words(row),
+                str(row.labels) if relabelled else "legs 1, 2, 3",
+                *forces(row.relabelled if relabelled else row.forces),
+            ]
+            for row in list(seen.values())[:_SHOWN]
+        ],
+    )
+
+
+def differences(row: Comparison) -> str:
+    """Return the differences of the closest reading to both columns of Table 2, N."""
+    lines = [["the reading", *forces(row.relabelled), ""]]
+    for name, ranges in COLUMNS.items():
+        gap = row.relabelled.numbers() - ranges.numbers()
+        share = distance(row.relabelled, ranges)
+        lines.append([f"less {name}", *(f"{x:+.1f}" for x in gap), f"{share:.3f}"])
+    return markdown(["", *FORCES, "distance"], lines)
+
+
+def fits(found: Reproduction) -> str:
+    """Return the paths that come closest with a free mass, and the nearest with two."""
+    rows = []
+    for column, one in found.fits.items():
+        both = ("platform and legs", one.both)
+        for free, fit in [*(("platform", fit) for fit in one.fits[:_FITS]), both]:
+            masses = [f"{fit.platform_mass:.2f}", f"{fit.leg_mass:.2f}"]
+            rows.append(
+                [
+                    *(column, path_words(fit.path), free, *masses, str(fit.labels)),
+                    *forces(fit.forces),
+                    f"{fit.distance:.3f}",
+                ]
+            )
+    head = ["column", "path", "free masses", "m (kg)", "m_leg (kg)", "Table 2's d_1, d_2, d_3"]
+    return markdown([*head, *FORCES, "distance"], rows)
+
+
+def moved(found: Reproduction) -> str:
+    """Return the nearest path's fits with one of its numbers moved."""
+    columns = list(found.fits)
+    rows = [["as it is", *_mass_and_distance(*((fit.fits[0].platform_mass, fit.fits[0].distance)
+             for fit in found.fits.values()))]]  # fmt: skip
+    for each in zip(*(found.fits[column].moved for column in columns), strict=True):
+        name = f"{each[0].moved} {1e3 * each[0].by:+g} mm"
+        rows.append(
+            [name, *_mass_and_distance(*((one.platform_mass, one.distance) for one in each))]
+        )
+    head = [text for column in columns for text in (f"{column}: m (kg)", "distance")]
+    return markdown(["path", *head], rows)
+
+
+def crossings(found: Reproduction) -> str:
+    """Return when the paths with Table 1's radii, Eq. 5 and 29 corrected, cross singularities."""
+    rows = []
+    for result in found.paths:
+        reading = result.reading
+        if reading.as_meant and result.crossings:
+            times = ", ".join(f"{time:.4f}" for time in result.crossings)
+            rows.append([f"0.4 {reading.height_unit}", reading.helix_unit, reading.branch, times])
+    return markdown(["z_0", "r_h, p_h in", "branch", "crosses a singularity at (s)"], rows)
+
+
+def sampled(found: Reproduction) -> str:
+    """Return what sampling across crossings reports."""
+    return markdown(
+        ["path", "crossings", "samples a second", *FORCES, "distance"],
+        [
+            [
+                *(row.path, str(row.crossings), f"{row.rate:.0f}"),
+                *forces(row.forces),
+                f"{row.distance:.3g}",
+            ]
+            for row in found.sampled
+        ],
+    )
+
+
+def probes(found: Reproduction) -> str:
+    """Return the helices of several heights."""
+    rows = []
+    for probe in found.probes:
+        name = [f"{1e3 * probe.height:.5g}", probe.branch]
+        if probe.forces is None:
+            times = ", ".join(f"{time:.3f}" for time in probe.crossings)
+            rows.append([*name, f"crosses at {times} s", *["-"] * 7])
+        else:
+            near = f"{probe.nearest:.1e}"
+            rows.append([*name, near, *forces(probe.forces), f"{probe.distance:.3f}"])
+    return markdown(["z_0 (mm)", "branch", "nearest", *FORCES, "distance"], rows)
+
+
+def readings_csv(found: Reproduction) -> str:
+    """Return every reading as CSV, the closest to Table 2 first and those refused last."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    path = ["z_0", "r_h_p_h", "g_h", "branch", "eq_5", "eq_29"]
+    columns = [f"F{leg}_{which}_N" for which in ("min", "max") for leg in (1, 2, 3)]
+    last = ["distance", "distance_any_labels", "labels", "refused", "singular_at_s"]
+    writer.writerow([*path, "bodies", "gravity", "eq_14", "nearest", *columns, *last])
+    for row in found.comparisons:
+        numbers = [f"{x:.4g}" for x in row.forces.numbers()]
+        ends = [f"{row.distance:.4f}", f"{row.distance_relabelled:.4f}", str(row.labels), "", ""]
+        writer.writerow([*_fields(row.path), *row.body, f"{row.nearest:.3g}", *numbers, *ends])
+    for result in found.paths:
+        if result.refused:
+            times = " ".join(f"{time:.4f}" for time in result.crossings)
+            writer.writerow([*_fields(result.reading), *[""] * 13, result.refused, times])
+    return text.getvalue()
+
+
+def path_words(path: PathReading) -> str:
+    """Return what a path reads Table 1 as."""
+    return (
+        f"z_0 in {path.height_unit}; r_h, p_h in {path.helix_unit}; {path.radii}; branch "
+        f"{path.branch}; Eq. 5 {path.eq_5}, Eq. 29 {path.eq_29}"
+    )
+
+
+def bodies_words(row: Comparison) -> str:
+    """Return what a reading takes the bodies to be."""
+    return f"{row.body.bodies}; {row.body.gravity}; {row.body.eq_14}"
+
+
+# Inner workings -----------------------------------------------------------------------------------
+
+
+def _mass_and_distance(*pairs: tuple[float, float]) -> Sequence[str]:
+    return [
+        text
+        for mass, gap in pairs
+        for text in (("crosses", "-") if math.isnan(gap) else (f"{mass:.1f}", f"{gap:.3f}"))
+    ]
+
+
+def _fields(path: PathReading) -> list[str]:
+    choice = [path.height_unit, path.helix_unit, path.radii, path.branch]
+    return [*choice, path.eq_5, path.eq_29]
+
+
+def _group(path: PathReading) -> tuple[str, str, str]:
+    return path.height_unit, path.helix_unit, path.eq_29

@@ -1,0 +1,45 @@
+"""The reproduction as files: the page, its pictures and every reading that was tried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from rps_pin.files import whole_file
+from rps_pin.paper.compute import Reproduction
+from rps_pin.paper.figures import write_figures
+from rps_pin.paper.page import render
+from rps_pin.paper.reading_tables import readings_csv
+
+
+def write(
+    found: Reproduction,
+    folder: Path,
+    track: Callable[[Iterable[str], str], Iterable[str]] = lambda items, _: items,
+) -> list[Path]:
+    """Write ``reproduction.md``, and its pictures and readings into ``reproduction/`` beside it.
+
+    Each file is written whole or not at all, the page last. What stands there is replaced.
+
+    Parameters
+    ----------
+    found
+        What `compute` returned.
+    folder
+        Made if need be.
+    track
+        Wraps the loop over the pictures, for a progress bar.
+
+    Returns
+    -------
+    list of Path
+        The files, the page first.
+    """
+    page, beside = folder / "reproduction.md", folder / "reproduction"
+    beside.mkdir(parents=True, exist_ok=True)
+    pictures = write_figures(found, beside, track)
+    readings = beside / "readings.csv"
+    for path, text in ((readings, readings_csv(found)), (page, render(found))):
+        with whole_file(path) as scratch:
+            scratch.write_text(text, "utf-8")
+    return [page, *pictures, readings]

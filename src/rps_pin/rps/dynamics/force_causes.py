@@ -1,0 +1,134 @@
+"""The actuator forces of a motion by cause: what gravity, inertia, speed, friction and loads ask.
+
+The actuator forces are linear in what the bodies' motion takes (see `force_equations`), so that
+each cause has its own part, and the parts add up to the whole. Gravity, inertia and Coriolis are
+those of the robot itself, without its payload: of platform, cylinders and rods.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.rps.dynamics.actuator_forces import forces_of
+from rps_pin.rps.dynamics.force_equations import ForceTerms, inertia_entries, vector_entries
+from rps_pin.rps.dynamics.friction import has_friction
+from rps_pin.rps.dynamics.loads import checked_wrench
+from rps_pin.rps.kinematics.pose import checked_motion
+from rps_pin.rps.robot import RPSRobot
+
+_NO_GRAVITY = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class ForceCauses:
+    """Parts of the actuator forces, shape (..., 3) each, N; positive pushes the leg out."""
+
+    gravity: Array
+    """Holding platform and legs against gravity."""
+    inertia: Array
+    """Accelerating them: what is proportional to the pose's acceleration."""
+    coriolis: Array
+    """Coriolis and centrifugal forces: what is quadratic in the pose's rate."""
+    friction: Array
+    """Of prismatic and revolute joints."""
+    payload: Array
+    """Carrying and moving the payload: its gravity, inertia and Coriolis forces."""
+    external: Array
+    """Withstanding the external wrench."""
+
+    @property
+    def total(self) -> Array:
+        """The actuator forces, shape (..., 3), N."""
+        whole: Array = np.sum(list(self.parts().values()), axis=0)
+        return whole
+
+    def parts(self) -> dict[str, Array]:
+        """Return the parts by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+def force_causes(
+    robot: RPSRobot,
+    pose: ArrayLike,
+    rate: ArrayLike,
+    acceleration: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+) -> ForceCauses:
+    """Return the parts of the actuator forces of samples.
+
+    Parameters
+    ----------
+    robot
+        The 3-RPS, with its payload and friction.
+    pose, rate, acceleration, wrench
+        As for `RPSRobot.actuator_forces`.
+
+    Raises
+    ------
+    InputError, UnreachableError, SingularityError
+        As `RPSRobot.actuator_forces`.
+    """
+    x, dx, ddx = checked_motion(pose, rate, acceleration)
+    robot.actuator_forces(x, dx, ddx, wrench=wrench)  # refuses what has no forces
+    load = None if wrench is None else checked_wrench(wrench, x.shape[:-1])
+    zero = np.zeros_like(x)
+    bodies = _without_friction(ForceTerms.of(robot.parameters))
+    weightless = replace(bodies, gravity=_NO_GRAVITY)
+
+    def part(terms: ForceTerms | None, dx: Array, ddx: Array, load: Array | None = None) -> Array:
+        return zero if terms is None else forces_of(terms, (x, dx, ddx), load)[0]
+
+    nothing = _massless(weightless)
+    return ForceCauses(
+        gravity=part(bodies, zero, zero),
+        inertia=part(weightless, zero, ddx),
+        coriolis=part(weightless, dx, zero),
+        friction=part(_only_friction(robot), dx, zero),
+        payload=part(_only_payload(robot), dx, ddx),
+        external=part(None if load is None else nothing, zero, zero, load),
+    )
+
+
+def _without_friction(terms: ForceTerms) -> ForceTerms:
+    return replace(
+        terms,
+        prismatic_damping=0.0,
+        prismatic_friction=0.0,
+        revolute_damping=0.0,
+        revolute_friction=0.0,
+    )
+
+
+def _massless(terms: ForceTerms) -> ForceTerms:
+    return replace(
+        terms,
+        platform_mass=0.0,
+        platform_moment=(0.0, 0.0, 0.0),
+        platform_inertia=(0.0,) * 6,
+        leg_moment=0.0,
+        leg_inertia=0.0,
+        rod_mass=0.0,
+    )
+
+
+def _only_friction(robot: RPSRobot) -> ForceTerms | None:
+    if not has_friction(robot.parameters):
+        return None
+    return _massless(robot.force_terms)
+
+
+def _only_payload(robot: RPSRobot) -> ForceTerms | None:
+    payload = robot.payload
+    if payload is None:
+        return None
+    return replace(
+        _without_friction(_massless(robot.force_terms)),
+        platform_mass=payload.mass,
+        platform_moment=vector_entries(payload.first_moment),
+        platform_inertia=inertia_entries(payload.inertia_about_platform),
+    )

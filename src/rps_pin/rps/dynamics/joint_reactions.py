@@ -1,0 +1,216 @@
+"""What the joints of a 3-RPS bear along a motion: in closed form, all samples at once.
+
+**Leg axes** of leg i are those of its joints' frames in the URDF: x along the leg towards its tip,
+s_i; z across it in the leg's plane, t_i, to where phi grows; y = z x x = -a_i, against the axis a_i
+of the revolute joint. Every wrench is (force, moment), N and N m, at a point that its field names.
+
+The revolute joint turns freely about a_i (but for friction) and the rod slides freely along s_i
+(but for friction), which gives the tip's force in the leg's plane: with M_i what turning the leg
+about its joint takes, and F_rod what its rod takes along the leg,
+
+    s_i . f_i = F_i - F_rod,     t_i . f_i = -M_i / d_i,
+
+f_i on the platform. Across the planes, a_i . f_i = 2/3 a_i . r + mu, with r the force on the
+platform that is left, since the sum of a_i a_i' over the legs is 3/2 in the base plane; mu, the
+same in all legs, bears the couple that is left, since the sum of a_i vanishes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.errors import InputError
+from rps_pin.rps.dynamics.friction import friction_force
+from rps_pin.rps.dynamics.loads import checked_wrench
+from rps_pin.rps.kinematics.legs import RADIAL, LegMotion
+from rps_pin.rps.kinematics.pose import PlatformMotion, checked_motion
+from rps_pin.rps.kinematics.rates import ACROSS
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.robot import RPSRobot
+
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+class JointReactions(NamedTuple):
+    """Forces and wrenches in the joints of samples (...); legs on the axis after the batch."""
+
+    actuator: Array
+    """Force of each actuator, shape (..., 3), N; positive pushes the leg out."""
+    spherical: Array
+    """Force of each leg on the platform in base axes, shape (..., 3 legs, 3), N."""
+    spherical_in_leg: Array
+    """The same in leg axes, shape (..., 3 legs, 3), N."""
+    prismatic: Array
+    """What each cylinder exerts on its rod, at the tip, leg axes, shape (..., 3 legs, 6). The force
+    along x is the actuator's, less the joint's friction."""
+    revolute: Array
+    """What the base exerts on each cylinder, at the revolute joint, leg axes, shape
+    (..., 3 legs, 6)."""
+    leg_axes: Array
+    """From leg axes to base axes, shape (..., 3 legs, 3, 3): columns x, y, z."""
+    length: Array
+    """d, shape (..., 3 legs), m."""
+
+    def bending_moment(self, reach: ArrayLike | None = None) -> Array:
+        """Return the bending moment on each leg at a distance behind its tip, in leg axes.
+
+        What the cylinder exerts on the rod across the leg, about a point of the leg's axis. Of a
+        massless rod it is the bending moment at that section; of one with mass, at a section that
+        has all of the rod on the tip's side.
+
+        Parameters
+        ----------
+        reach
+            Distance of the section behind the tip, of a shape that broadcasts with (..., 3 legs),
+            m. Left out: the leg's length, that is, at the revolute joint.
+
+        Returns
+        -------
+        array
+            Moments about y and z, shape (..., 3 legs, 2), N m: y bends the leg in its own plane, z
+            out of it.
+
+        Raises
+        ------
+        InputError
+            If a distance is negative or not finite.
+        """
+        x = np.asarray(self.length if reach is None else reach, dtype=np.float64)
+        if not (np.isfinite(x) & (x >= 0)).all():
+            raise InputError("reach must be finite distances behind the tip, not negative, in m")
+        force, moment = self.prismatic[..., :3], self.prismatic[..., 3:]
+        # About a point x behind the tip: M + (x, 0, 0) x F.
+        return np.stack(
+            [moment[..., 1] - x * force[..., 2], moment[..., 2] + x * force[..., 1]], -1
+        )
+
+
+def joint_reactions(
+    robot: RPSRobot,
+    pose: ArrayLike,
+    rate: ArrayLike,
+    acceleration: ArrayLike,
+    *,
+    wrench: ArrayLike | None = None,
+) -> JointReactions:
+    """Return what all joints bear: the tip's forces, the wrenches in the legs.
+
+    Parameters
+    ----------
+    robot
+        The 3-RPS, with its payload and friction.
+    pose, rate, acceleration, wrench
+        As for `RPSRobot.actuator_forces`.
+
+    Raises
+    ------
+    InputError, UnreachableError, SingularityError
+        As `RPSRobot.actuator_forces`.
+    """
+    x, dx, ddx = checked_motion(pose, rate, acceleration)
+    actuator = robot.actuator_forces(x, dx, ddx, wrench=wrench)
+    platform, legs = robot.motion(x, dx, ddx)
+    axes = _leg_axes(legs.angle)
+    p = robot.parameters
+    weight = np.einsum("...ji,j->...i", axes, p.gravity)  # gravity in leg axes
+    rod = p.rod_mass * (_point_acceleration(legs, legs.length - p.rod_com, sliding=True) - weight)
+    cylinder = p.leg_mass * (
+        _point_acceleration(legs, np.full_like(legs.length, p.leg_com), sliding=False) - weight
+    )
+    sliding = friction_force(
+        legs.speed, p.prismatic_damping, p.prismatic_friction, p.friction_speed
+    )
+    turning = friction_force(
+        legs.angle_rate, p.revolute_damping, p.revolute_friction, p.friction_speed
+    )
+
+    inertia = p.leg_inertia_about_com + p.rod_inertia
+    moment = inertia * legs.angle_acceleration + turning
+    moment += p.leg_com * cylinder[..., 2] + (legs.length - p.rod_com) * rod[..., 2]
+    tip = np.zeros((*legs.length.shape, 3))
+    tip[..., 0] = actuator - sliding - rod[..., 0]
+    tip[..., 2] = -moment / legs.length
+    load = None if wrench is None else checked_wrench(wrench, x.shape[:-1])
+    force, couple = _platform_wrench(robot, platform, load)
+    arms = p.platform_radius * RADIAL @ np.swapaxes(platform.rotation, -1, -2)
+    known = np.einsum("...ij,...j->...i", axes, tip)
+    across = _across_planes(arms, force - known.sum(-2), couple - np.cross(arms, known).sum(-2))
+    tip[..., 1] = -across  # y is against the joint's axis
+    spherical = known + across[..., None] * ACROSS
+    prismatic = _prismatic(p, legs, tip, rod)
+    revolute = _revolute(p, legs, prismatic, cylinder)
+    return JointReactions(actuator, spherical, tip, prismatic, revolute, axes, legs.length)
+
+
+def _leg_axes(angle: Array) -> Array:
+    """Return s, -a and t of each leg as columns, shape (..., 3 legs, 3, 3)."""
+    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    along = -cosine * RADIAL + sine * _UP
+    upwards = sine * RADIAL + cosine * _UP
+    return np.stack([along, np.broadcast_to(-ACROSS, along.shape), upwards], axis=-1)
+
+
+def _point_acceleration(legs: LegMotion, distance: Array, *, sliding: bool) -> Array:
+    """Return the acceleration of a point of cylinder or rod, in leg axes, (..., 3 legs, 3)."""
+    speed, push = (legs.speed, legs.acceleration) if sliding else (0.0, 0.0)
+    acceleration = np.zeros((*distance.shape, 3))
+    acceleration[..., 0] = push - distance * legs.angle_rate**2
+    acceleration[..., 2] = distance * legs.angle_acceleration + 2 * speed * legs.angle_rate
+    return acceleration
+
+
+def _platform_wrench(
+    robot: RPSRobot, motion: PlatformMotion, wrench: Array | None
+) -> tuple[Array, Array]:
+    """Return what the legs must exert on platform and payload, about its centre, base axes."""
+    p, payload = robot.parameters, robot.payload
+    mass, moment, inertia = p.platform_mass, np.zeros(3), np.array(p.platform_inertia)
+    if payload is not None:
+        mass, moment = mass + payload.mass, payload.first_moment
+        inertia = inertia + payload.inertia_about_platform
+    R, omega, alpha = motion.rotation, motion.angular_velocity, motion.angular_acceleration
+    gamma = motion.acceleration - p.gravity
+    # m gamma + alpha x S + omega x (omega x S);  I alpha + omega x I omega + S x gamma
+    swing = np.cross(alpha, moment) + np.cross(omega, np.cross(omega, moment))
+    local = np.einsum("...ji,...j->...i", R, gamma)
+    turn = alpha @ inertia + np.cross(omega, omega @ inertia) + np.cross(moment, local)
+    force = mass * gamma + np.einsum("...ij,...j->...i", R, swing)
+    couple = np.einsum("...ij,...j->...i", R, turn)
+    if wrench is not None:
+        return force - wrench[..., :3], couple - wrench[..., 3:]
+    return force, couple
+
+
+def _across_planes(arms: Array, force: Array, couple: Array) -> Array:
+    """Return the legs' forces along their joints' axes that make up a wrench, (..., 3 legs)."""
+    across = 2 / 3 * force @ ACROSS.T
+    left = couple - np.cross(arms, across[..., None] * ACROSS).sum(axis=-2)
+    unit = np.cross(arms, ACROSS).sum(axis=-2)  # couple of unit forces in all legs
+    mu = (left * unit).sum(-1) / (unit * unit).sum(-1)
+    total: Array = across + mu[..., None]
+    return total
+
+
+def _prismatic(p: RPSParameters, legs: LegMotion, tip: Array, rod: Array) -> Array:
+    """Return the wrench of cylinder on rod at the tip: the rod's balance."""
+    wrench = np.zeros((*tip.shape[:-1], 6))
+    wrench[..., :3] = tip + rod
+    # About the tip, the rod's centre at (-r, 0, 0); it turns with phi'' about -y.
+    wrench[..., 4] = -p.rod_inertia * legs.angle_acceleration + p.rod_com * rod[..., 2]
+    wrench[..., 5] = -p.rod_com * rod[..., 1]
+    return wrench
+
+
+def _revolute(p: RPSParameters, legs: LegMotion, prismatic: Array, cylinder: Array) -> Array:
+    """Return the wrench of the base on the cylinder at the revolute joint: its balance."""
+    force, d = prismatic[..., :3], legs.length
+    wrench = prismatic.copy()
+    wrench[..., :3] += cylinder
+    wrench[..., 4] -= d * force[..., 2] + p.leg_com * cylinder[..., 2]
+    wrench[..., 4] -= p.leg_inertia_about_com * legs.angle_acceleration
+    wrench[..., 5] += d * force[..., 1] + p.leg_com * cylinder[..., 1]
+    return wrench

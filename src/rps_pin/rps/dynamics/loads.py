@@ -1,0 +1,125 @@
+"""What the platform carries: a payload fixed to it, and wrenches from outside.
+
+A payload is a rigid body that moves with the platform: `RPSRobot.with_payload` returns the robot
+that carries it, and everything which that robot computes includes it. A wrench is what something
+else (a tool, the wind, a person) exerts on the platform: (force, moment), N and N m, in base axes,
+the moment about the platform's centre. It is an argument of the dynamics, ``wrench=``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.errors import InputError, ParameterError
+from rps_pin.rps.checks import finite_entries
+
+#: Share of the largest principal moment by which the triangle inequality may fail: rounding.
+_ROUNDING = 1e-9
+
+_LIKE_NONE = np.zeros((3, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class Payload:
+    """A rigid body fixed to the platform.
+
+    Parameters
+    ----------
+    mass
+        kg; positive.
+    centre
+        Its centre of mass in platform axes, from the platform's centre, shape (3,), m.
+    inertia
+        About its own centre of mass, in platform axes, shape (3, 3), kg m^2; zero (a point) if left
+        out.
+
+    Raises
+    ------
+    ParameterError
+        If the mass is not positive, or no rigid body has the inertia.
+    InputError
+        If a number is not finite, or a shape is wrong.
+    """
+
+    mass: float
+    centre: Array | Sequence[float] = (0.0, 0.0, 0.0)
+    inertia: Array | Sequence[Sequence[float]] | None = None
+
+    def __post_init__(self) -> None:
+        mass = float(finite_entries(self.mass, (), "payload mass"))
+        if not mass > 0:
+            raise ParameterError("payload mass", mass, "must be positive, in kg")
+        object.__setattr__(self, "mass", mass)
+        self._set("centre", self.centre, (3,))
+        self._set("inertia", _LIKE_NONE if self.inertia is None else self.inertia, (3, 3))
+        _check_inertia(np.asarray(self.inertia))
+
+    def _set(self, name: str, value: ArrayLike, shape: tuple[int, ...]) -> None:
+        array = finite_entries(value, shape, f"payload {name}")
+        if array.shape != shape:
+            raise InputError(f"payload {name} has shape {array.shape}; it must be {shape}")
+        array.setflags(write=False)
+        object.__setattr__(self, name, array)
+
+    @property
+    def first_moment(self) -> Array:
+        """Mass times centre, shape (3,), kg m, platform axes."""
+        moment: Array = self.mass * np.asarray(self.centre, dtype=np.float64)
+        return moment
+
+    @property
+    def inertia_about_platform(self) -> Array:
+        """Inertia about the platform's centre, shape (3, 3), kg m^2, platform axes: Steiner."""
+        c = np.asarray(self.centre, dtype=np.float64)
+        own = np.asarray(self.inertia, dtype=np.float64)
+        inertia: Array = own + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+        return inertia
+
+    def as_inertia(self) -> pin.Inertia:
+        """Return it as Pinocchio has it, in the platform's frame."""
+        return pin.Inertia(self.mass, np.asarray(self.centre), np.asarray(self.inertia))
+
+
+def checked_wrench(value: ArrayLike, batch: tuple[int, ...]) -> Array:
+    """Return a wrench on the platform for each sample of a batch, shape (*batch, 6).
+
+    Parameters
+    ----------
+    value
+        (force, moment), constant (6,) or of a shape (..., 6) that broadcasts to the batch; N, N m.
+    batch
+        The batch's shape.
+
+    Raises
+    ------
+    InputError
+        If it is not finite, or its shape does not fit.
+    """
+    wrench = finite_entries(value, (6,), "wrench")
+    try:
+        return np.broadcast_to(wrench, (*batch, 6))
+    except ValueError:
+        raise InputError(
+            f"wrench has shape {wrench.shape}; it must be (6,) or go with {(*batch, 6)}: force and "
+            "moment of each sample"
+        ) from None
+
+
+def _check_inertia(inertia: Array) -> None:
+    scale = float(np.abs(inertia).max())
+    if np.abs(inertia - inertia.T).max() > _ROUNDING * scale:
+        raise ParameterError("payload inertia", inertia, "must be symmetric")
+    smallest, middle, largest = np.linalg.eigvalsh(inertia)
+    if smallest < -_ROUNDING * scale or largest - smallest - middle > _ROUNDING * scale:
+        raise ParameterError(
+            "payload inertia",
+            inertia,
+            f"no rigid body has it: its principal moments are {smallest:.6g}, {middle:.6g} and "
+            f"{largest:.6g}; none may be negative or exceed the sum of the others",
+        )

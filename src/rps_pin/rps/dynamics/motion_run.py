@@ -1,0 +1,258 @@
+"""A whole motion of a 3-RPS: its inverse dynamics sample by sample, and what comes of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.integrate import trapezoid
+
+from rps_pin.arrays import Array
+from rps_pin.errors import InputError, SingularityError
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.singularity.path_refusal import require_clear
+from rps_pin.trajectories.path import Trajectory
+
+Progress = Callable[[Iterable[int]], Iterable[int]]
+
+_MOST_SAMPLES = 10_000_000
+
+
+@dataclass(frozen=True)
+class MotionRun:
+    """Everything computed along a motion; n samples, SI units, legs in the paper's order."""
+
+    time: Array
+    """Shape (n,), s."""
+    pose: Array
+    """(z, tilt_x, tilt_y), shape (n, 3), m and rad."""
+    rate: Array
+    """Its first time derivative, shape (n, 3)."""
+    acceleration: Array
+    """Its second time derivative, shape (n, 3)."""
+    position: Array
+    """Of the platform's centre in base axes, shape (n, 3), m."""
+    configuration: Array
+    """Pinocchio configurations, shape (n, nq)."""
+    length: Array
+    """Of the legs, shape (n, 3), m."""
+    speed: Array
+    """Of the actuators, shape (n, 3), m/s; positive is out."""
+    leg_acceleration: Array
+    """Of the actuators, shape (n, 3), m/s^2."""
+    force: Array
+    """Of the actuators, shape (n, 3), N; positive pushes the leg out."""
+    reaction: Array
+    """Of each leg on the platform at its spherical joint, base axes, shape (n, 3 legs, 3), N."""
+    loop_gap: Array
+    """Largest gap of the closures, shape (n,), m."""
+    residual: Array
+    """KKT residual over the largest generalised force, shape (n,)."""
+    singularity_distance: Array
+    """1 / condition number of the passive Jacobian, shape (n,): 0 at a singularity, 1 at best."""
+
+    @property
+    def power(self) -> Array:
+        """Mechanical power of the actuators, F d', shape (n, 3), W."""
+        return self.force * self.speed
+
+
+@dataclass(frozen=True)
+class ActuatorSummary:
+    """What one actuator has to do in a motion."""
+
+    actuator: int
+    """1 to 3."""
+    force_min: float
+    """N."""
+    force_max: float
+    """N."""
+    force_rms: float
+    """Root of the time average of the squared force, N."""
+    length_min: float
+    """m."""
+    length_max: float
+    """m."""
+    speed_peak: float
+    """Largest magnitude, m/s."""
+    power_peak: float
+    """Largest magnitude, W."""
+    power_mean: float
+    """Time average of the magnitude, W."""
+
+
+@dataclass(frozen=True)
+class MotionSummary:
+    """A motion in a few numbers."""
+
+    duration: float
+    """s."""
+    samples: int
+    actuators: tuple[ActuatorSummary, ...]
+    loop_gap_max: float
+    """m."""
+    residual_max: float
+    """Largest KKT residual, relative to the largest generalised force of its sample."""
+    singularity_distance_min: float
+    """Smallest 1 / condition number; 0 would be a singularity, 1 is the best there is."""
+    singularity_time: float
+    """When, s."""
+    singularity_pose: tuple[float, float, float]
+    """Where: (z, tilt_x, tilt_y), m and rad."""
+    exceeded: tuple[str, ...]
+    """Actuator limits that the motion asks too much of, a sentence each."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers, strings, lists and dictionaries, as JSON has them."""
+        return asdict(self)
+
+
+def run_motion(
+    robot: RPSRobot,
+    trajectory: Trajectory,
+    sample_rate: float = 1000.0,
+    *,
+    wrench: ArrayLike | None = None,
+    progress: Progress = iter,
+) -> MotionRun:
+    """Compute the inverse dynamics of a robot along a trajectory, through its constraint models.
+
+    Parameters
+    ----------
+    robot
+        The 3-RPS.
+    trajectory
+        Poses and their exact derivatives over time.
+    sample_rate
+        Samples a second, Hz; the end of the trajectory is always the last sample.
+    wrench
+        What something outside exerts on the platform all along: force (N) in base axes and moment
+        (N m) about the platform's centre, shape (6,).
+    progress
+        Wraps the loop over the samples, for a progress bar.
+
+    Raises
+    ------
+    InputError
+        If the sample rate is not a positive number, or gives over ten million samples.
+    UnreachableError
+        If the trajectory leaves the robot's limits; says when, before any force is computed.
+    SingularityError
+        If it meets a singularity; likewise.
+    """
+    time = sample_times(trajectory.duration, sample_rate)
+    require_clear(robot, trajectory)
+    pose, rate, acceleration = trajectory.sample(time)
+    q, v, a = robot.state(pose, rate, acceleration)
+    platform, legs = robot.motion(pose, rate, acceleration)
+    n = len(time)
+    force, reaction = np.empty((n, 3)), np.empty((n, 3, 3))
+    gap, residual, distance = np.empty(n), np.empty(n), np.empty(n)
+    side = 0
+    for i in progress(range(n)):
+        try:
+            result = robot.inverse_dynamics(q[i], v[i], a[i], wrench=wrench)
+        except SingularityError as error:
+            raise SingularityError(
+                f"at t = {time[i]:.6g} s the motion meets a singularity: {error}",
+                error.condition,
+                error.limit,
+            ) from None
+        before, side = side, result.orientation
+        if before * side < 0:
+            raise SingularityError(
+                f"between t = {time[i - 1]:.6g} s and {time[i]:.6g} s the motion crosses a "
+                "singularity: no actuator forces carry the robot through it",
+                math.inf,
+                robot.mechanism.max_condition,
+            )
+        force[i] = result.tau
+        reaction[i] = result.constraint_forces.reshape(3, 3)
+        largest = max(np.abs(result.tau).max(), np.abs(result.constraint_forces).max())
+        residual[i] = result.residual / largest if largest > 0 else result.residual
+        distance[i] = 1 / result.condition
+        gap[i] = robot.mechanism.loop_gap(q[i])
+    return MotionRun(
+        time=time,
+        pose=pose,
+        rate=rate,
+        acceleration=acceleration,
+        position=platform.position,
+        configuration=q,
+        length=legs.length,
+        speed=legs.speed,
+        leg_acceleration=legs.acceleration,
+        force=force,
+        reaction=reaction,
+        loop_gap=gap,
+        residual=residual,
+        singularity_distance=distance,
+    )
+
+
+def summarise(run: MotionRun, robot: RPSRobot) -> MotionSummary:
+    """Return a motion in a few numbers, and the limits of the robot's actuators that it exceeds."""
+    nearest = int(np.argmin(run.singularity_distance))
+    z, tilt_x, tilt_y = (float(x) for x in run.pose[nearest])
+    return MotionSummary(
+        duration=float(run.time[-1]),
+        samples=len(run.time),
+        actuators=tuple(_actuator_summary(run, leg) for leg in range(3)),
+        loop_gap_max=float(run.loop_gap.max()),
+        residual_max=float(run.residual.max()),
+        singularity_distance_min=float(run.singularity_distance[nearest]),
+        singularity_time=float(run.time[nearest]),
+        singularity_pose=(z, tilt_x, tilt_y),
+        exceeded=tuple(_exceeded(run, robot)),
+    )
+
+
+def sample_times(duration: float, sample_rate: float) -> Array:
+    """Return times from 0 at a rate (Hz), and the duration itself as the last one, s."""
+    if not (math.isfinite(sample_rate) and sample_rate > 0):
+        raise InputError(f"sample rate = {sample_rate}: it must be a positive number of Hz")
+    if duration * sample_rate > _MOST_SAMPLES:
+        raise InputError(
+            f"{sample_rate:g} Hz for {duration:g} s would be {duration * sample_rate:.3g} samples; "
+            f"at most {_MOST_SAMPLES} are possible"
+        )
+    count = math.ceil(duration * sample_rate - 1e-9)
+    return np.append(np.arange(count) / sample_rate, duration)
+
+
+def _actuator_summary(run: MotionRun, leg: int) -> ActuatorSummary:
+    force, power = run.force[:, leg], run.power[:, leg]
+    return ActuatorSummary(
+        actuator=leg + 1,
+        force_min=float(force.min()),
+        force_max=float(force.max()),
+        force_rms=math.sqrt(_time_average(force**2, run.time)),
+        length_min=float(run.length[:, leg].min()),
+        length_max=float(run.length[:, leg].max()),
+        speed_peak=float(np.abs(run.speed[:, leg]).max()),
+        power_peak=float(np.abs(power).max()),
+        power_mean=_time_average(np.abs(power), run.time),
+    )
+
+
+def _time_average(values: Array, time: Array) -> float:
+    return float(trapezoid(values, time) / (time[-1] - time[0]))
+
+
+def _exceeded(run: MotionRun, robot: RPSRobot) -> Iterable[str]:
+    p = robot.parameters
+    for what, unit, values, limit in (
+        ("force", "N", run.force, p.actuator_force_limit),
+        ("speed", "m/s", run.speed, p.actuator_speed_limit),
+    ):
+        sample, leg = np.unravel_index(int(np.abs(values).argmax()), values.shape)
+        peak = float(abs(values[sample, leg]))
+        if peak > limit:
+            yield (
+                f"actuator {leg + 1} would need a {what} of {peak:.4g} {unit} at "
+                f"t = {run.time[sample]:.4g} s; its limit is {limit:.4g} {unit}"
+            )

@@ -1,0 +1,251 @@
+"""Actuator sizing: what a motion asks of the actuators, from a trajectory or from samples.
+
+Between samples, force and power are taken as linear in time; averages, energies and shares of time
+are exact for that. Peaks are those of the samples. The sheet itself is in `sizing_sheet`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array, Bools
+from rps_pin.errors import InputError, SingularityError, UnreachableError
+from rps_pin.rps.checks import finite_entries
+from rps_pin.rps.dynamics.motion_run import sample_times
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, ActuatorSizing, Margin, SizingSheet
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.singularity.measures import singularity_measures
+from rps_pin.rps.singularity.path_refusal import require_clear
+from rps_pin.trajectories.path import Trajectory
+
+
+def size_trajectory(
+    robot: RPSRobot,
+    trajectory: Trajectory,
+    sample_rate: float = 1000.0,
+    *,
+    limits: ActuatorLimits | None = None,
+    wrench: ArrayLike | None = None,
+    threshold: float = 0.5,
+) -> SizingSheet:
+    """Return what a trajectory asks of a robot's actuators.
+
+    Parameters
+    ----------
+    robot
+        The 3-RPS, with its payload and friction.
+    trajectory
+        Anything with ``duration`` and ``sample(t)``.
+    sample_rate
+        Hz.
+    limits
+        What the actuators can do; what the robot's parameters say if left out.
+    wrench
+        On the platform, (6,) or (n, 6); see `RPSRobot.actuator_forces`.
+    threshold
+        Share of the peak force that counts for the duty.
+
+    Raises
+    ------
+    InputError
+        If a number is not usable.
+    UnreachableError, SingularityError
+        If the motion is out of reach, or meets a singularity; says when.
+    """
+    time = sample_times(trajectory.duration, sample_rate)
+    require_clear(robot, trajectory)
+    motion = trajectory.sample(time)
+    return size_motion(robot, time, *motion, limits=limits, wrench=wrench, threshold=threshold)
+
+
+def size_motion(
+    robot: RPSRobot,
+    time: ArrayLike,
+    pose: ArrayLike,
+    rate: ArrayLike,
+    acceleration: ArrayLike,
+    *,
+    limits: ActuatorLimits | None = None,
+    wrench: ArrayLike | None = None,
+    threshold: float = 0.5,
+) -> SizingSheet:
+    """Return what a sampled motion asks of a robot's actuators.
+
+    Parameters
+    ----------
+    robot, limits, wrench, threshold
+        As for `size_trajectory`.
+    time
+        Increasing, shape (n,), s.
+    pose, rate, acceleration
+        Shape (n, 3) each.
+
+    Raises
+    ------
+    InputError, UnreachableError, SingularityError
+        As `size_trajectory`.
+    """
+    times = _checked_time(time)
+    x = finite_entries(pose, (3,), "pose")
+    if x.shape != (len(times), 3):
+        raise InputError(f"pose has shape {x.shape}; with these times it must be {len(times), 3}")
+    force = robot.actuator_forces(x, rate, acceleration, wrench=wrench, errors="mask")
+    _refuse_bad_samples(robot, times, x, np.ma.getmaskarray(force)[:, 0])
+    legs = robot.motion(x, rate, acceleration)[1]
+    return size_actuators(
+        times,
+        np.asarray(force),
+        legs.speed,
+        legs.length,
+        ActuatorLimits.of(robot.parameters) if limits is None else limits,
+        threshold,
+    )
+
+
+def size_actuators(
+    time: ArrayLike,
+    force: ArrayLike,
+    speed: ArrayLike,
+    length: ArrayLike,
+    limits: ActuatorLimits,
+    threshold: float = 0.5,
+) -> SizingSheet:
+    """Return the sheet of known forces (N), speeds (m/s) and lengths (m), shape (n, 3) each.
+
+    Raises
+    ------
+    InputError
+        If times do not increase, shapes do not fit, or the threshold is not between 0 and 1.
+    """
+    times = _checked_time(time)
+    if not 0 < threshold < 1:
+        raise InputError(f"threshold = {threshold}: it must be between 0 and 1")
+    arrays = []
+    for name, value in (("force", force), ("speed", speed), ("length", length)):
+        array = finite_entries(value, (3,), name)
+        if array.shape != (len(times), 3):
+            raise InputError(f"{name} has shape {array.shape}; it must be {len(times), 3}")
+        arrays.append(array)
+    actuators = tuple(
+        _sizing(leg, times, tuple(array[:, leg] for array in arrays), limits, threshold)
+        for leg in range(3)
+    )
+    return SizingSheet(actuators, limits, threshold, times, arrays[0], arrays[1])
+
+
+# Inner workings -----------------------------------------------------------------------------------
+
+
+def _sizing(
+    leg: int,
+    time: Array,
+    series: tuple[Array, ...],
+    limits: ActuatorLimits,
+    threshold: float,
+) -> ActuatorSizing:
+    """Return one actuator's demands from its force, speed and length, shape (n,) each."""
+    force, speed, length = series
+    duration = float(time[-1] - time[0])
+    power = force * speed
+    driven, regenerated = positive_area(power, time), positive_area(-power, time)
+    peak = int(np.abs(force).argmax())
+    peaks = [float(np.abs(values).max()) for values in (force, speed, power)]
+    shortest, longest = float(length.min()), float(length.max())
+    margins = [
+        Margin(name, value, limit, limit - value, unit)
+        for name, value, limit, unit in (
+            ("force", peaks[0], limits.force, "N"),
+            ("speed", peaks[1], limits.speed, "m/s"),
+            ("power", peaks[2], limits.power, "W"),
+        )
+    ]
+    margins.append(
+        Margin("shortest leg", shortest, limits.length[0], shortest - limits.length[0], "m")
+    )
+    margins.append(
+        Margin("longest leg", longest, limits.length[1], limits.length[1] - longest, "m")
+    )
+    # The square of a linear function has the mean (a^2 + a b + b^2) / 3.
+    a, b = force[:-1], force[1:]
+    square = float((np.diff(time) * (a * a + a * b + b * b)).sum() / 3 / duration)
+    return ActuatorSizing(
+        actuator=leg + 1,
+        force_peak=peaks[0],
+        force_peak_time=float(time[peak]),
+        force_min=float(force.min()),
+        force_max=float(force.max()),
+        force_rms=math.sqrt(square),
+        speed_peak=peaks[1],
+        power_peak=peaks[2],
+        power_mean=(driven + regenerated) / duration,
+        energy_driven=driven,
+        energy_regenerated=regenerated,
+        duty=time_above(np.abs(force), threshold * peaks[0], time) / duration,
+        length_min=shortest,
+        length_max=longest,
+        margins=tuple(margins),
+    )
+
+
+def positive_area(values: Array, time: Array) -> float:
+    """Return the integral of the positive part of a function that is linear between samples."""
+    a, b = values[:-1], values[1:]
+    apart = np.abs(a) + np.abs(b)
+    mixed = a * b < 0
+    top = np.maximum(a, b)
+    # Where the sign changes: a triangle of height top over top / apart of the interval.
+    triangle = top * top / np.where(mixed, 2 * apart, 1.0)
+    both = (np.maximum(a, 0.0) + np.maximum(b, 0.0)) / 2
+    return float((np.diff(time) * np.where(mixed, triangle, both)).sum())
+
+
+def time_above(values: Array, level: float, time: Array) -> float:
+    """Return how long a function that is linear between samples is above a level, s."""
+    a, b = values[:-1] - level, values[1:] - level
+    mixed = a * b < 0
+    share = np.maximum(a, b) / np.where(mixed, np.abs(a) + np.abs(b), 1.0)
+    return float((np.diff(time) * np.where(mixed, share, (a + b > 0))).sum())
+
+
+def _checked_time(time: ArrayLike) -> Array:
+    times = finite_entries(time, (), "time")
+    if times.ndim != 1 or len(times) < 2:
+        raise InputError(f"time has shape {times.shape}; it must be (n,), with n of 2 or more")
+    if not (np.diff(times) > 0).all():
+        first = int(np.argmin(np.diff(times) > 0))
+        raise InputError(
+            f"times must increase: {times[first]:.9g} s, then {times[first + 1]:.9g} s"
+        )
+    return times
+
+
+def _refuse_bad_samples(robot: RPSRobot, time: Array, pose: Array, refused: Bools) -> None:
+    """Refuse a motion with a refused sample, or with a singularity between two samples."""
+    if refused.any():
+        first = int(np.argmax(refused))
+        still = np.zeros(3)
+        try:
+            robot.actuator_forces(pose[first], still, still)
+        except UnreachableError as error:
+            raise UnreachableError(
+                f"at t = {time[first]:.6g} s: {error}", error.violations
+            ) from None
+        except SingularityError as error:
+            raise SingularityError(
+                f"at t = {time[first]:.6g} s the motion meets a singularity: {error}",
+                error.condition,
+                error.limit,
+            ) from None
+    sign = np.sign(singularity_measures(robot.parameters, pose).determinant)
+    crossing = sign[:-1] * sign[1:] < 0
+    if crossing.any():
+        i = int(np.argmax(crossing))
+        raise SingularityError(
+            f"between t = {time[i]:.6g} s and {time[i + 1]:.6g} s the motion crosses a "
+            "singularity: no actuator forces carry the robot through it",
+            math.inf,
+            robot.mechanism.max_condition,
+        )

@@ -1,0 +1,207 @@
+"""The sizing sheet: what a motion asks of the actuators beside what they can do, as data and text.
+
+Work is counted from the actuator's side: force times speed is positive where the actuator drives
+its leg, negative where the leg drives the actuator (regenerated).
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from rich.console import Console
+from rich.table import Table
+
+from rps_pin.arrays import Array
+from rps_pin.errors import InputError
+from rps_pin.rps.parameters import RPSParameters
+
+
+@dataclass(frozen=True)
+class ActuatorLimits:
+    """What one actuator can do; infinity where there is no limit."""
+
+    force: float = math.inf
+    """Push or pull, N."""
+    speed: float = math.inf
+    """Out or in, m/s."""
+    power: float = math.inf
+    """Given out or taken in, W."""
+    length: tuple[float, float] = (0.0, math.inf)
+    """Shortest and longest leg, m."""
+
+    def __post_init__(self) -> None:
+        for name in ("force", "speed", "power"):
+            value = getattr(self, name)
+            if not value > 0:
+                raise InputError(f"{name} limit = {value}: it must be positive")
+        low, high = self.length
+        if not 0 <= low < high:
+            raise InputError(f"length limits = {self.length}: they must be 0 <= shortest < longest")
+
+    @classmethod
+    def of(cls, parameters: RPSParameters, *, power: float = math.inf) -> ActuatorLimits:
+        """Return the limits in a robot's parameters; they have none of power."""
+        return cls(
+            parameters.actuator_force_limit,
+            parameters.actuator_speed_limit,
+            power,
+            parameters.leg_length_limits,
+        )
+
+
+class Margin(NamedTuple):
+    """One quantity against its limit."""
+
+    quantity: str
+    value: float
+    """What the motion asks, in `unit`."""
+    limit: float
+    """In `unit`; infinite if there is none."""
+    margin: float
+    """How far the limit is, in `unit`; negative: exceeded."""
+    unit: str
+
+    @property
+    def kept(self) -> bool:
+        """Whether the limit is kept."""
+        return self.margin >= 0
+
+
+@dataclass(frozen=True)
+class ActuatorSizing:
+    """What one actuator has to do. Peaks are magnitudes."""
+
+    actuator: int
+    """1 to 3."""
+    force_peak: float
+    """N."""
+    force_peak_time: float
+    """When, s."""
+    force_min: float
+    """N; negative pulls."""
+    force_max: float
+    """N."""
+    force_rms: float
+    """Root of the time average of the squared force, N: what heats a motor."""
+    speed_peak: float
+    """m/s."""
+    power_peak: float
+    """W."""
+    power_mean: float
+    """Time average of the magnitude, W."""
+    energy_driven: float
+    """Positive work: what the actuator puts in, J."""
+    energy_regenerated: float
+    """What flows back into it, J; positive."""
+    duty: float
+    """Share of the time that the force is above `SizingSheet.threshold` times its peak."""
+    length_min: float
+    """m."""
+    length_max: float
+    """m."""
+    margins: tuple[Margin, ...]
+    """Force, speed, power, shortest and longest leg."""
+
+    @property
+    def stroke(self) -> float:
+        """Length range of the motion, m."""
+        return self.length_max - self.length_min
+
+
+@dataclass(frozen=True)
+class SizingSheet:
+    """A motion's demands on the three actuators; n samples."""
+
+    actuators: tuple[ActuatorSizing, ...]
+    limits: ActuatorLimits
+    threshold: float
+    """Share of the peak force that counts for the duty."""
+    time: Array
+    """Shape (n,), s."""
+    force: Array
+    """Shape (n, 3), N."""
+    speed: Array
+    """Shape (n, 3), m/s."""
+
+    @property
+    def kept(self) -> bool:
+        """Whether every limit is kept."""
+        return all(margin.kept for actuator in self.actuators for margin in actuator.margins)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers, strings, lists and dictionaries, as JSON has them.
+
+        Without the samples; a limit that there is not, and its margin, are None.
+        """
+        return {
+            "duration": float(self.time[-1] - self.time[0]),
+            "samples": len(self.time),
+            "threshold": self.threshold,
+            "kept": self.kept,
+            "actuators": [_plain(actuator) for actuator in self.actuators],
+        }
+
+    def table(self) -> Table:
+        """Return the sheet as a table for a terminal; limits that are broken are marked."""
+        return _table(self)
+
+    def text(self, width: int = 100) -> str:
+        """Return the table as plain text."""
+        console = Console(file=io.StringIO(), width=width, color_system=None)
+        console.print(self.table())
+        written = console.file
+        assert isinstance(written, io.StringIO)
+        return written.getvalue()
+
+    def __str__(self) -> str:
+        return self.text()
+
+
+def _plain(actuator: ActuatorSizing) -> dict[str, Any]:
+    data = {name: value for name, value in vars(actuator).items() if name != "margins"}
+    data["stroke"] = actuator.stroke
+    data["margins"] = [
+        {
+            "quantity": margin.quantity,
+            "value": margin.value,
+            "limit": margin.limit if math.isfinite(margin.limit) else None,
+            "margin": margin.margin if math.isfinite(margin.margin) else None,
+            "unit": margin.unit,
+            "kept": margin.kept,
+        }
+        for margin in actuator.margins
+    ]
+    return data
+
+
+def _table(sheet: SizingSheet) -> Table:
+    table = Table(title="Actuator sizing")
+    table.add_column("")
+    for actuator in sheet.actuators:
+        table.add_column(f"actuator {actuator.actuator}", justify="right")
+    rows = [
+        ("peak force (N)", "force_peak"),
+        ("RMS force (N)", "force_rms"),
+        ("peak speed (m/s)", "speed_peak"),
+        ("peak power (W)", "power_peak"),
+        ("mean power (W)", "power_mean"),
+        ("energy driven (J)", "energy_driven"),
+        ("energy regenerated (J)", "energy_regenerated"),
+        ("stroke (m)", "stroke"),
+    ]
+    for label, name in rows:
+        table.add_row(label, *(f"{getattr(each, name):.4g}" for each in sheet.actuators))
+    label = f"time above {sheet.threshold:.0%} of peak force"
+    table.add_row(label, *(f"{each.duty:.1%}" for each in sheet.actuators), end_section=True)
+    for index, margin in enumerate(sheet.actuators[0].margins):
+        if math.isfinite(margin.margin):
+            cells = [_margin_cell(each.margins[index]) for each in sheet.actuators]
+            table.add_row(f"{margin.quantity}: margin to {margin.limit:.4g} {margin.unit}", *cells)
+    return table
+
+
+def _margin_cell(margin: Margin) -> str:
+    return f"{margin.margin:.4g}" if margin.kept else f"[bold red]{margin.margin:.4g} BROKEN[/]"

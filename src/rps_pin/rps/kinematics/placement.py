@@ -1,0 +1,142 @@
+"""Placements of the platform: whether the legs can hold them (Eq. 3 and 4), and their pose."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from rps_pin.arrays import Array
+from rps_pin.errors import ClosureError, InputError
+from rps_pin.rps.checks import checked_radius, finite_entries, positive_length
+from rps_pin.rps.kinematics import pose as poses
+from rps_pin.rps.kinematics.legs import tips
+
+#: Largest entry of R'R - I in what is still taken for a rotation.
+_ORTHONORMAL = 1e-6
+
+
+def constraint_residuals(position: ArrayLike, rotation: ArrayLike, platform_radius: float) -> Array:
+    """Return by how much a placement breaks the constraints of Eq. 4, shape (..., 3), m.
+
+    They are h (u_y - v_x), p_y + h u_y and p_x - h/2 (u_x - v_y). All vanish exactly if each
+    spherical joint lies in its leg's plane, Eq. 3: then legs of some length and angle reach it.
+
+    Parameters
+    ----------
+    position
+        Of the platform's centre in base axes, shape (..., 3), m.
+    rotation
+        From platform to base axes, shape (..., 3, 3).
+    platform_radius
+        The paper's h, m.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong shape or is not finite, or the rotation is none.
+    """
+    return _residuals(*_checked_placement(position, rotation), checked_radius(platform_radius))
+
+
+def pose_from_placement(
+    position: ArrayLike,
+    rotation: ArrayLike,
+    platform_radius: float,
+    *,
+    tolerance: float | None = None,
+) -> Array:
+    """Return the pose (..., 3) of a placement of the platform.
+
+    The pose is the nearest in rotation; its tilt is within pi. A placement is refused if one of
+    its spherical joints is further than the tolerance from the pose's. A half turn has two poses,
+    w and -w; either may be returned.
+
+    Parameters
+    ----------
+    position
+        Of the platform's centre in base axes, shape (..., 3), m.
+    rotation
+        From platform to base axes, shape (..., 3, 3).
+    platform_radius
+        The paper's h, m.
+    tolerance
+        In m; 1e-9 h if left out.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong shape or is not finite, the rotation is none, or the placement
+        belongs to the robot's other operation mode: half turns about axes outside the base plane.
+    ClosureError
+        If the placement breaks the constraints of Eq. 4.
+    """
+    centre, turn = _checked_placement(position, rotation)
+    h = checked_radius(platform_radius)
+    allowed = positive_length(1e-9 * h if tolerance is None else tolerance, "tolerance")
+    x, y, torsion, w = _quaternion(turn)
+    # The nearest rotation about an axis in the base plane has (x, y, w) alone, normalised.
+    sine = np.hypot(x, y)
+    size = np.where(sine == 0, 2.0, 2 * np.arctan2(sine, w) / np.where(sine == 0, 1.0, sine))
+    pose = np.stack([centre[..., 2], x * size, y * size], axis=-1)
+
+    apart = tips(centre, turn, h) - tips(poses.position(pose, h), poses.rotation(pose), h)
+    gap = np.linalg.norm(apart, axis=-1).max(axis=-1)
+    if (gap > allowed).any():
+        first = tuple(int(i) for i in np.argwhere(gap > allowed)[0])
+        where = f" (entry {first} of {gap.size})" if first else ""
+        residuals = _residuals(centre[first], turn[first], h)
+        if np.abs(residuals).max() <= allowed:
+            raise InputError(
+                f"the placement{where} has no pose: it is a half turn about an axis "
+                f"{np.arcsin(min(1.0, abs(float(torsion[first])))):.6g} rad out of the base plane, "
+                f"the robot's other operation mode; a joint is {gap[first]:.3g} m from the nearest "
+                f"pose's, more than {allowed:.3g} m"
+            )
+        raise ClosureError(
+            f"the placement{where} breaks the constraints of Eq. 4: h (u_y - v_x), p_y + h u_y and "
+            f"p_x - h/2 (u_x - v_y) are {', '.join(f'{r:.3g}' for r in residuals)} m; a joint is "
+            f"{gap[first]:.3g} m from the nearest pose's, more than {allowed:.3g} m",
+            float(gap[first]),
+        )
+    return pose
+
+
+def _residuals(position: Array, rotation: Array, h: float) -> Array:
+    p_x, p_y, _ = np.moveaxis(position, -1, 0)
+    u_x, u_y = rotation[..., 0, 0], rotation[..., 1, 0]
+    v_x, v_y = rotation[..., 0, 1], rotation[..., 1, 1]
+    # Eq. 4: u_y = v_x, p_y = -h u_y, p_x = h/2 (u_x - v_y)
+    return np.stack([h * (u_y - v_x), p_y + h * u_y, p_x - h / 2 * (u_x - v_y)], axis=-1)
+
+
+def _quaternion(rotation: Array) -> Array:
+    """Return the unit quaternion (x, y, z, w) with w >= 0, components first: shape (4, ...)."""
+    batch = rotation.shape[:-2]
+    if 0 in batch:
+        return np.zeros((4, *batch))
+    quaternion = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_quat()
+    quaternion *= np.where(quaternion[:, 3:] < 0, -1.0, 1.0)
+    components: Array = np.moveaxis(quaternion.reshape(*batch, 4), -1, 0)
+    return components
+
+
+def _checked_placement(position: ArrayLike, rotation: ArrayLike) -> tuple[Array, Array]:
+    """Return positions (..., 3) and rotations (..., 3, 3) of one batch shape."""
+    p, R = finite_entries(position, (3,), "position"), finite_entries(rotation, (3, 3), "rotation")
+    try:
+        batch = np.broadcast_shapes(p.shape[:-1], R.shape[:-2])
+    except ValueError:
+        raise InputError(
+            f"position and rotation have shapes {p.shape} and {R.shape}, which do not go together"
+        ) from None
+    error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2), initial=0.0)
+    wrong = (error > _ORTHONORMAL) | (np.linalg.det(R) < 0)
+    if wrong.any():
+        first = tuple(int(i) for i in np.argwhere(wrong)[0])
+        raise InputError(
+            f"rotation{f' {first}' if first else ''} is none: R'R differs from I by "
+            f"{error[first]:.3g} (at most {_ORTHONORMAL}), det(R) = {np.linalg.det(R[first]):.6g} "
+            "(must be 1)"
+        )
+    return np.broadcast_to(p, (*batch, 3)), np.broadcast_to(R, (*batch, 3, 3))

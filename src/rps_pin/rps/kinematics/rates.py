@@ -1,0 +1,502 @@
+"""Rates of the 3-RPS in closed form: legs from poses, poses from legs, and the platform's twist.
+
+Leg i sees only two numbers of the tilt w: its components along and across the leg's plane,
+
+    e = w . e_i,    t = w . t_i    (e_i the radial direction, t_i = z x e_i the joint's axis).
+
+With A and B of `rps_pin.rps.kinematics.pose` (functions of s = e^2 + t^2), Eq. 1 and 4 put its tip
+at
+
+    radial coordinate  rho_i = h (1 + B (e^2 - 3 t^2) / 2),    height  z_i = z - h A t,
+
+always in the leg's own plane (Eq. 3). Everything here is a derivative of these two. With Eq. 7,
+g - rho = d cos(phi) and z_i = d sin(phi), so that
+
+    d'   = K pose',    K = -cos(phi) d(rho)/d(pose) + sin(phi) d(z_i)/d(pose),
+    phi' = N pose',    N = (sin(phi) d(rho)/d(pose) + cos(phi) d(z_i)/d(pose)) / d.
+
+Rates are those of poses ``(z, tilt_x, tilt_y)``: m/s, rad/s, rad/s. Legs are counted 1 to 3 in
+messages, 0 to 2 in arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array, Bools
+from rps_pin.closed_loop.dynamics.kinematics import MAX_CONDITION
+from rps_pin.errors import InputError, SingularityError, UnreachableError
+from rps_pin.rps.kinematics.legs import RADIAL
+from rps_pin.rps.kinematics.pose import (
+    checked_motion,
+    checked_pose,
+    exp_coefficients,
+    exp_slopes,
+    platform_motion,
+)
+from rps_pin.rps.parameters import RPSParameters
+
+#: t_i, shape (3 legs, 3): the axes of the revolute joints, z x e_i.
+ACROSS = np.stack([-RADIAL[:, 1], RADIAL[:, 0], np.zeros(3)], axis=-1)
+ACROSS.setflags(write=False)
+
+#: A leg shorter than this part of g has no direction (as in `rps_pin.rps.kinematics.legs`).
+_VANISHING = 1e-9
+
+Errors = Literal["raise", "mask"]
+
+
+class TipJacobians(NamedTuple):
+    """Where the tips are in the planes of their legs, and how they move with the pose."""
+
+    radial: Array
+    """rho, along e_i from the base's centre, shape (..., 3 legs), m."""
+    height: Array
+    """z_i, above the base, shape (..., 3 legs), m."""
+    radial_jacobian: Array
+    """d(rho)/d(pose), shape (..., 3 legs, 3): 1, m/rad, m/rad."""
+    height_jacobian: Array
+    """d(z_i)/d(pose), shape (..., 3 legs, 3): 1, m/rad, m/rad."""
+
+
+class LegJacobians(NamedTuple):
+    """Leg lengths and angles with their derivatives with respect to the pose."""
+
+    length: Array
+    """The paper's d, shape (..., 3 legs), m."""
+    angle: Array
+    """The paper's phi, shape (..., 3 legs), rad."""
+    length_jacobian: Array
+    """K = d(length)/d(pose), shape (..., 3 legs, 3): 1, m/rad, m/rad."""
+    angle_jacobian: Array
+    """N = d(angle)/d(pose), shape (..., 3 legs, 3): rad/m, 1, 1."""
+
+
+class LegJacobianRates(NamedTuple):
+    """Time derivatives of the legs' Jacobians."""
+
+    length_jacobian: Array
+    """K', shape (..., 3 legs, 3): 1/s, m/rad/s, m/rad/s."""
+    angle_jacobian: Array
+    """N', shape (..., 3 legs, 3): rad/m/s, 1/s, 1/s."""
+
+
+class PoseDerivative(NamedTuple):
+    """A pose's rate or acceleration, found from the legs."""
+
+    value: Array
+    """Shape (..., 3); zero where it is not determined."""
+    determined: Bools
+    """Whether the legs determine it, shape (...): not at a singularity."""
+
+
+class PlatformTwist(NamedTuple):
+    """The platform's twist, in two parts, and its time derivative, in base axes.
+
+    A twist is the velocity of the centre (m/s) above the angular velocity (rad/s), shape (..., 6).
+    The robot has three freedoms: it climbs and tilts about the horizontal axes. The rest of its
+    motion is *parasitic*: what the legs' planes force upon it.
+    """
+
+    commanded: Array
+    """(0, 0, p_z', omega_x, omega_y, 0), shape (..., 6)."""
+    parasitic: Array
+    """(p_x', p_y', 0, 0, 0, omega_z), shape (..., 6); omega_z is the torsion about the vertical."""
+    commanded_rate: Array
+    """Time derivative of `commanded`, shape (..., 6), m/s^2 and rad/s^2."""
+    parasitic_rate: Array
+    """Time derivative of `parasitic`, shape (..., 6), m/s^2 and rad/s^2."""
+
+    @property
+    def total(self) -> Array:
+        """The twist, shape (..., 6)."""
+        return self.commanded + self.parasitic
+
+    @property
+    def total_rate(self) -> Array:
+        """The twist's time derivative, shape (..., 6)."""
+        return self.commanded_rate + self.parasitic_rate
+
+
+# Jacobians ----------------------------------------------------------------------------------------
+
+
+def tip_jacobians(parameters: RPSParameters, pose: ArrayLike) -> TipJacobians:
+    """Return the tips in their legs' planes and their derivatives: Eq. 1 and 4.
+
+    Parameters
+    ----------
+    pose
+        Shape (..., 3).
+
+    Raises
+    ------
+    InputError
+        If the pose has the wrong shape or is not finite.
+    """
+    x = checked_pose(pose)
+    h = parameters.platform_radius
+    e, t, s = _tilt_components(x)
+    a, b, d = exp_coefficients(s)
+    b_s, _, _ = exp_slopes(s)
+    a_s = (d - b) / 2  # dA/ds
+    f = e**2 - 3 * t**2
+    return TipJacobians(
+        h * (1 + b * f / 2),
+        x[..., :1] - h * a * t,
+        # d(rho)/de and d(rho)/dt, then d(z)/de and d(z)/dt; e and t are linear in the tilt.
+        _by_pose(0.0, h * e * (b_s * f + b), h * t * (b_s * f - 3 * b)),
+        _by_pose(1.0, -2 * h * a_s * e * t, -h * (a + 2 * a_s * t**2)),
+    )
+
+
+def tip_jacobian_rates(
+    parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike
+) -> tuple[Array, Array]:
+    """Return the time derivatives of `TipJacobians.radial_jacobian` and ``height_jacobian``.
+
+    Parameters
+    ----------
+    pose, rate
+        Pose and its time derivative, shape (..., 3) each.
+
+    Returns
+    -------
+    arrays
+        Shape (..., 3 legs, 3) each: 1/s, m/rad/s, m/rad/s.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong shape or is not finite.
+    """
+    x, dx, _ = checked_motion(pose, rate, np.zeros(3))
+    h = parameters.platform_radius
+    e, t, s = _tilt_components(x)
+    de, dt, _ = _tilt_components(dx)
+    ds = 2 * (e * de + t * dt)
+    _, b, d = exp_coefficients(s)
+    b_s, b_ss, d_s = exp_slopes(s)
+    a_s, a_ss = (d - b) / 2, (d_s - b_s) / 2
+    f, df = e**2 - 3 * t**2, 2 * (e * de - 3 * t * dt)
+    df_b = b_ss * ds * f + b_s * df  # d/dt of B_s f
+    return (
+        _by_pose(
+            0.0,
+            h * (de * (b_s * f + b) + e * (df_b + b_s * ds)),
+            h * (dt * (b_s * f - 3 * b) + t * (df_b - 3 * b_s * ds)),
+        ),
+        _by_pose(
+            0.0,
+            -2 * h * (a_ss * ds * e * t + a_s * (de * t + e * dt)),
+            -h * (a_s * ds + 2 * a_ss * ds * t**2 + 4 * a_s * t * dt),
+        ),
+    )
+
+
+def leg_jacobians(parameters: RPSParameters, pose: ArrayLike) -> LegJacobians:
+    """Return leg lengths and angles with their 3x3 Jacobians, in closed form: Eq. 1, 4 and 7.
+
+    Limits are not considered.
+
+    Parameters
+    ----------
+    pose
+        Shape (..., 3).
+
+    Raises
+    ------
+    InputError
+        If the pose has the wrong shape or is not finite.
+    UnreachableError
+        If a leg has no length, and so no direction.
+    """
+    legs, vanishing = masked_leg_jacobians(parameters, pose)
+    refuse_vanishing(legs.length, vanishing)
+    return legs
+
+
+def leg_jacobian_rates(
+    parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike
+) -> LegJacobianRates:
+    """Return the time derivatives of the legs' Jacobians, in closed form.
+
+    With them, d'' = K pose'' + K' pose' and phi'' = N pose'' + N' pose'.
+
+    Parameters
+    ----------
+    pose, rate
+        Pose and its time derivative, shape (..., 3) each.
+
+    Raises
+    ------
+    InputError, UnreachableError
+        As `leg_jacobians`.
+    """
+    x, dx, _ = checked_motion(pose, rate, np.zeros(3))
+    legs = leg_jacobians(parameters, x)
+    return jacobian_rates_of_legs(parameters, x, dx, legs)
+
+
+def masked_leg_jacobians(parameters: RPSParameters, pose: ArrayLike) -> tuple[LegJacobians, Bools]:
+    """Return `leg_jacobians`, and which legs have no length, shape (..., 3 legs).
+
+    Their angle and their rows of the Jacobians say nothing; they are finite.
+    """
+    tip = tip_jacobians(parameters, pose)
+    inwards = parameters.base_radius - tip.radial
+    length, angle = np.hypot(inwards, tip.height), np.arctan2(tip.height, inwards)
+    vanishing = length < _VANISHING * parameters.base_radius
+    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    lever = np.where(vanishing, parameters.base_radius, length)[..., None]
+    return (
+        LegJacobians(
+            length,
+            angle,
+            -cosine * tip.radial_jacobian + sine * tip.height_jacobian,
+            (sine * tip.radial_jacobian + cosine * tip.height_jacobian) / lever,
+        ),
+        vanishing,
+    )
+
+
+def jacobian_rates_of_legs(
+    parameters: RPSParameters, pose: Array, rate: Array, legs: LegJacobians
+) -> LegJacobianRates:
+    """Return `leg_jacobian_rates` of poses whose `leg_jacobians` are at hand."""
+    d_radial, d_height = tip_jacobian_rates(parameters, pose, rate)
+    lever = np.maximum(legs.length, _VANISHING * parameters.base_radius)[..., None]
+    K, N = legs.length_jacobian, legs.angle_jacobian
+    speed, turning = _times(K, rate)[..., None], _times(N, rate)[..., None]
+    cosine, sine = np.cos(legs.angle)[..., None], np.sin(legs.angle)[..., None]
+    return LegJacobianRates(
+        # (cos)' = -sin phi', (sin)' = cos phi'; sin d(rho) + cos d(z) = d N.
+        -cosine * d_radial + sine * d_height + turning * lever * N,
+        (sine * d_radial + cosine * d_height - turning * K - speed * N) / lever,
+    )
+
+
+# Poses from legs ----------------------------------------------------------------------------------
+
+
+def pose_rate(
+    parameters: RPSParameters,
+    pose: ArrayLike,
+    leg_speed: ArrayLike,
+    *,
+    errors: Errors = "raise",
+    max_gain: float = MAX_CONDITION,
+) -> PoseDerivative:
+    """Return how the pose changes when the legs move with given speeds: K pose' = d'.
+
+    Parameters
+    ----------
+    pose
+        Shape (..., 3).
+    leg_speed
+        d' of legs 1, 2, 3, shape (..., 3), m/s; positive is out.
+    errors
+        ``"raise"`` refuses a pose where the legs do not determine the rate; ``"mask"`` answers zero
+        there and says so in `PoseDerivative.determined`.
+    max_gain
+        Largest accepted speed of the platform for a unit of leg speed, tilt rates made speeds by h:
+        1 over K's smallest singular value. (K's condition number would not do: in a flat robot, all
+        of K vanishes evenly.)
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong shape or is not finite.
+    UnreachableError
+        If a leg has no length.
+    SingularityError
+        If K is too near a singular matrix: the gain and its limit are in the message.
+    """
+    _check_options(errors, max_gain)
+    x, speed = _checked_together(pose=checked_pose(pose), leg_speed=checked_legs(leg_speed))
+    return _solved(parameters, x, lambda _: speed, errors, max_gain)
+
+
+def pose_acceleration(
+    parameters: RPSParameters,
+    pose: ArrayLike,
+    rate: ArrayLike,
+    leg_acceleration: ArrayLike,
+    *,
+    errors: Errors = "raise",
+    max_gain: float = MAX_CONDITION,
+) -> PoseDerivative:
+    """Return the pose's acceleration from those of the legs: K pose'' = d'' - K' pose'.
+
+    Parameters
+    ----------
+    pose, rate
+        Pose and its time derivative (see `pose_rate`), shape (..., 3) each.
+    leg_acceleration
+        d'' of legs 1, 2, 3, shape (..., 3), m/s^2.
+    errors, max_gain
+        As in `pose_rate`.
+
+    Raises
+    ------
+    InputError, UnreachableError, SingularityError
+        As `pose_rate`.
+    """
+    _check_options(errors, max_gain)
+    x, dx, acceleration = _checked_together(
+        pose=checked_pose(pose),
+        rate=checked_pose(rate, "rate"),
+        leg_acceleration=checked_legs(leg_acceleration, "leg_acceleration"),
+    )
+
+    def right_side(legs: LegJacobians) -> Array:
+        change = jacobian_rates_of_legs(parameters, x, dx, legs)
+        return acceleration - _times(change.length_jacobian, dx)
+
+    return _solved(parameters, x, right_side, errors, max_gain)
+
+
+# The platform -------------------------------------------------------------------------------------
+
+
+def platform_twist(
+    parameters: RPSParameters,
+    pose: ArrayLike,
+    rate: ArrayLike,
+    acceleration: ArrayLike = (0.0, 0.0, 0.0),
+) -> PlatformTwist:
+    """Return the platform's twist and its derivative in base axes, the parasitic part told apart.
+
+    Parameters
+    ----------
+    pose, rate, acceleration
+        Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong shape or is not finite.
+    """
+    motion = platform_motion(*checked_motion(pose, rate, acceleration), parameters.platform_radius)
+    # omega = R omega_platform, and omega' = R omega_platform' since omega x omega = 0.
+    twist = np.concatenate(
+        [motion.velocity, _times(motion.rotation, motion.angular_velocity)], axis=-1
+    )
+    twist_rate = np.concatenate(
+        [motion.acceleration, _times(motion.rotation, motion.angular_acceleration)], axis=-1
+    )
+    commanded = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
+    return PlatformTwist(
+        commanded * twist,
+        (1 - commanded) * twist,
+        commanded * twist_rate,
+        (1 - commanded) * twist_rate,
+    )
+
+
+# Inner workings -----------------------------------------------------------------------------------
+
+
+def _tilt_components(pose: Array) -> tuple[Array, Array, Array]:
+    """Return e and t of each leg, shape (..., 3 legs), and s = e^2 + t^2, shape (..., 1)."""
+    tilt = pose[..., 1:]
+    return (
+        tilt @ RADIAL[:, :2].T,
+        tilt @ ACROSS[:, :2].T,
+        (tilt**2).sum(axis=-1, keepdims=True),
+    )
+
+
+def _by_pose(by_z: float, by_e: Array, by_t: Array) -> Array:
+    """Return derivatives with respect to the pose from those to z, e and t, (..., 3 legs, 3)."""
+    by_tilt = by_e[..., None] * RADIAL[:, :2] + by_t[..., None] * ACROSS[:, :2]
+    return np.concatenate([np.full((*by_e.shape, 1), by_z), by_tilt], axis=-1)
+
+
+def _times(matrix: Array, vector: Array) -> Array:
+    product: Array = np.einsum("...ij,...j->...i", matrix, vector)
+    return product
+
+
+def _solved(
+    parameters: RPSParameters,
+    pose: Array,
+    right_side: Callable[[LegJacobians], Array],
+    errors: Errors,
+    max_gain: float,
+) -> PoseDerivative:
+    """Solve K x = right side, with the tilts made lengths by h."""
+    legs, vanishing = masked_leg_jacobians(parameters, pose)
+    if errors == "raise":
+        refuse_vanishing(legs.length, vanishing)
+    units = np.array([1.0, *2 * [1 / parameters.platform_radius]])
+    scaled = legs.length_jacobian * units
+    values = np.linalg.svd(scaled, compute_uv=False)
+    determined = (values[..., 2] * max_gain >= 1) & ~vanishing.any(axis=-1)
+    if errors == "raise" and not determined.all():
+        _refuse_singular(values, determined, max_gain)
+    regular = np.where(determined[..., None, None], scaled, np.eye(3))
+    right = np.where(determined[..., None], right_side(legs), 0.0)
+    return PoseDerivative(units * np.linalg.solve(regular, right[..., None])[..., 0], determined)
+
+
+def _refuse_singular(values: Array, determined: Bools, limit: float) -> None:
+    first = tuple(int(i) for i in np.argwhere(~determined)[0])
+    smallest = float(values[first][2])
+    gain = 1 / smallest if smallest > 0 else float("inf")
+    where = f" (entry {first} of {determined.size})" if first else ""
+    raise SingularityError(
+        f"the legs do not determine how the platform moves here{where}: it could move {gain:.3g} "
+        f"times as fast as they, and at most {limit:.3g} times is accepted",
+        gain,
+        limit,
+    )
+
+
+def refuse_vanishing(length: Array, vanishing: Bools) -> None:
+    """Raise `UnreachableError` if a leg, (..., 3 legs), has no length."""
+    if vanishing.any():
+        leg = int(np.argwhere(vanishing)[0][-1]) + 1
+        raise UnreachableError(
+            f"leg {leg} would have length {length[vanishing][0]:.3g} m: its tip lies on its "
+            "revolute joint, and it has no direction"
+        )
+
+
+def check_errors_option(errors: str) -> None:
+    """Raise `InputError` unless errors is ``"raise"`` or ``"mask"``."""
+    if errors not in ("raise", "mask"):
+        raise InputError(f"errors = {errors!r}; it must be 'raise' or 'mask'")
+
+
+def _check_options(errors: str, max_gain: float) -> None:
+    check_errors_option(errors)
+    if not max_gain > 0:
+        raise InputError(f"max_gain = {max_gain}: it must be positive")
+
+
+def checked_legs(value: ArrayLike, name: str = "leg_speed") -> Array:
+    """Return one number for each leg as a finite float array of shape (..., 3)."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be numbers of shape (..., 3)") from None
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise InputError(f"{name} has shape {array.shape}; it must be (..., 3): legs 1, 2, 3")
+    if not np.isfinite(array).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(f"{name} is not finite: entry {where} is {array[where]}")
+    return array
+
+
+def _checked_together(**arrays: Array) -> tuple[Array, ...]:
+    """Return arrays broadcast to one shape, or say by name which do not go together."""
+    try:
+        return tuple(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise InputError(f"these shapes do not go together: {shapes}") from None

@@ -1,0 +1,1 @@
+"""Motions of the 3-RPS: trajectory files, and shortest times along a curve."""

@@ -1,0 +1,129 @@
+"""What running along a curve asks of the actuators, as functions of place, rate and acceleration.
+
+Along a curve x(u), the actuator forces and the legs' speeds are
+
+    F = m(u) u'' + c(u) u'^2 + g(u) + friction(u, u'),    d' = d_u(u) u'.
+
+All come from `RPSRobot.actuator_forces`. Without friction, forces do not change when the motion is
+run through backwards; friction changes its sign. That tells the two apart.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
+from rps_pin.rps.kinematics.rates import leg_jacobians
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.trajectories.curve import Curve
+from rps_pin.trajectories.path import PathSample
+
+#: Relative step of the rate in the slope of friction: errors of about its square.
+_STEP = 1e-5
+
+
+class LimitUse(NamedTuple):
+    """How much of the actuators' limits a motion uses: 1 is at the limit."""
+
+    force: Array
+    """Force over its limit, shape (..., 3); positive pushes the leg out."""
+    speed: Array
+    """Speed over its limit, shape (..., 3); positive is out. Zero without a limit."""
+
+    @property
+    def sides(self) -> Array:
+        """Use of each limit: 3 pushes, 3 pulls, 3 speeds either way, shape (..., 9)."""
+        return np.concatenate([self.force, -self.force, np.abs(self.speed)], axis=-1)
+
+    @property
+    def most(self) -> Array:
+        """Use of the limit that is used most, shape (...)."""
+        most: Array = self.sides.max(axis=-1)
+        return most
+
+
+class CurveTerms(NamedTuple):
+    """Terms of the forces at places of a curve, shape (..., 3) each; N, m and the curve's unit."""
+
+    mass: Array
+    """m: force by u''."""
+    swing: Array
+    """c: force by u'^2."""
+    weight: Array
+    """g: what holding still takes, against gravity and the wrench."""
+    lengths: Array
+    """d_u: derivative of the leg lengths."""
+
+
+class CurveDynamics:
+    """A robot that runs along a curve.
+
+    Parameters
+    ----------
+    robot
+        The 3-RPS, with its payload and friction.
+    curve
+        Where it runs.
+    limits
+        Of its actuators.
+    wrench
+        On the platform, all along, shape (6,), or none.
+    """
+
+    def __init__(
+        self, robot: RPSRobot, curve: Curve, limits: ActuatorLimits, wrench: Array | None
+    ) -> None:
+        self.robot = robot
+        self.curve = curve
+        self.limits = limits
+        self.wrench = wrench
+
+    def terms(self, u: Array) -> CurveTerms:
+        """Return the terms at parameters of shape (...)."""
+        x, first, second = self.curve.at(u)
+        still = np.zeros_like(x)
+        weight = self._forces(x, still, still)
+        there, back = self._forces(x, first, second), self._forces(x, -first, second)
+        return CurveTerms(
+            self._forces(x, still, first) - weight,
+            (there + back) / 2 - weight,
+            weight,
+            np.einsum("...ij,...j->...i", self._length_jacobian(x), first),
+        )
+
+    def friction(self, u: Array, square: Array) -> tuple[Array, Array]:
+        """Return what friction takes at u'^2 of shape (...), and its slope by u'^2, (..., 3)."""
+        x, first, _ = self.curve.at(u)
+        rate = np.sqrt(square)[..., None]
+        more = self._friction(x, first * rate * (1 + _STEP))
+        less = self._friction(x, first * rate * (1 - _STEP))
+        # d/d(r^2) = (d/dr) / (2 r), and (d/dr) is the difference over 2 _STEP r
+        over = 4 * _STEP * square[..., None]
+        slope = np.divide(more - less, over, out=np.zeros_like(more), where=over > 0)
+        return self._friction(x, first * rate), slope
+
+    def use(self, motion: PathSample) -> LimitUse:
+        """Return how much of the limits a sampled motion uses."""
+        force = self._forces(*motion)
+        speed = self.robot.motion(*motion)[1].speed
+        return LimitUse(force / self.limits.force, speed / self.limits.speed)
+
+    def sample(self, u: Array, square: Array, acceleration: Array) -> PathSample:
+        """Return the motion at parameters, u'^2 and u'' of shape (...)."""
+        x, first, second = self.curve.at(u)
+        rate = first * np.sqrt(square)[..., None]
+        bend = second * square[..., None]
+        return PathSample(x, rate, first * acceleration[..., None] + bend)
+
+    def _forces(self, x: Array, rate: Array, acceleration: Array) -> Array:
+        return self.robot.actuator_forces(x, rate, acceleration, wrench=self.wrench)
+
+    def _friction(self, x: Array, rate: Array) -> Array:
+        still = np.zeros_like(x)
+        return (self._forces(x, rate, still) - self._forces(x, -rate, still)) / 2
+
+    def _length_jacobian(self, x: Array) -> Array:
+        return leg_jacobians(self.robot.parameters, x).length_jacobian

@@ -1,0 +1,181 @@
+"""Refuse a curve that cannot be scaled in time, before anything is solved: where, and why."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.errors import (
+    InfeasibleError,
+    InputError,
+    LimitExcess,
+    LimitViolation,
+    ParameterError,
+    SingularityError,
+    UnreachableError,
+)
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
+from rps_pin.rps.motion.curve_dynamics import CurveDynamics
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.singularity.path_check import check_path
+from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck
+from rps_pin.trajectories.curve import Curve
+from rps_pin.trajectories.path import PathSample
+
+#: At how many places a curve is looked at for standing still, and for what holding it takes.
+_LOOKS = 4001
+#: A tangent of this part of the longest is none, with a bend of this part of it per length.
+_NO_TANGENT, _NO_BEND = 1e-6, 1e-2
+#: Width of the brackets of `check_path`, over the curve's length.
+_BRACKET = 1e-9
+
+
+@dataclass(frozen=True)
+class _AsTrajectory:
+    """A curve as a trajectory, with the parameter u for the time."""
+
+    curve: Curve
+
+    @property
+    def duration(self) -> float:
+        return self.curve.length
+
+    def sample(self, t: ArrayLike) -> PathSample:
+        return PathSample(*self.curve.at(t))
+
+
+class _WithLimits(NamedTuple):
+    """What `check_path` asks of a robot."""
+
+    parameters: RPSParameters
+
+
+def ends_at_rest(robot: RPSRobot, curve: Curve) -> tuple[bool, bool]:
+    """Return at which ends the rate u' must vanish: not where the curve's tangent does.
+
+    There, the robot rests whatever the rate is, as long as the curve bends.
+
+    Raises
+    ------
+    InputError
+        If a curve stands still: it has neither a tangent nor a bend at some place. No finite rate
+        runs through it in the shortest time.
+    """
+    u = np.linspace(0.0, curve.length, _LOOKS)
+    _, first, second = curve.at(u)
+    size = np.array([1 / robot.parameters.platform_radius, 1.0, 1.0])
+    tangent = np.linalg.norm(first * size, axis=-1)
+    bend = np.linalg.norm(second * size, axis=-1) * curve.length
+    longest = tangent.max()
+    if not longest > 0:
+        raise InputError(f"the pose is the same all along {curve!r}: nothing moves")
+    without = tangent <= _NO_TANGENT * longest
+    still = without & (bend <= _NO_BEND * longest)
+    if still.any():
+        raise InputError(
+            f"the curve stands still at u = {u[np.argmax(still)]:.6g} of {curve.length:.6g}: its "
+            "first and second derivatives vanish there, and u' would have to be infinite. A "
+            "trajectory that rests in its own time is no curve to scale: give the curve it runs "
+            "along, with a tangent everywhere (of a spline, its poses without times)"
+        )
+    return not without[0], not without[-1]
+
+
+def require_clear_curve(robot: RPSRobot, curve: Curve, limits: ActuatorLimits) -> None:
+    """Refuse a curve that leaves the workspace, or meets a singularity.
+
+    Parameters
+    ----------
+    limits
+        Those of length count beside the robot's.
+
+    Raises
+    ------
+    UnreachableError, SingularityError
+        Says at which u, and why.
+    """
+    parameters = _with_lengths(robot.parameters, limits.length)
+    found = check_path(
+        _WithLimits(parameters), _AsTrajectory(curve), tolerance=_BRACKET * curve.length
+    )
+    outside = [event for event in found.limits if event.kind != "returns"]
+    if outside:
+        raise _unreachable(parameters, curve, found, outside[0])
+    met = [event for event in found.singularities if event.kind != "grazes"]
+    if met:
+        z, tilt_x, tilt_y = met[0].pose
+        leg = f" of leg {met[0].leg}" if met[0].leg else ""
+        raise SingularityError(
+            f"at u = {met[0].time:.9g} of {curve.length:.6g} the curve {met[0].kind} a "
+            f"{met[0].singularity} singularity{leg}, at z = {z:.6g} m, tilt = ({tilt_x:.6g}, "
+            f"{tilt_y:.6g}) rad: no law of time carries the robot through it",
+            math.inf,
+            robot.mechanism.max_condition,
+        )
+
+
+def _with_lengths(p: RPSParameters, length: tuple[float, float]) -> RPSParameters:
+    low, high = (
+        max(p.leg_length_limits[0], length[0]),
+        min(p.leg_length_limits[1], length[1]),
+    )
+    try:
+        return p.replace(leg_length_limits=(low, high))
+    except ParameterError:
+        raise InputError(
+            f"length limits = {length}: the robot's legs have {p.leg_length_limits} m, and no "
+            "length is within both"
+        ) from None
+
+
+def _unreachable(
+    parameters: RPSParameters, curve: Curve, found: PathCheck, event: LimitEvent
+) -> UnreachableError:
+    """Return the error of the first limit left, with what is broken half-way until all is well."""
+    back = (e.time for e in found.limits if e.kind == "returns" and e.time > event.time)
+    middle = (event.time + next(back, found.duration)) / 2
+    robot = RPSRobot(parameters)
+    violations: tuple[LimitViolation, ...] = ()
+    try:
+        robot.inverse_kinematics(curve.at(middle).pose)
+    except UnreachableError as error:
+        violations = error.violations
+    further = "; ".join(map(str, violations))
+    return UnreachableError(
+        f"at u = {event.time:.9g} of {found.duration:.6g} the curve leaves the workspace: leg "
+        f"{event.leg} breaks its {event.side} limit of {event.quantity}, {event.limit:.6g} "
+        f"{event.unit}{f'. At u = {middle:.6g}, {further}' if further else ''}",
+        violations,
+    )
+
+
+def infeasible(dynamics: CurveDynamics) -> InfeasibleError:
+    """Return the error of a curve without any law of time: what holding still asks too much.
+
+    Where holding still is possible all along, so is moving slowly enough, also against friction.
+    """
+    limit = dynamics.limits.force
+    u = np.linspace(0.0, dynamics.curve.length, _LOOKS)
+    weight = dynamics.terms(u).weight
+    place, leg = np.unravel_index(int(np.abs(weight).argmax()), weight.shape)
+    force, actuator = float(weight[place, leg]), f"actuator {leg + 1}"
+    z, tilt_x, tilt_y = dynamics.curve.at(u[place]).pose
+    where = (
+        f"at u = {u[place]:.6g} of {dynamics.curve.length:.6g} (z = {z:.6g} m, tilt = "
+        f"({tilt_x:.6g}, {tilt_y:.6g}) rad)"
+    )
+    if abs(force) <= limit:
+        return InfeasibleError(
+            f"no law of time was found that keeps forces of {limit:.6g} N, though holding still "
+            f"takes at most {abs(force):.6g} N, of {actuator} {where}"
+        )
+    return InfeasibleError(
+        f"no law of time keeps the actuators' limits from rest to rest: {where}, {actuator} needs "
+        f"{force:.6g} N to hold still, and its limit is {limit:.6g} N",
+        [LimitExcess(actuator, force, math.copysign(limit, force), "N")],
+    )

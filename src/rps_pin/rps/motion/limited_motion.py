@@ -1,0 +1,96 @@
+"""A motion at the limits of its actuators: which limit it reaches when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Bools
+from rps_pin.errors import InputError
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
+from rps_pin.rps.motion.curve_dynamics import CurveDynamics, LimitUse
+from rps_pin.rps.motion.speed_profile import SpeedProfile
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.trajectories.curve import TimedCurve
+
+#: A limit counts as reached within this part of it.
+ACTIVE = 1e-3
+
+#: Names of the limits, in the order of `LimitUse.sides`.
+SIDES = tuple(f"actuator {leg} {what}" for what in ("push", "pull", "speed") for leg in (1, 2, 3))
+
+
+class LimitedMotion(TimedCurve):
+    """A motion along a curve in the shortest time, made by `time_optimal`.
+
+    Attributes
+    ----------
+    curve : Curve
+        Where the robot goes.
+    law : SpeedProfile
+        When; its pieces, and the squared rate at their ends.
+    robot : RPSRobot
+        Who goes.
+    limits : ActuatorLimits
+        What is kept.
+    """
+
+    law: SpeedProfile
+
+    def __init__(self, dynamics: CurveDynamics, law: SpeedProfile) -> None:
+        super().__init__(dynamics.curve, law)
+        self._dynamics = dynamics
+
+    @property
+    def robot(self) -> RPSRobot:
+        """Who goes."""
+        return self._dynamics.robot
+
+    @property
+    def limits(self) -> ActuatorLimits:
+        """What is kept."""
+        return self._dynamics.limits
+
+    def __repr__(self) -> str:
+        return f"LimitedMotion({self.curve!r}, {self.law!r})"
+
+    def use(self, t: ArrayLike) -> LimitUse:
+        """Return how much of the limits is used at times of shape (...), s.
+
+        Raises
+        ------
+        InputError
+            If a time lies outside the motion.
+        """
+        return self._dynamics.use(self.sample(t))
+
+    def active(self, t: ArrayLike, within: float = ACTIVE) -> Bools:
+        """Return which limits are reached at times of shape (...), s; shape (..., 9), as `SIDES`.
+
+        Raises
+        ------
+        InputError
+            If a time lies outside the motion, or `within` is not between 0 and 1.
+        """
+        if not 0 < within < 1:
+            raise InputError(f"within = {within}: it must be between 0 and 1")
+        reached: Bools = self.use(t).sides >= 1 - within
+        return reached
+
+    def shares(self, within: float = ACTIVE, samples: int = 10_001) -> dict[str, float]:
+        """Return for what share of the time each limit is reached, and none (``"none"``)."""
+        reached = self.active(np.linspace(0.0, self.duration, samples), within)
+        found = dict(zip(SIDES, reached.mean(axis=0).tolist(), strict=True))
+        return found | {"none": float((~reached.any(axis=-1)).mean())}
+
+    def report(self) -> str:
+        """Return a few lines to read: the time, and how long each limit is reached."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        yield f"{self.duration:.6g} s, {len(self.law.bump)} pieces; at a limit to {ACTIVE:.1%}:"
+        for name, share in self.shares().items():
+            if share > 0:
+                yield f"  {name:<17} {share:7.2%} of the time"

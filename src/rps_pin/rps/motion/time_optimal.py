@@ -1,0 +1,148 @@
+"""The shortest time along a curve that a robot's actuators allow.
+
+With forces F = m u'' + c u'^2 + g + friction, and speeds d_u u' (see `curve_dynamics`), limits of
+forces and speeds are linear in u'' and u'^2, and the shortest time is a convex program (see
+`fastest_profile`). Around it goes a loop, until the motion is as wanted (see `time_search`).
+
+A motion is returned only if `RPSRobot.actuator_forces` and the legs' speeds keep the limits to
+`KEPT`, within the pieces of its law of time and at some 20,000 times.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from numbers import Integral
+from typing import Protocol
+
+from numpy.typing import ArrayLike
+
+from rps_pin.errors import InputError, shown
+from rps_pin.rps.dynamics.loads import checked_wrench
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
+from rps_pin.rps.motion.curve_dynamics import CurveDynamics
+from rps_pin.rps.motion.curve_refusal import ends_at_rest, require_clear_curve
+from rps_pin.rps.motion.limited_motion import LimitedMotion
+from rps_pin.rps.motion.time_search import KEPT, MOST_ROUNDS, TimeSearch
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.trajectories.curve import Curve, CurveSample
+from rps_pin.trajectories.path import Trajectory
+
+__all__ = ["INTERVALS", "KEPT", "time_optimal"]
+
+Progress = Callable[[Iterable[int]], Iterable[int]]
+
+#: Pieces at first.
+INTERVALS = 100
+
+
+class _HasCurve(Protocol):
+    @property
+    def curve(self) -> Curve: ...
+
+
+@dataclass(frozen=True)
+class _OwnTime:
+    """A trajectory as a curve: u is its own time."""
+
+    trajectory: Trajectory
+
+    @property
+    def length(self) -> float:
+        return self.trajectory.duration
+
+    def at(self, u: ArrayLike) -> CurveSample:
+        return CurveSample(*self.trajectory.sample(u))
+
+
+def time_optimal(
+    robot: RPSRobot,
+    path: Curve | _HasCurve | Trajectory,
+    *,
+    limits: ActuatorLimits | None = None,
+    wrench: ArrayLike | None = None,
+    intervals: int = INTERVALS,
+    progress: Progress = iter,
+) -> LimitedMotion:
+    """Return the motion of the shortest time along a path, from rest to rest.
+
+    Parameters
+    ----------
+    robot
+        The 3-RPS, with its payload and friction.
+    path
+        A curve; or what has one (`TimedCurve`, `HelixPath`: their laws of time are not used); or a
+        trajectory, which is taken as a curve in its own time. A curve whose second derivative jumps
+        should have the parameters where it does in an attribute ``knots``: otherwise the time found
+        can be a per cent too long.
+    limits
+        Of the actuators' forces and speeds, and of the legs' lengths; the robot's if left out.
+    wrench
+        What something outside exerts on the platform all along: force (N) in base axes and moment
+        (N m) about the platform's centre, shape (6,).
+    intervals
+        Pieces of the speed profile at first, 8 or more. Those where it matters are divided.
+    progress
+        Wraps the loop over the rounds, for a progress bar; few of the rounds are needed.
+
+    Returns
+    -------
+    LimitedMotion
+        A `TimedCurve`, which knows how much of the limits it uses when. They are kept to `KEPT`.
+
+    Raises
+    ------
+    InputError
+        If there is no shortest time (no limit of force), a limit of power is given, the path is no
+        path, or it stands still somewhere.
+    UnreachableError, SingularityError
+        If the curve leaves the workspace, or meets a singularity; says at which u.
+    InfeasibleError
+        If no law of time keeps the limits; says where, which actuator, and by how much.
+    RPSPinError
+        If no motion is found that keeps the limits to `KEPT`, or friction does not settle.
+    """
+    bounds = _checked_limits(ActuatorLimits.of(robot.parameters) if limits is None else limits)
+    if not isinstance(intervals, Integral) or isinstance(intervals, bool) or intervals < 8:
+        raise InputError(f"intervals = {shown(intervals)}: it must be a whole number of 8 or more")
+    curve = _curve_of(path)
+    load = None if wrench is None else checked_wrench(wrench, ())
+    rest = ends_at_rest(robot, curve)
+    require_clear_curve(robot, curve, bounds)
+    search = TimeSearch(CurveDynamics(robot, curve, bounds, load), rest, int(intervals))
+    for _ in progress(range(MOST_ROUNDS)):
+        if search.advance():
+            return search.motion()
+    raise search.failure()
+
+
+# What is given ------------------------------------------------------------------------------------
+
+
+def _checked_limits(limits: ActuatorLimits) -> ActuatorLimits:
+    if not isinstance(limits, ActuatorLimits):
+        raise InputError(f"limits = {shown(limits)}: they must be ActuatorLimits")
+    if math.isfinite(limits.power):
+        raise InputError(
+            f"power limit = {limits.power:.6g} W: a motion can be scaled to limits of force and "
+            "speed, not of power"
+        )
+    if math.isinf(limits.force):
+        raise InputError(
+            "the actuators have no limit of force: without one, any time can be made shorter. Give "
+            "limits=ActuatorLimits(force=...), or a robot with an actuator_force_limit"
+        )
+    return limits
+
+
+def _curve_of(path: object) -> Curve:
+    for candidate in (path, getattr(path, "curve", None)):
+        if hasattr(candidate, "at") and hasattr(candidate, "length"):
+            return candidate
+    if hasattr(path, "sample") and hasattr(path, "duration"):
+        return _OwnTime(path)
+    raise InputError(
+        f"path = {shown(path)}: it must be a curve (length, at), have one (curve), or be a "
+        "trajectory (duration, sample)"
+    )

@@ -1,0 +1,148 @@
+"""Arguments from callers, checked once: numbers, arrays, shapes and choices.
+
+Each function returns what it was given as plain floats or float64 arrays, or raises `InputError`
+with the argument's name, what was given, and what is possible.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from numbers import Integral, Real
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg.blas import dasum
+
+from rps_pin.arrays import Array
+from rps_pin.errors import InputError, shown
+
+#: No number given to a trajectory or a law is larger: what is computed from them stays finite.
+LARGEST = 1e50
+
+
+# Single numbers -----------------------------------------------------------------------------------
+
+
+def real(value: object) -> float:
+    """Return a single real number as a float; NaN for anything else, such as True."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return math.nan
+
+
+def finite_number(value: object, name: str, unit: str = "") -> float:
+    """Return a finite number of at most `LARGEST`; `unit` is named in the error."""
+    number = real(value)
+    if not abs(number) <= LARGEST:
+        wanted = f"a finite number{unit and f' of {unit}'}"
+        raise InputError(f"{name} = {shown(value)}: it must be {wanted}, at most {LARGEST}")
+    return number
+
+
+def positive_number(value: object, name: str, unit: str = "") -> float:
+    """Return a finite number above zero; `unit` is named in the error."""
+    number = real(value)
+    if not 0 < number < math.inf:
+        wanted = f"a positive number{unit and f' of {unit}'}"
+        raise InputError(f"{name} = {shown(value)}: it must be {wanted}, finite")
+    return number
+
+
+def non_negative_number(value: object, name: str, unit: str = "") -> float:
+    """Return a finite number of zero or more; `unit` is named in the error."""
+    number = real(value)
+    if not 0 <= number < math.inf:
+        wanted = f"a number{unit and f' of {unit}'}"
+        raise InputError(f"{name} = {shown(value)}: it must be {wanted}, zero or more, finite")
+    return number
+
+
+def whole_number(value: object, name: str, least: int = 1) -> int:
+    """Return an integer of at least `least`."""
+    if not isinstance(value, Integral) or isinstance(value, bool) or value < least:
+        raise InputError(f"{name} = {shown(value)}: it must be a whole number, at least {least}")
+    return int(value)
+
+
+def choice(value: object, name: str, options: Sequence[str]) -> str:
+    """Return a value that is one of the options."""
+    if value not in options:
+        listed = " or ".join(repr(option) for option in options)
+        raise InputError(f"{name} = {shown(value)}: it must be {listed}")
+    return str(value)
+
+
+# Arrays -------------------------------------------------------------------------------------------
+
+
+def real_array(
+    value: ArrayLike, name: str, ending: tuple[int, ...] = (), meaning: str = ""
+) -> Array:
+    """Return finite real numbers whose shape ends as told, (..., *ending).
+
+    Parameters
+    ----------
+    value
+        Numbers; not copied where they are float64 already.
+    name, meaning
+        Of the argument, for the error: ``"pose"``, ``"height, tilt_x, tilt_y"``.
+    ending
+        The last dimensions.
+    """
+    wanted = f"(..., {', '.join(map(str, ending))})" if ending else "(...)"
+    wanted += meaning and f": {meaning}"
+    try:
+        given = np.asarray(value)
+    except ValueError:  # ragged
+        raise InputError(f"{name} must be numbers of shape {wanted}") from None
+    if given.dtype.kind not in "iuf":
+        raise InputError(f"{name} = {shown(value)}: it must be numbers of shape {wanted}")
+    if given.ndim < len(ending) or given.shape[given.ndim - len(ending) :] != ending:
+        raise InputError(f"{name} has shape {given.shape}; it must be {wanted}")
+    array = given.astype(np.float64, copy=False)
+    refuse_not_finite(array, name)
+    return array
+
+
+def real_vector(value: ArrayLike, size: int, name: str) -> Array:
+    """Return finite real numbers of shape (size,): the fast way, for control loops."""
+    if (
+        isinstance(value, np.ndarray)
+        and value.dtype == np.float64
+        and value.shape == (size,)
+        and math.isfinite(dasum(value))
+    ):
+        return value
+    array = real_array(value, name)
+    if array.shape != (size,):
+        raise InputError(f"{name} has shape {array.shape}; it must be ({size},)")
+    return array
+
+
+def refuse_not_finite(array: Array, name: str) -> None:
+    """Raise `InputError` at the first entry that is not finite."""
+    finite = np.isfinite(array)
+    if not finite.all():
+        where = tuple(int(i) for i in np.argwhere(~finite)[0])
+        entry = f"entry {where[0] if len(where) == 1 else where} is " if where else "it is "
+        raise InputError(f"{name} is not finite: {entry}{array[where]}")
+
+
+def one_shape(**arrays: Array) -> tuple[Array, ...]:
+    """Return named arrays broadcast to one shape."""
+    try:
+        return tuple(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise InputError(f"the shapes do not go together: {shapes}") from None
+
+
+def read_only(array: Array) -> Array:
+    """Return a copy that nobody writes to."""
+    copy = array.copy()
+    copy.setflags(write=False)
+    return copy

@@ -1,0 +1,1 @@
+"""Files of a scene: pages, pictures and films."""

@@ -1,0 +1,145 @@
+"""One file that shows a whole motion: no server, no network, nothing beside it."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rps_pin.errors import InputError
+from rps_pin.files import whole_file
+from rps_pin.viewer.files.page import WATCH_LAYERS, inline_script, licences, page, viewer_library
+from rps_pin.viewer.motion import FRAME_RATE, Motion
+from rps_pin.viewer.scene.scene import Scene
+from rps_pin.viewer.server.recorder import Recorder
+
+# The page may run what it holds and show pictures made of data. It may fetch nothing: the browser
+# itself would stop it.
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
+)
+
+# Each command is decoded and carried out before the next: Meshcat's own static pages fetch() their
+# commands, and then an object may arrive after the animation that moves it.
+_START = """\
+const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+watchLayers(viewer);
+for (const text of JSON.parse(document.getElementById("commands").textContent)) {
+  viewer.handle_command_bytearray(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)));
+}
+"""
+
+# Meshcat folds its panel away; open it with nothing but the playback controls unfolded.
+_SHOW_CONTROLS = """\
+viewer.gui.__folders["Scene"].close();
+viewer.gui.open();
+"""
+
+
+def write_html(
+    path: str | os.PathLike[str],
+    model: pin.Model,
+    visual: pin.GeometryModel,
+    times: ArrayLike,
+    configurations: ArrayLike,
+    *,
+    title: str = "Robot motion",
+    frame_rate: float = FRAME_RATE,
+) -> None:
+    """Write a page that plays a motion in a loop when it is opened from disk.
+
+    The file is written whole or not at all; a file that stood there before is replaced.
+
+    Parameters
+    ----------
+    path
+        The page to write, for instance ``viewer.html``.
+    model
+        The robot.
+    visual
+        What to draw.
+    times : array_like, shape (n,)
+        Times in seconds, strictly increasing. With n = 1 the page shows a pose that stands still.
+    configurations : array_like, shape (n, nq)
+        The configuration at each time.
+    title
+        Plain text for the browser's tab and the caption.
+    frame_rate
+        Keyframes per second that are stored; the browser interpolates between them.
+
+    Raises
+    ------
+    InputError
+        If the motion, the frame rate or the visual model cannot be shown, or `path` names a
+        folder or stands in a folder that does not exist.
+    OSError
+        If the file cannot be written.
+    """
+    target = checked_target(path)
+    text = motion_page(model, visual, times, configurations, title=title, frame_rate=frame_rate)
+    with whole_file(target) as scratch:
+        scratch.write_text(text, encoding="utf-8")
+
+
+def motion_page(
+    model: pin.Model,
+    visual: pin.GeometryModel,
+    times: ArrayLike,
+    configurations: ArrayLike,
+    *,
+    title: str = "Robot motion",
+    frame_rate: float = FRAME_RATE,
+) -> str:
+    """Return the page that `write_html` writes, as one string."""
+    motion = Motion(model, times, configurations)
+    recorder = Recorder()
+    scene = Scene(model, visual, recorder, motion.configurations)
+    moves = motion.duration > 0.0
+    if moves:
+        scene.animate(motion, frame_rate=frame_rate)
+    return recorded_page(
+        recorder, title=title, note=note_of(motion, scene.grid_spacing), moves=moves
+    )
+
+
+def checked_target(path: str | os.PathLike[str]) -> Path:
+    """Return where a file can be written, or raise `InputError`."""
+    target = Path(path)
+    if target.is_dir() or not target.parent.is_dir():
+        raise InputError(f"cannot write {target}: it is a folder, or its folder does not exist")
+    return target
+
+
+def note_of(motion: Motion, spacing: float) -> str:
+    """Return the caption's second line: how long the motion lasts, and the grid."""
+    note = f"grid {1e3 * spacing:g} mm"
+    return f"{motion.duration:.3g} s, in a loop · {note}" if motion.duration > 0.0 else note
+
+
+def recorded_page(recorder: Recorder, *, title: str, note: str, moves: bool) -> str:
+    """Return a page that carries out recorded commands when it is opened."""
+    return page(
+        title=title,
+        note=note,
+        policy=_POLICY,
+        scripts=_scripts(recorder.packed(), controls=moves),
+    )
+
+
+def _scripts(commands: Sequence[bytes], *, controls: bool) -> str:
+    """Return the library, its licences, the commands, and the script that runs them."""
+    texts = json.dumps([base64.b64encode(command).decode("ascii") for command in commands])
+    as_data = ' type="application/json" id="{}"'
+    return "\n".join(
+        [
+            inline_script(licences(), as_data.format("licences")),
+            inline_script(texts, as_data.format("commands")),
+            inline_script(viewer_library()),
+            inline_script(WATCH_LAYERS + _START + (_SHOW_CONTROLS if controls else "")),
+        ]
+    )

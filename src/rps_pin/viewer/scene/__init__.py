@@ -1,0 +1,1 @@
+"""Scenes: links, shapes, stage and animation, in any Meshcat window."""

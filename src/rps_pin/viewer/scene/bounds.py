@@ -1,0 +1,97 @@
+"""The box that a robot fills."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from pinocchio import coal
+
+from rps_pin.arrays import Array
+from rps_pin.errors import InputError
+from rps_pin.viewer.scene.links import Link, link_poses
+
+_SIDES = 16
+"""Of the prism that stands for a cylinder."""
+
+
+class Box(NamedTuple):
+    """An axis-aligned box in the world frame, in metres."""
+
+    lower: Array
+    """Corner with the smallest coordinates, shape (3,)."""
+    upper: Array
+    """Corner with the largest coordinates, shape (3,)."""
+
+    radius: float
+    """Radius of a sphere about the box's middle that holds all in it."""
+
+    @property
+    def centre(self) -> Array:
+        """Middle of the box, shape (3,)."""
+        return (self.lower + self.upper) / 2.0
+
+
+def bounding_box(model: pin.Model, links: Sequence[Link], configurations: Array) -> Box:
+    """Return a box that holds every link at every configuration.
+
+    A cylinder counts with the prism around it, others with their own bounding boxes, so the result
+    is a little generous.
+
+    Parameters
+    ----------
+    model
+        The robot.
+    links
+        Its links.
+    configurations : ndarray, shape (n, nq)
+        Configurations of `model`.
+
+    Raises
+    ------
+    InputError
+        If the robot has nothing to draw, or what it has is of no size.
+    """
+    if not links:
+        raise InputError("the robot has no visual geometry: there is nothing to show")
+    poses = link_poses(model, links, configurations)
+    corners = np.concatenate(
+        [_in_world(poses[:, index], _corners(link)) for index, link in enumerate(links)]
+    )
+    lower, upper = corners.min(axis=0), corners.max(axis=0)
+    radius = float(np.linalg.norm(corners - (lower + upper) / 2.0, axis=1).max())
+    box = Box(lower, upper, radius)
+    if not np.isfinite(box.radius) or box.radius <= 0.0:
+        raise InputError(f"the robot's bounding box has radius {box.radius} m: it cannot be shown")
+    return box
+
+
+def _corners(link: Link) -> Array:
+    """Return corners around the link's geometries in the link's frame, shape (m, 3)."""
+    corners = []
+    for item in link.geometries:
+        in_link = link.placement.actInv(item.placement)
+        corners += [in_link.act(corner) for corner in _own_corners(item.geometry)]
+    return np.array(corners)
+
+
+def _own_corners(shape: coal.CollisionGeometry) -> Array:
+    """Return corners around one shape in its own frame, shape (m, 3)."""
+    if isinstance(shape, coal.Cylinder):
+        turn = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
+        reach = shape.radius / np.cos(np.pi / _SIDES)
+        ring = np.stack([reach * np.cos(turn), reach * np.sin(turn)], axis=1)
+        ends = [np.full((_SIDES, 1), side * shape.halfLength) for side in (-1.0, 1.0)]
+        return np.concatenate([np.hstack([ring, end]) for end in ends])
+    shape.computeLocalAABB()
+    box = shape.aabb_local
+    return np.array(list(product(*zip(box.min_, box.max_, strict=True))))
+
+
+def _in_world(poses: Array, points: Array) -> Array:
+    """Move points of shape (m, 3) by every pose of shape (n, 4, 4); the result has n m rows."""
+    turned: Array = np.einsum("nij,mj->nmi", poses[:, :3, :3], points)
+    return (turned + poses[:, None, :3, 3]).reshape(-1, 3)

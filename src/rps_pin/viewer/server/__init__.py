@@ -1,0 +1,1 @@
+"""Live views: a Meshcat server on this machine only."""

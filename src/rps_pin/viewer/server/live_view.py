@@ -1,0 +1,237 @@
+"""The newest pose of a running loop in the browser, without disturbing the loop.
+
+The viewer is a process of its own. Between it and the loop lies a small shared memory: the loop
+writes a pose there, which takes about a microsecond and never waits; the viewer looks at its own
+rate, and shows what is new. (A thread would not do: it holds Python's interpreter lock for up to
+5 ms at a time, and a loop at 1 kHz waits for it.) Whatever happens to the viewer, the loop goes on.
+
+A pose that is read while it is written must not be shown. Its checksum tells, in whatever order a
+processor makes the writes visible; the viewer then looks again at its next picture.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import struct
+import zlib
+from collections.abc import Iterator
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any, Self
+
+import numpy as np
+
+from rps_pin.errors import InputError, RPSPinError
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.viewer.motion import FRAME_RATE, check_frame_rate
+
+#: Number of the write, and the pose; its CRC-32 follows.
+_RECORD = struct.Struct("4d")
+_CHECKSUM = 4
+_START_SECONDS = 60.0
+_END_SECONDS = 5.0
+
+
+class LiveView:
+    """Show a loop's robot while a ``with`` block lasts, on this machine only.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    pose
+        Where it is at first, and what the camera is set for, shape (3,).
+    rate
+        Pictures a second.
+    port
+        As for `LocalViewer`.
+    title
+        Plain text for the browser's tab.
+
+    Attributes
+    ----------
+    url : str
+        Address to open in a browser on this machine.
+
+    Raises
+    ------
+    InputError
+        If an argument does not fit.
+    RPSPinError
+        If the viewer does not start; says why.
+
+    Notes
+    -----
+    As for every process that Python spawns, a script that makes a live view must have its work
+    below ``if __name__ == "__main__":``, or the new process would do it once more.
+
+    Examples
+    --------
+    >>> with LiveView(robot, pose) as view:  # doctest: +SKIP
+    ...     print(view.url)
+    ...     view.show(controller.estimate.answers.pose)  # in each tick
+    """
+
+    def __init__(
+        self,
+        robot: RPSRobot,
+        pose: Any,
+        *,
+        rate: float = FRAME_RATE,
+        port: int | None = None,
+        title: str = "Robot",
+    ) -> None:
+        if not isinstance(robot, RPSRobot):
+            raise InputError(f"robot is a {type(robot).__name__}; it must be an RPSRobot")
+        check_frame_rate(rate)
+        start = np.asarray(pose, dtype=np.float64)
+        if start.shape != (3,) or not np.isfinite(start).all():
+            raise InputError(f"pose = {pose!r}: it must be three finite numbers")
+        self._asked = (robot, start, rate, port, title)
+        # Not forked: Meshcat's server, and OpenBLAS, have threads.
+        self._context = multiprocessing.get_context("spawn")
+        self._slot = self._context.RawArray("B", _RECORD.size + _CHECKSUM)
+        self._memory = memoryview(self._slot).cast("B")
+        self._count = 0.0
+        self.url = ""
+        self._process: BaseProcess | None = None
+        self._line: Connection | None = None
+        self.show(start)
+
+    def show(self, pose: Any) -> None:
+        """Give the newest pose, an array of shape (3,); takes about a microsecond, and never waits.
+
+        What the numbers are is not checked: a pose that cannot be shown is left out.
+
+        Raises
+        ------
+        InputError
+            If these are not three numbers.
+        """
+        self._count += 1.0
+        try:
+            z, tilt_x, tilt_y = pose
+            record = _RECORD.pack(self._count, z, tilt_x, tilt_y)
+        except (TypeError, ValueError, struct.error):
+            raise InputError(f"pose = {pose!r}: it must be three numbers") from None
+        self._memory[:] = _checked(record)
+
+    @property
+    def alive(self) -> bool:
+        """Whether the viewer runs."""
+        return self._process is not None and self._process.is_alive()
+
+    def __enter__(self) -> Self:
+        if self._process is not None:
+            raise RPSPinError("the view is running already, or has run: make a new one")
+        try:
+            self.url = self._start()
+        except BaseException:  # Ctrl-C too: __exit__ is not called
+            self._stop()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop()
+
+    def _start(self) -> str:
+        """Start the process and return its address."""
+        self._line, theirs = self._context.Pipe()
+        process = self._context.Process(
+            target=_serve,
+            args=(*self._asked, self._slot, theirs),
+            name="rps_pin live view",
+            daemon=True,
+        )
+        with theirs, _ctrl_c_blocked():
+            process.start()
+            self._process = process
+        try:
+            told = self._line.recv() if self._line.poll(_START_SECONDS) else "it took too long"
+        except (EOFError, OSError):
+            told = 'its process ended (a script needs `if __name__ == "__main__":`)'
+        if not told.startswith("http"):
+            raise RPSPinError(f"the live view did not start: {told}")
+        return str(told)
+
+    def _stop(self) -> None:
+        """End the process: it does when its line says anything, or is cut."""
+        if self._line is not None:
+            with contextlib.suppress(OSError):  # nobody listens any more
+                self._line.send(None)
+            self._line.close()
+        if self._process is not None:
+            self._process.join(_END_SECONDS)
+            if self._process.is_alive():
+                self._process.kill()
+                self._process.join()
+
+
+def _checked(record: bytes) -> bytes:
+    """Return a record and its checksum."""
+    return record + zlib.crc32(record).to_bytes(_CHECKSUM, "little")
+
+
+@contextlib.contextmanager
+def _ctrl_c_blocked() -> Iterator[None]:
+    """Keep Ctrl-C from the processes that are started here: it is the loop's.
+
+    They inherit the mask, and so never show a traceback, not even while they import.
+    """
+    resource_tracker.ensure_running()  # where it first has to start, it would unblock the signal
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# In the viewer's process --------------------------------------------------------------------------
+
+
+def _serve(
+    robot: RPSRobot,
+    start: Any,
+    rate: float,
+    port: int | None,
+    title: str,
+    slot: Any,
+    line: Connection,
+) -> None:
+    """Show what the slot holds, at the rate, until the line or the loop's process ends."""
+    from rps_pin.viewer.scene.scene import Scene  # noqa: PLC0415
+    from rps_pin.viewer.server.local_viewer import LocalViewer  # noqa: PLC0415
+
+    memory, parent = memoryview(slot).cast("B"), os.getppid()
+    # Shapes depend on the limits, so the scene is the robot's own.
+    free, still, seen = RPSRobot(robot.parameters.without_limits()), np.zeros(3), 0.0
+    try:
+        first = free.state(start, still, still)[0]
+        with LocalViewer(port, title=title) as viewer:
+            scene = Scene(robot.mechanism.model, robot.visual_model(), viewer.window, first)
+            line.send(viewer.url)
+            # A line that is cut polls true, unless a process forked from the loop's holds it too.
+            while not line.poll(1.0 / rate) and os.getppid() == parent:
+                newest = _newest(memory)
+                if newest is not None and newest[0] != seen:
+                    seen, pose = newest
+                    # One that cannot be shown is left out, overflows and all.
+                    with contextlib.suppress(RPSPinError), np.errstate(all="ignore"):
+                        scene.display(free.state(pose, still, still)[0])
+    except (RPSPinError, OSError) as error:
+        with contextlib.suppress(OSError):  # nobody listens any more
+            line.send(str(error))
+
+
+def _newest(memory: memoryview) -> tuple[float, tuple[float, float, float]] | None:
+    """Return the number of the newest pose and the pose, or None while it is being written."""
+    copy = bytes(memory)
+    record = copy[: _RECORD.size]
+    if copy != _checked(record):
+        return None
+    count, z, tilt_x, tilt_y = _RECORD.unpack(record)
+    return count, (z, tilt_x, tilt_y)

@@ -1,0 +1,171 @@
+"""A Meshcat server for this machine only, inside this process.
+
+Meshcat's own server listens on every network interface and runs as a process of its own; this one
+listens on 127.0.0.1, in one background thread, and is gone when its ``with`` block ends.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Self
+
+import tornado.httpserver
+import umsgpack
+
+from rps_pin.errors import InputError, RPSPinError
+from rps_pin.viewer.server.store import SceneStore
+from rps_pin.viewer.server.web import Hub, application
+from rps_pin.viewer.server.window import Command
+
+HOST = "127.0.0.1"
+"""The only address that is ever listened on."""
+_START_SECONDS = 10.0
+_FAREWELL_SECONDS = 0.5
+"""How long the open tabs have to answer the goodbye before their connections are cut."""
+
+
+class LiveWindow:
+    """A Meshcat window that hands every command to the browser tabs of a `LocalViewer`."""
+
+    def __init__(self, viewer: LocalViewer) -> None:
+        self._viewer = viewer
+
+    def send(self, command: Command) -> None:
+        """Show a command in every open tab and keep it for those that open later.
+
+        Raises
+        ------
+        RPSPinError
+            If the viewer is not running.
+        """
+        message = command.lower()
+        self._viewer.deliver(message, umsgpack.packb(message))
+
+
+class LocalViewer:
+    """Serve a scene to browsers on this machine for as long as a ``with`` block lasts.
+
+    Parameters
+    ----------
+    port
+        The port to listen on, 1 to 65535; without it the system picks a free one.
+    title
+        Plain text for the browser's tab and the caption.
+    note
+        Plain text for the caption's second line.
+
+    Attributes
+    ----------
+    window : LiveWindow
+        The window to give to a `Scene`.
+
+    Examples
+    --------
+    >>> with LocalViewer() as viewer:  # doctest: +SKIP
+    ...     print(viewer.url)
+    ...     play(Scene(model, visual, viewer.window, qs), times, qs)
+    """
+
+    def __init__(self, port: int | None = None, *, title: str = "Robot", note: str = "") -> None:
+        if port is not None and not 1 <= port <= 65535:
+            raise InputError(f"port = {port}: it must be between 1 and 65535")
+        self._asked = port
+        self._title = title
+        self._note = note
+        self._store = SceneStore()
+        self._hub = Hub(self._store)
+        self._thread: threading.Thread | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._end: asyncio.Event | None = None
+        self._port = 0
+        self.window = LiveWindow(self)
+
+    @property
+    def url(self) -> str:
+        """Address to open in a browser on this machine.
+
+        Raises
+        ------
+        RPSPinError
+            If the viewer is not running.
+        """
+        if self._loop is None:
+            raise RPSPinError("the viewer is not running: it has an address inside its with block")
+        return f"http://{HOST}:{self._port}/"
+
+    def __enter__(self) -> Self:
+        if self._thread is not None:
+            raise RPSPinError("the viewer is running already, or has run: make a new one")
+        listener = _listener(self._asked)
+        self._port = int(listener.getsockname()[1])
+        ready = threading.Event()
+        self._thread = threading.Thread(
+            target=lambda: asyncio.run(self._serve(listener, ready)),
+            name="rps_pin viewer",
+            daemon=True,
+        )
+        self._thread.start()
+        try:
+            started = ready.wait(_START_SECONDS)
+        except BaseException:
+            self._stop()
+            raise
+        if not started:
+            raise RPSPinError(f"the viewer did not start within {_START_SECONDS:g} s")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stop()
+
+    def _stop(self) -> None:
+        """End the server's thread, if it serves, and wait until the port is free again."""
+        loop, self._loop = self._loop, None
+        if loop is not None and self._end is not None and self._thread is not None:
+            loop.call_soon_threadsafe(self._end.set)
+            self._thread.join()
+
+    def deliver(self, message: Mapping[str, object], packed: bytes) -> None:
+        """Pass a message, and the same in wire format, to the server's thread."""
+        if self._loop is None:
+            raise RPSPinError("the viewer is not running: nothing can be shown")
+        self._loop.call_soon_threadsafe(self._hub.publish, message, packed)
+
+    async def _serve(self, listener: socket.socket, ready: threading.Event) -> None:
+        """Serve in the background thread until `_end` is set, then leave nothing open."""
+        app = application(self._hub, port=self._port, title=self._title, note=self._note)
+        server = tornado.httpserver.HTTPServer(app)
+        server.add_socket(listener)
+        self._end = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+        ready.set()
+        await self._end.wait()
+        server.stop()
+        await self._hub.close(_FAREWELL_SECONDS)
+        await server.close_all_connections()
+
+
+def _listener(port: int | None) -> socket.socket:
+    """Return a listening socket on this machine's own address; port ``None`` is any free one."""
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        # The port of a viewer that has just ended may be used again at once.
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((HOST, port or 0))
+        listener.listen()
+        listener.setblocking(False)
+    except OSError as error:
+        listener.close()
+        raise InputError(
+            f"port {port} of {HOST} cannot be used ({error.strerror}): choose another, or none to "
+            "let the system pick a free one"
+        ) from error
+    return listener

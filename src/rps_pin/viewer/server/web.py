@@ -1,0 +1,192 @@
+"""The web application behind `LocalViewer`: one page, Meshcat's script, and one WebSocket."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+
+import tornado.web
+import tornado.websocket
+from tornado.iostream import IOStream
+
+from rps_pin.viewer.files.page import WATCH_LAYERS, inline_script, page, viewer_library
+from rps_pin.viewer.server.store import SceneStore
+
+_SOCKET_PATH = "/socket"
+_SCRIPT_PATH = "/meshcat.js"
+_MOST_UNSENT = 20_000
+"""Messages, besides the scene itself, that may wait for one tab: a few megabytes."""
+_GOING_AWAY = 1001
+"""WebSocket status of a server that ends."""
+
+_START = f"""\
+const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+watchLayers(viewer);
+viewer.connect("ws://" + location.host + "{_SOCKET_PATH}");
+viewer.connection.onclose = () => {{
+  document.getElementById("note").textContent =
+    "No connection to the viewer any more; this is the last picture it showed.";
+}};
+"""
+
+
+class Hub:
+    """The open tabs, and the scene that each of them shows. Used by the server's thread alone."""
+
+    def __init__(self, store: SceneStore) -> None:
+        self._store = store
+        self._tabs: set[Tab] = set()
+
+    def publish(self, message: Mapping[str, object], packed: bytes) -> None:
+        """Show a message in every tab and keep it for later ones.
+
+        A tab that has stopped reading is cut off, or its unread messages would fill the memory.
+        """
+        self._store.apply(message, packed)
+        most = _MOST_UNSENT + len(self._store)
+        for tab in list(self._tabs):
+            if tab.unsent < most:
+                tab.show(packed)
+            else:
+                tab.cut()
+
+    def join(self, tab: Tab) -> None:
+        """Show a new tab the scene as it stands, and all that comes."""
+        self._tabs.add(tab)
+        for packed in self._store:
+            tab.show(packed)
+
+    def leave(self, tab: Tab) -> None:
+        """Forget a tab."""
+        self._tabs.discard(tab)
+
+    async def close(self, patience: float) -> None:
+        """Say goodbye to every tab; cut off those that have not answered after `patience` s."""
+        for tab in list(self._tabs):
+            tab.close(_GOING_AWAY, "the viewer has ended")
+        deadline = asyncio.get_running_loop().time() + patience
+        while self._tabs and asyncio.get_running_loop().time() < deadline:
+            await asyncio.sleep(0.01)
+        for tab in list(self._tabs):
+            tab.cut()
+
+
+class _LocalHandler(tornado.web.RequestHandler):
+    """Refuses whatever does not come from a page of this very server.
+
+    A foreign site can make its own name lead to 127.0.0.1 (DNS rebinding), but it cannot make the
+    browser call that name by another in the Host header, nor hide its own in Origin.
+    """
+
+    def prepare(self) -> None:
+        origin = self.request.headers.get("Origin")
+        hosts: frozenset[str] = self.settings["hosts"]
+        if self.request.headers.get("Host") not in hosts or (
+            origin is not None and not self._is_own(origin)
+        ):
+            self.set_status(403)
+            self.finish("This viewer answers to this machine only.")
+
+    def _is_own(self, origin: str) -> bool:
+        return origin in {f"http://{host}" for host in self.settings["hosts"]}
+
+
+class _Text(_LocalHandler):
+    """Serves one text."""
+
+    def initialize(self, content: str, kind: str) -> None:
+        self._content = content
+        self._kind = kind
+
+    def get(self) -> None:
+        self.set_header("Content-Type", f"{self._kind}; charset=utf-8")
+        self.set_header("Cache-Control", "no-store")
+        self.write(self._content)
+
+
+class Tab(_LocalHandler, tornado.websocket.WebSocketHandler):
+    """One browser tab."""
+
+    def initialize(self) -> None:
+        """Start with nothing sent."""
+        self._hub: Hub = self.settings["hub"]
+        self.unsent = 0
+        self._stream: IOStream | None = None
+
+    def check_origin(self, origin: str) -> bool:
+        """Tell whether the page that opens the connection is our own."""
+        return self._is_own(origin)
+
+    def open(self, *args: str, **kwargs: str) -> None:
+        """Join the others."""
+        assert self.ws_connection is not None
+        self._stream = self.ws_connection.stream
+        self._hub.join(self)
+
+    def on_message(self, message: str | bytes) -> None:
+        """Take no notice: a tab has nothing to tell."""
+
+    def on_close(self) -> None:
+        """Leave the others."""
+        self._hub.leave(self)
+
+    def show(self, packed: bytes) -> None:
+        """Send one message."""
+        try:
+            sent = asyncio.ensure_future(self.write_message(packed, binary=True))
+        except tornado.websocket.WebSocketClosedError:
+            self._hub.leave(self)
+            return
+        self.unsent += 1
+        sent.add_done_callback(self._count_sent)
+
+    def cut(self) -> None:
+        """Close the connection without a goodbye."""
+        self._hub.leave(self)
+        if self._stream is not None:
+            self._stream.close()
+
+    def _count_sent(self, sent: asyncio.Future[None]) -> None:
+        self.unsent -= 1
+        # A tab that closed meanwhile is no error; on_close sees to it.
+        if not sent.cancelled():
+            sent.exception()
+
+
+def application(hub: Hub, *, port: int, title: str, note: str) -> tornado.web.Application:
+    """Return the application that serves `hub` on `port` of this machine.
+
+    Parameters
+    ----------
+    hub
+        The scene and its tabs.
+    port
+        The port it is reached on: part of every permitted Host and Origin.
+    title, note
+        Plain text for the page's caption.
+    """
+    names = ("127.0.0.1", "localhost")
+    # A browser leaves the port out of Host where it is HTTP's own.
+    hosts = frozenset(f"{name}:{port}" for name in names) | frozenset(names if port == 80 else ())
+    sockets = " ".join(f"ws://{host}" for host in sorted(hosts))
+    text = page(
+        title=title,
+        note=note,
+        policy=(
+            "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'unsafe-inline'; "
+            f"img-src data: blob:; connect-src {sockets}"
+        ),
+        scripts=f'<script src="{_SCRIPT_PATH}"></script>\n{inline_script(WATCH_LAYERS + _START)}',
+    )
+    return tornado.web.Application(
+        [
+            ("/", _Text, {"content": text, "kind": "text/html"}),
+            (_SCRIPT_PATH, _Text, {"content": viewer_library(), "kind": "text/javascript"}),
+            (_SOCKET_PATH, Tab),
+        ],
+        hosts=hosts,
+        hub=hub,
+        # No line on the terminal for every request.
+        log_function=lambda handler: None,
+        websocket_max_message_size=1024,
+    )

@@ -1,0 +1,162 @@
+"""The page: every table has its rows, every template field is filled, and the committed one."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from pathlib import Path
+
+import pytest
+
+from rps_pin.paper import paper_data as paper
+from rps_pin.paper import reading_tables, tables
+from rps_pin.paper.compute import Reproduction
+from rps_pin.paper.equations import equation_lines
+from rps_pin.paper.figures import pictures
+from rps_pin.paper.page import closest_reading, render
+from rps_pin.paper.printing import between, error, markdown
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "reproduction.md"
+
+
+@pytest.fixture(scope="module")
+def page(found: Reproduction) -> str:
+    return render(found)
+
+
+def rows(table: str) -> list[list[str]]:
+    head, line, *body = [row.strip("| ").split(" | ") for row in table.splitlines()]
+    assert set(line) == {"---"}
+    assert all(row.count("|") == table.splitlines()[0].count("|") for row in table.splitlines())
+    return [head, *body]
+
+
+def test_every_equation_has_its_line_and_none_fails(found: Reproduction) -> None:
+    lines = equation_lines(found)
+    assert [line.number for line in lines] == list(range(1, 30))
+    corrected = {line.number for line in lines if line.status.startswith("corrected")}
+    assert corrected == {5, 11, 12, 14, 16, 19, 29}
+    assert not any("not" in line.status for line in lines)
+    assert len(rows(tables.equations(found))) == 30
+
+
+def test_a_failing_equation_is_told(found: Reproduction) -> None:
+    from dataclasses import replace
+
+    broken = replace(found, checks=found.checks | {"6": 1e-3})
+    assert equation_lines(broken)[5].status == "**not reproduced**"
+    unsure = [one._replace(error_right=0.5) for one in found.misprints]
+    assert equation_lines(replace(found, misprints=unsure))[4].status == "**not corrected**"
+    assert "**not confirmed**" in tables.misprints(replace(found, misprints=unsure))
+
+
+def test_tables_have_their_rows(found: Reproduction) -> None:
+    assert len(rows(tables.misprints(found))) == 1 + 7
+    assert len(rows(tables.statements(found))) == 1 + len(found.statements)
+    assert len(rows(tables.balances(found))) == 1 + 4
+    assert len(rows(tables.table_1())) == 1 + 11
+    assert len(rows(tables.reach(found))) == 1 + len(found.reach)
+    assert len(rows(tables.helix_ranges(found))) == 1 + 6
+    assert len(rows(tables.agreement(found))) == 1 + 7
+    assert rows(tables.table_2())[1][1:] == ["-329", "11", "-422", "509", "95", "426"]
+    assert rows(tables.table_2())[2][1:] == ["-305", "6", "-382", "438", "78", "369"]
+    assert len(rows(reading_tables.grid())) == 1 + 9
+    assert len(rows(reading_tables.probes(found))) == 1 + len(found.probes)
+    assert len(rows(reading_tables.sampled(found))) == 1 + len(found.sampled)
+    assert len(rows(reading_tables.fits(found))) == 1 + 2 * 4
+    assert len(rows(reading_tables.moved(found))) == 1 + 1 + 4
+
+
+def test_the_fates_of_paths_add_up(found: Reproduction) -> None:
+    regular = 0
+    for row in rows(reading_tables.paths(found))[1:]:
+        _, _, _, count, out, singular, *_ = row
+        regular += int(count) - int(out) - int(singular)
+    assert regular == sum(not path.refused for path in found.paths)
+
+
+def test_differences_are_differences(found: Reproduction) -> None:
+    best = closest_reading(found)
+    _, reading, less_paper, less_sokolov = rows(reading_tables.differences(best))
+    assert reading[0] == "the reading"
+    for row, table in ((less_paper, paper.THIS_STUDY), (less_sokolov, paper.SOKOLOV)):
+        for text, ours, theirs in zip(
+            row[1:7], best.relabelled.numbers(), table.numbers(), strict=True
+        ):
+            assert float(text) == pytest.approx(ours - theirs, abs=0.051)
+
+
+def test_the_csv_has_every_reading(found: Reproduction) -> None:
+    lines = list(csv.DictReader(io.StringIO(reading_tables.readings_csv(found))))
+    refused = [path for path in found.paths if path.refused]
+    assert len(lines) == len(found.comparisons) + len(refused)
+    choice = ("z_0", "r_h_p_h", "g_h", "branch", "eq_5", "eq_29", "bodies", "gravity", "eq_14")
+    assert len({tuple(line[name] for name in choice) for line in lines}) == len(lines)
+    distances = [float(line["distance"]) for line in lines if line["distance"]]
+    assert distances == sorted(distances)
+    for line in lines:
+        assert None not in line
+        assert bool(line["refused"]) is not bool(line["distance"])
+
+
+def test_the_page_is_whole(page: str, found: Reproduction) -> None:
+    assert "$" not in page
+    for bad in ("nan", "None", "inf "):
+        assert not re.search(rf"\b{bad}\b", page), bad
+    shown = set(re.findall(r"\]\(reproduction/(\w+)\.png\)", page))
+    assert shown == set(pictures(found))
+    assert "This is a quick run" in page
+
+
+def test_errors_are_bounds() -> None:
+    for value in (0.0, 1e-16, 3e-13, 2e-9, 4e-7, 9e-4):
+        bound = float(error(value).removeprefix("< "))
+        assert value < bound <= max(1e-12, 31 * value)
+    assert error(0.072) == "0.072"
+    assert between([0.002, 0.001]) == "1.000 to 2.000"
+    assert markdown(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
+
+
+# The committed page -------------------------------------------------------------------------------
+
+
+def prose(text: str) -> list[str]:
+    """Return the lines that are no tables, without their numbers."""
+    lines = [line for line in text.splitlines() if not line.startswith("|")]
+    return [
+        re.sub(r"[-+]?\d[\d,.]*(e-?\d+)?", "#", line) for line in lines if "quick run" not in line
+    ]
+
+
+def test_the_committed_page_is_this_template_s(page: str) -> None:
+    committed = PAGE.read_text("utf-8")
+    assert "quick run" not in committed
+    assert [x for x in prose(committed) if x] == [x for x in prose(page) if x]
+
+
+def test_cheap_numbers_of_the_committed_page_are_today_s(found: Reproduction) -> None:
+    committed = PAGE.read_text("utf-8")
+    for table in (
+        tables.misprints(found),
+        tables.balances(found),
+        tables.table_1(),
+        tables.table_2(),
+        reading_tables.grid(),
+    ):
+        assert table in committed
+    for row in found.statements:
+        if "random legs" not in row.found and "volume" not in row.found:
+            assert " | ".join(row) in committed
+
+
+def test_the_committed_pictures_and_readings_are_there_and_small() -> None:
+    folder = PAGE.with_suffix("")
+    shown = re.findall(r"\]\((reproduction/\w+\.\w+)\)", PAGE.read_text("utf-8"))
+    assert {path.name for path in folder.iterdir()} == {Path(name).name for name in shown}
+    assert sum(path.stat().st_size for path in folder.glob("*.png")) < 1_000_000
+    with (folder / "readings.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    refused = sum(bool(line["refused"]) for line in lines)
+    assert len(lines) == 24 * (384 - refused) + refused

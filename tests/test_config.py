@@ -1,0 +1,127 @@
+"""YAML files are data: read safely, bounded, with lines for messages."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from rps_pin import InputError
+from rps_pin.config import LARGEST_FILE, read_yaml
+
+
+def held(folder: Path, content: str | bytes) -> Path:
+    file = folder / "given.yaml"
+    if isinstance(content, bytes):
+        file.write_bytes(content)
+    else:
+        file.write_text(content, "utf-8")
+    return file
+
+
+def test_values_and_their_lines(tmp_path: Path) -> None:
+    file = read_yaml(
+        held(tmp_path, "a: 1\nb:\n  - x: 2\n    y: [1, 2]\n  - {x: 3}\nc: &v [4]\nd: *v\n"), "file"
+    )
+    assert file.values == {"a": 1, "b": [{"x": 2, "y": [1, 2]}, {"x": 3}], "c": [4], "d": [4]}
+    lines = {
+        ("a",): 1,
+        ("b",): 2,
+        ("b", 0): 3,
+        ("b", 0, "y"): 4,
+        ("b", 0, "y", 1): 4,
+        ("b", 1, "x"): 5,
+        ("b", 1, "none"): 5,  # what is not there is told by what is around
+        ("b", 7): 2,
+        ("c",): 6,
+        ("d",): 7,
+    }
+    for path, line in lines.items():
+        assert file.place(path) == f"{tmp_path / 'given.yaml'}, line {line}"
+    assert file.place(()) == str(tmp_path / "given.yaml")
+
+
+def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
+    assert read_yaml(held(tmp_path, "\ufeffa: 1\n"), "file").values == {"a": 1}
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        ("", "must hold 'key: value' lines; it holds nothing"),
+        ("# only a comment\n", "it holds nothing"),
+        ("- a\n- b\n", "it holds a list"),
+        ("word\n", "it holds a str"),
+        ("a: 1\nb: [1\n", "line 3: not valid YAML"),
+        ("a: 1\nb: 2\na: 3\n", "line 3: not valid YAML: .*found duplicate key"),
+        ("a: 1\n2: 3\n", "line 2: the key '2' must be text"),
+        ("a: 1\n? [1, 2]\n: 3\n", "line 2: a key must be text"),
+        ("a:\n  [[[]]]: 1\n", "line 2: a key must be text"),
+        ("a: 1\nb: !!python/object/apply:os.getcwd []\n", "line 2: not valid YAML: could not det"),
+        ("a: !!python/name:os.system\n", "line 1: not valid YAML"),
+        ("a: *nowhere\n", "line 1: not valid YAML: found undefined alias"),
+        ("a: 1\n---\nb: 2\n", "line 2: not valid YAML: .*but found another document"),
+        ("a: \x07\n", "not valid YAML"),
+        (b"\xff\xfe\x00\x01", "cannot read the file .*: not a UTF-8 text"),
+        (b"\x7fELF\x02\x01\x01\x00\x00", "not valid YAML|not a UTF-8"),
+        ("a: !!float word\n", "not valid YAML"),
+        ("a: !!timestamp 2020-99-99\n", "not valid YAML"),
+    ],
+)
+def test_what_is_no_mapping_is_refused(content: str | bytes, why: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=why) as caught:
+        read_yaml(held(tmp_path, content), "file")
+    assert "\n" not in str(caught.value)
+    assert "given.yaml" in str(caught.value)
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"cannot read the file .*none\.yaml: No such file"):
+        read_yaml(tmp_path / "none.yaml", "file")
+    with pytest.raises(InputError, match=r"cannot read the file .*directory"):
+        read_yaml(tmp_path, "file")
+    with pytest.raises(InputError, match="given by its path, not by 3"):
+        read_yaml(3, "file")
+    with pytest.raises(InputError, match="cannot read"):
+        read_yaml("a\0b", "file")
+
+
+def bomb(levels: int) -> str:
+    """Ten of ten of ten ...: each list names the one before ten times."""
+    lines = ["a0: &a0 [ha, ha, ha, ha, ha, ha, ha, ha, ha, ha]"]
+    for level in range(1, levels):
+        lines.append(f"a{level}: &a{level} [{', '.join([f'*a{level - 1}'] * 10)}]")
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (bomb(40), "would unfold to more than"),
+        ("a: &a [*a]\n", "would unfold to more than"),
+        ("a: &a\n  b: *a\n", "would unfold to more than"),
+        ("a: " + "[" * 50_000, "nested too deeply"),
+        ("a: " + "{b: " * 20_000, "nested too deeply"),
+        ("a: " + "- " * 50_000, "not valid YAML"),
+        ("x" * (LARGEST_FILE + 1), f"more than {LARGEST_FILE} bytes"),
+    ],
+    ids=["bomb", "list in itself", "mapping in itself", "lists", "mappings", "dashes", "long"],
+)
+def test_huge_things_are_refused_at_once(content: str, why: str, tmp_path: Path) -> None:
+    start = time.perf_counter()
+    with pytest.raises(InputError, match=why):
+        read_yaml(held(tmp_path, content), "file")
+    assert time.perf_counter() - start < 60
+
+
+def test_a_file_without_an_end_is_refused() -> None:
+    if not Path("/dev/zero").exists():
+        pytest.skip("this system has no endless file")
+    with pytest.raises(InputError, match="more than"):
+        read_yaml("/dev/zero", "file")
+
+
+def test_modest_aliases_and_merges_are_read(tmp_path: Path) -> None:
+    text = "base: &b {x: 1}\nmore: {<<: *b, y: 2}\n" + bomb(3)
+    assert read_yaml(held(tmp_path, text), "file").values["more"] == {"x": 1, "y": 2}
