@@ -94,16 +94,9 @@ def real_array(
         The last dimensions.
     """
     wanted = f"(..., {', '.join(map(str, ending))})" if ending else "(...)"
-    wanted += meaning and f": {meaning}"
-    try:
-        given = np.asarray(value)
-    except ValueError:  # ragged
-        raise InputError(f"{name} must be numbers of shape {wanted}") from None
-    if given.dtype.kind not in "iuf":
-        raise InputError(f"{name} = {shown(value)}: it must be numbers of shape {wanted}")
-    if given.ndim < len(ending) or given.shape[given.ndim - len(ending) :] != ending:
-        raise InputError(f"{name} has shape {given.shape}; it must be {wanted}")
-    array = given.astype(np.float64, copy=False)
+    array = _numbers(value, name, f"numbers of shape {wanted}{meaning and f': {meaning}'}")
+    if array.ndim < len(ending) or array.shape[array.ndim - len(ending) :] != ending:
+        raise InputError(f"{name} has shape {array.shape}; it must be {wanted}")
     refuse_not_finite(array, name)
     return array
 
@@ -117,10 +110,22 @@ def real_vector(value: ArrayLike, size: int, name: str) -> Array:
         and math.isfinite(dasum(value))
     ):
         return value
-    array = real_array(value, name)
+    array = _numbers(value, name, f"{size} numbers")
     if array.shape != (size,):
         raise InputError(f"{name} has shape {array.shape}; it must be ({size},)")
+    refuse_not_finite(array, name)
     return array
+
+
+def _numbers(value: ArrayLike, name: str, wanted: str) -> Array:
+    """Return a value as float64; ragged, complex, truth and text values are refused."""
+    try:
+        given = np.asarray(value)
+    except ValueError:  # ragged
+        raise InputError(f"{name} must be {wanted}") from None
+    if given.dtype.kind not in "iuf":
+        raise InputError(f"{name} must be {wanted}; it is {shown(value)}")
+    return given.astype(np.float64, copy=False)
 
 
 def refuse_not_finite(array: Array, name: str) -> None:

@@ -37,8 +37,8 @@ from rps_pin.closed_loop.io.parts import MechanismParts
 from rps_pin.closed_loop.io.urdf import model_from_urdf
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import InputError
+from rps_pin.validation import real_vector
 
 
 class ClosedLoopModel(ClosedLoopDynamics):
@@ -110,7 +110,7 @@ class ClosedLoopModel(ClosedLoopDynamics):
             If it is no URDF, or as for the class.
         """
         model = model_from_urdf(path_or_xml)
-        model.gravity.linear = checked_vector(gravity, 3, "gravity")
+        model.gravity.linear = real_vector(gravity, 3, "gravity")
         return cls(model, closures, actuated, **options)
 
     @classmethod
@@ -215,7 +215,7 @@ class ClosedLoopModel(ClosedLoopDynamics):
         ClosureError
             If the loops do not close from `home`.
         """
-        return describe(self, None if q is None else checked_vector(q, self.model.nq, "q"))
+        return describe(self, None if q is None else real_vector(q, self.model.nq, "q"))
 
     # Wrenches -------------------------------------------------------------------------------------
 
@@ -232,8 +232,8 @@ class ClosedLoopModel(ClosedLoopDynamics):
         constraint_forces
             lambda, shape (nc,), as `inverse_dynamics` returns it.
         """
-        multipliers = checked_vector(constraint_forces, self.constraint_size, "constraint_forces")
-        return closure_wrenches(self._loops, checked_vector(q, self.model.nq, "q"), multipliers)
+        multipliers = real_vector(constraint_forces, self.constraint_size, "constraint_forces")
+        return closure_wrenches(self._loops, real_vector(q, self.model.nq, "q"), multipliers)
 
     def joint_wrenches(
         self,
@@ -329,7 +329,7 @@ class ClosedLoopModel(ClosedLoopDynamics):
         SingularityError
             If these joints do not determine the motion here, or a motion moves no mass.
         """
-        q_, v_ = checked_vector(q, self.model.nq, "q"), checked_vector(v, self.model.nv, "v")
+        q_, v_ = real_vector(q, self.model.nq, "q"), real_vector(v, self.model.nv, "v")
         a = self.forward_dynamics(q_, v_, tau, wrenches=wrenches)
         multipliers = self.constraint_forces(q_, v_, a, tau, wrenches=wrenches)
         basis, chosen = self.motion_basis(q_, independent), self._independent(independent)

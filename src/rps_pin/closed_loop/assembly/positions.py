@@ -14,8 +14,8 @@ from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 from rps_pin.closed_loop.assembly.nearest import NearestSearch
 from rps_pin.closed_loop.constraints.closures import Closure, frame_id
 from rps_pin.closed_loop.constraints.loops import LoopErrors, Loops, refuse_twice
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import ClosureError, InputError, MechanismError
+from rps_pin.validation import real_vector
 
 #: A loop counts as closed below this gap, in units of the characteristic length.
 _CLOSED = 1e-12
@@ -125,7 +125,7 @@ class ClosedLoopPositions:
 
         An angle between closed frames counts with the characteristic length as its lever.
         """
-        return self._loops.worst(self._loops.gaps(checked_vector(q, self.model.nq, "q")))[0]
+        return self._loops.worst(self._loops.gaps(real_vector(q, self.model.nq, "q")))[0]
 
     def close(
         self,
@@ -237,14 +237,12 @@ class ClosedLoopPositions:
         """
         q = self._normal(self._home if q_guess is None else q_guess, "q_guess")
         if not isinstance(values, Mapping):
-            given = checked_vector(values, len(self.actuated), "values")
+            given = real_vector(values, len(self.actuated), "values")
             values = dict(zip(self.actuated, given, strict=True))
         self._velocity_indices(list(values), "to give a value")
         for name, value in values.items():
             joint = self.model.joints[self.model.getJointId(name)]
-            of_joint = checked_vector(
-                np.atleast_1d(value), joint.nq, f"the value of joint {name!r}"
-            )
+            of_joint = real_vector(np.atleast_1d(value), joint.nq, f"the value of joint {name!r}")
             q[joint.idx_q : joint.idx_q + joint.nq] = of_joint
         return self.close(q, fixed=list(values), within_limits=within_limits)
 
@@ -300,14 +298,14 @@ class ClosedLoopPositions:
     ) -> tuple[Array, Array, Array]:
         """Return q, v and a as finite arrays of the right shapes."""
         return (
-            checked_vector(q, self.model.nq, "q"),
-            checked_vector(v, self.model.nv, "v"),
-            checked_vector(a, self.model.nv, "a"),
+            real_vector(q, self.model.nq, "q"),
+            real_vector(v, self.model.nv, "v"),
+            real_vector(a, self.model.nv, "a"),
         )
 
     def _normal(self, q: ArrayLike, name: str) -> Array:
         """Return a checked configuration with quaternions of unit length."""
-        normal: Array = pin.normalize(self.model, checked_vector(q, self.model.nq, name))
+        normal: Array = pin.normalize(self.model, real_vector(q, self.model.nq, name))
         if not pin.isNormalized(self.model, normal, 1e-9):
             raise InputError(f"{name} holds a quaternion of no length: it is no orientation")
         return normal

@@ -31,8 +31,8 @@ from rps_pin.closed_loop.dynamics.passive_joint_forces import (
     refuse_springs,
 )
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, checked_wrench, generalised_force
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import InputError, MechanismError
+from rps_pin.validation import real_vector
 
 _INFINITY = math.inf
 #: How many times the forces of the tree no well conditioned closure carries.
@@ -189,7 +189,7 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         sense: exact where a is what `forward_dynamics` returns.
         """
         rest = self.generalised_force(q, v, a, wrenches=wrenches)
-        rest[self._actuated] -= checked_vector(tau, self._actuated.size, "tau")
+        rest[self._actuated] -= real_vector(tau, self._actuated.size, "tau")
         rows, columns = self._loops.row_scale, self._loops.column_scale
         jacobian = self._scaled(self._loops.jacobian(np.asarray(q, dtype=np.float64)))
         scaled: Array = rows * least_norm(jacobian.T, columns * rest)
@@ -230,8 +230,8 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
         MechanismError
             If ``"proximal"`` does not apply.
         """
-        q_, v_ = checked_vector(q, self.model.nq, "q"), checked_vector(v, self.model.nv, "v")
-        tau_ = checked_vector(tau, self._actuated.size, "tau")
+        q_, v_ = real_vector(q, self.model.nq, "q"), real_vector(v, self.model.nv, "v")
+        tau_ = real_vector(tau, self._actuated.size, "tau")
         if method == "proximal":
             return self._proximal_dynamics(q_, v_, tau_, wrenches)
         if method != "reduced":
@@ -262,7 +262,7 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
 
     def gravity_forces(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
         """Return the forces T' g at the independent joints that carry the weight, shape (m,)."""
-        q_ = checked_vector(q, self.model.nq, "q")
+        q_ = real_vector(q, self.model.nq, "q")
         basis = self.motion_basis(q_, independent)
         weight = pin.computeGeneralizedGravity(self.model, self._loops.data, q_)
         forces: Array = basis.T @ weight
@@ -270,7 +270,7 @@ class ClosedLoopDynamics(ClosedLoopKinematics):
 
     def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
         """Return kinetic energy, rotors included, and potential energy, springs included, J."""
-        q_, v_ = checked_vector(q, self.model.nq, "q"), checked_vector(v, self.model.nv, "v")
+        q_, v_ = real_vector(q, self.model.nq, "q"), real_vector(v, self.model.nv, "v")
         kinetic = float(v_ @ self._tree_mass(q_) @ v_) / 2  # with armature, unlike Pinocchio's own
         potential = pin.computePotentialEnergy(self.model, self._loops.data, q_)
         if self.effects is not None:

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import InputError
+from rps_pin.validation import real_vector
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class ForceBound:
             full[row] = 1.0
             return full
         count = 3 if len(self.direction) == 3 <= size else size
-        full[:count] = checked_vector(self.direction, count, f"direction of {self.name}")
+        full[:count] = real_vector(self.direction, count, f"direction of {self.name}")
         if not full.any():
             raise InputError(f"direction of {self.name} has no length")
         return full
@@ -127,7 +127,7 @@ def friction_pyramid(
         raise InputError(f"friction = {friction}: it must be finite and not negative")
     if sides < 3:
         raise InputError(f"sides = {sides}: a pyramid has at least 3")
-    up = checked_vector(normal, 3, "normal")
+    up = real_vector(normal, 3, "normal")
     if not np.linalg.norm(up) > 0:
         raise InputError("normal has no length")
     up = up / np.linalg.norm(up)

@@ -39,9 +39,9 @@ from rps_pin.closed_loop.dynamics.least_effort import (
 )
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import InfeasibleError, InputError, LimitExcess
 from rps_pin.numerics.quadratic_program import LeastDistance, NearestPoint, least_violation
+from rps_pin.validation import real_vector
 
 TorqueLimits = Literal["model"] | float | ArrayLike | tuple[ArrayLike, ArrayLike] | None
 
@@ -173,7 +173,7 @@ class ForceDistribution:
         jacobian = self.mechanism.jacobian(q)
         aim = np.zeros(self.weights.size)
         if preferred is not None:
-            aim = checked_vector(preferred, aim.size, "preferred")
+            aim = real_vector(preferred, aim.size, "preferred")
         factors = _Factors(*full_svd(self._scale * jacobian))
         effort, free = self._unlimited(factors, force, aim)
         names: tuple[str, ...] = ()

@@ -20,8 +20,8 @@ from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.constraints.loops import refuse_twice
 from rps_pin.closed_loop.dynamics.inverse_dynamics import allowed_motions, condition_number
 from rps_pin.closed_loop.dynamics.passive_factors import PassiveSolver
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import ClosureError, InputError, SingularityError
+from rps_pin.validation import real_vector
 
 #: Past this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
 #: machine is built well enough to know its forces.
@@ -57,7 +57,7 @@ class ClosedLoopKinematics(ClosedLoopPositions):
 
     def jacobian(self, q: ArrayLike) -> Array:
         """Return J, shape (nc, nv): the rates of the closures' rows are J v (see `rows`)."""
-        return self._loops.jacobian(checked_vector(q, self.model.nq, "q")).copy()
+        return self._loops.jacobian(real_vector(q, self.model.nq, "q")).copy()
 
     def allowed_motions(self, q: ArrayLike) -> Array:
         """Return a basis N of the velocities that keep the loops closed, shape (nv, mobility).
@@ -66,7 +66,7 @@ class ClosedLoopKinematics(ClosedLoopPositions):
         `characteristic_length`.
         """
         scale = self._loops.column_scale
-        jacobian = self._scaled(self._loops.jacobian(checked_vector(q, self.model.nq, "q")))
+        jacobian = self._scaled(self._loops.jacobian(real_vector(q, self.model.nq, "q")))
         return scale[:, None] * allowed_motions(jacobian)
 
     def motion_basis(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
@@ -86,7 +86,7 @@ class ClosedLoopKinematics(ClosedLoopPositions):
         """
         chosen = self._independent(independent)
         if chosen is self._actuated:
-            jacobian = self._loops.jacobian(checked_vector(q, self.model.nq, "q"))
+            jacobian = self._loops.jacobian(real_vector(q, self.model.nq, "q"))
             solved = self._solver.solve(jacobian, jacobian.take(chosen, axis=1))
             if solved is not None:
                 return self._basis(solved)
@@ -145,7 +145,7 @@ class ClosedLoopKinematics(ClosedLoopPositions):
         jacobian = pin.computeFrameJacobian(
             self.model,
             self._loops.data,
-            checked_vector(q, self.model.nq, "q"),
+            real_vector(q, self.model.nq, "q"),
             self._frame(frame),
             reference,
         )
@@ -180,9 +180,9 @@ class ClosedLoopKinematics(ClosedLoopPositions):
         ClosureError
             If no motion of the mechanism has these velocities (more joints than mobility).
         """
-        q_ = checked_vector(q, self.model.nq, "q")
+        q_ = real_vector(q, self.model.nq, "q")
         given = self._independent(independent)
-        rates = checked_vector(v_actuated, given.size, "v_actuated")
+        rates = real_vector(v_actuated, given.size, "v_actuated")
         still = np.zeros(self.constraint_size)
         return self._complete(self._loops.jacobian(q_), given, rates, still)
 
@@ -211,10 +211,10 @@ class ClosedLoopKinematics(ClosedLoopPositions):
         SingularityError, ClosureError
             As `velocity`; also if v itself opens the loops.
         """
-        q_ = checked_vector(q, self.model.nq, "q")
-        v_ = checked_vector(v, self.model.nv, "v")
+        q_ = real_vector(q, self.model.nq, "q")
+        v_ = real_vector(v, self.model.nv, "v")
         given = self._independent(independent)
-        accelerations = checked_vector(a_actuated, given.size, "a_actuated")
+        accelerations = real_vector(a_actuated, given.size, "a_actuated")
         drift = self._loops.drift(q_, v_)
         jacobian = self._loops.jacobian(q_)
         opening = float(np.abs(self._loops.row_scale * (jacobian @ v_)).max(initial=0.0))
@@ -235,7 +235,7 @@ class ClosedLoopKinematics(ClosedLoopPositions):
         constraint singularity). Its inverse is the relative distance to the nearest singular
         matrix, a number between 0 and 1.
         """
-        jacobian = self._loops.jacobian(checked_vector(q, self.model.nq, "q"))
+        jacobian = self._loops.jacobian(real_vector(q, self.model.nq, "q"))
         return self._condition(jacobian)
 
     # Inner workings -------------------------------------------------------------------------------

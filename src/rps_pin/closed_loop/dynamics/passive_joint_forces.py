@@ -20,8 +20,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import InputError, MechanismError
+from rps_pin.validation import real_vector
 
 #: rad/s or m/s.
 FRICTION_SPEED = 1e-2
@@ -59,7 +59,7 @@ class JointEffects:
     def __post_init__(self) -> None:
         size = np.size(self.damping)
         for name in ("damping", "friction", "stiffness", "rest"):
-            array = checked_vector(getattr(self, name), size, name).copy()
+            array = real_vector(getattr(self, name), size, name).copy()
             if name != "rest" and (array < 0).any():
                 raise InputError(f"{name} must not be negative: entry {int(array.argmin())} is")
             array.setflags(write=False)

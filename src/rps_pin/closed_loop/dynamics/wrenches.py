@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.loops import Loops
-from rps_pin.closed_loop.vectors import checked_vector
+from rps_pin.validation import real_vector
 
 Wrenches = Mapping[str, ArrayLike]
 
@@ -34,7 +34,7 @@ def generalised_force(
 
 def checked_wrench(value: ArrayLike, frame: str) -> Array:
     """Return a wrench as a finite array (6,)."""
-    return checked_vector(value, 6, f"the wrench at frame {frame!r}")
+    return real_vector(value, 6, f"the wrench at frame {frame!r}")
 
 
 def closure_wrenches(loops: Loops, q: Array, multipliers: Array) -> dict[str, Array]:

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.editing.joint_properties import copy_joint_properties
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import InputError, MechanismError
+from rps_pin.validation import real_vector
 
 #: Between a part's name and its own names.
 SEPARATOR = "/"
@@ -117,7 +117,7 @@ def body(
     """
     if not isinstance(mass, (int, float)) or not 0 < mass < np.inf:
         raise InputError(f"body {name!r}: mass = {mass!r} must be positive and finite")
-    own = pin.Inertia(float(mass), checked_vector(com, 3, "com"), _checked_inertia(name, inertia))
+    own = pin.Inertia(float(mass), real_vector(com, 3, "com"), _checked_inertia(name, inertia))
     model = pin.Model()
     model.name = name
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), FREE_JOINT)

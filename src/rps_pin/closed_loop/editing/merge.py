@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.editing.joint_properties import copy_joint_properties
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import MechanismError
+from rps_pin.validation import real_vector
 
 MergedKind = Literal["spherical", "universal"]
 
@@ -142,7 +142,7 @@ def merged_configuration(model: pin.Model, merges: Sequence[JointMerge], q: Arra
     MechanismError
         As for `merged`.
     """
-    q = checked_vector(q, model.nq, "q")
+    q = real_vector(q, model.nq, "q")
     rows = {row[-1]: row for row in (_row(model, merge) for merge in merges)}
     dropped = {joint for row in rows.values() for joint in row[:-1]}
     values = []

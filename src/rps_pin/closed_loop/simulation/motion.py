@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.manifold import ClosedManifold
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import ClosureError, InputError, SingularityError
+from rps_pin.validation import real_vector
 
 if TYPE_CHECKING:
     from rps_pin.closed_loop.model import ClosedLoopModel
@@ -45,14 +45,14 @@ class Drive:
             raise InputError("give a controller or constant forces tau, not both")
         self._controller, self._size = controller, mechanism.actuated_indices.size
         given = np.zeros(self._size) if tau is None else tau
-        self.tau = checked_vector(given, self._size, "tau").copy()
+        self.tau = real_vector(given, self._size, "tau").copy()
         self._wrenches = wrenches
 
     def command(self, time: float, q: Array, v: Array) -> None:
         """Ask the controller, which gets copies of the state."""
         if self._controller is not None:
             answer = self._controller(time, q.copy(), v.copy())
-            self.tau = checked_vector(answer, self._size, "the controller's tau").copy()
+            self.tau = real_vector(answer, self._size, "the controller's tau").copy()
 
     def wrenches(self, time: float, q: Array, v: Array) -> Wrenches | None:
         """Return the wrenches that act now."""
@@ -111,8 +111,8 @@ def refuse_infinite(q: Array, v: Array) -> None:
 def closed_start(mechanism: ClosedLoopModel, q: ArrayLike, v: ArrayLike | None) -> State:
     """Return the initial state closed to rounding error, or say how far open it is."""
     nv = mechanism.model.nv
-    q_ = checked_vector(q, mechanism.model.nq, "q")
-    v_ = np.zeros(nv) if v is None else checked_vector(v, nv, "v")
+    q_ = real_vector(q, mechanism.model.nq, "q")
+    v_ = np.zeros(nv) if v is None else real_vector(v, nv, "v")
     gap = mechanism.loop_gap(q_)
     if not gap <= OPEN * max(1.0, mechanism.characteristic_length):
         raise ClosureError(

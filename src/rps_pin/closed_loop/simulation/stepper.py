@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.integrators import rk4_step
 from rps_pin.closed_loop.simulation.motion import Drive, Motion, WrenchesInTime, closed_start
-from rps_pin.closed_loop.vectors import checked_vector
 from rps_pin.errors import InputError
+from rps_pin.validation import real_vector
 
 if TYPE_CHECKING:
     from rps_pin.closed_loop.model import ClosedLoopModel
@@ -85,7 +85,7 @@ class Stepper:
             raise InputError(f"duration = {duration}: it must be positive and finite")
         if not isinstance(steps, Integral) or isinstance(steps, bool) or steps < 1:
             raise InputError(f"steps = {steps!r}: it must be a whole number, 1 or more")
-        self._drive.tau = checked_vector(tau, self._drive.tau.size, "tau").copy()
+        self._drive.tau = real_vector(tau, self._drive.tau.size, "tau").copy()
         motion, step = self._motion, duration / steps
         start, state, gap = self.time, (self.q, self.v), self.gap
         with np.errstate(over="ignore", invalid="ignore"):  # refused in words
