@@ -18,12 +18,8 @@ from rps_pin.control import (
     Gains,
     PDControl,
     effective_inertia,
-    exponential_map,
-    place,
-    reading,
-    scalar_rates,
-    scalar_state,
 )
+from rps_pin.control.estimator import exponential_map, place, reading, scalar_rates, scalar_state
 from rps_pin.numerics.compiled import COMPILES
 from rps_pin.rps.kinematics import tracking as scalar_tracking
 

@@ -21,7 +21,7 @@ from tornado.websocket import websocket_connect
 from rps_pin import RPSRobot
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.viewer import LiveView, LocalViewer, Recorder, Scene
-from rps_pin.viewer.server.local_viewer import live_view
+from rps_pin.viewer.server import live_view
 
 POSE = (0.22, 0.0, 0.0)
 PLATFORM = "/world/robot/platform"

@@ -21,7 +21,7 @@ from tornado.websocket import websocket_connect
 
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.viewer import LocalViewer, RawCommand, Scene, play
-from rps_pin.viewer.server.local_viewer import web
+from rps_pin.viewer.server import web
 
 ROOT = Path(__file__).parents[2]
 
