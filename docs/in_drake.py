@@ -31,7 +31,7 @@ def main() -> None:
     simulator, largest = Simulator(plant, context), gap(plant, context, pairs)
     for k in range(task["ticks"]):
         simulator.AdvanceTo((k + 1) * task["step"])
-        largest = max(largest, gap(plant, context, pairs))
+        largest = float(np.max([largest, gap(plant, context, pairs)]))
     platform = plant.GetBodyByName("platform")
     begin = platform.floating_velocities_start_in_v()
     print(json.dumps({"gap": largest, "platform": np.abs(held[begin : begin + 6]).max()}))
@@ -68,7 +68,7 @@ def gap(plant: MultibodyPlant, context: Any, pairs: list[Any]) -> float:
     between = [
         plant.CalcRelativeTransform(context, a.body_frame(), b.body_frame()) for a, b in pairs
     ]
-    return max(float(np.linalg.norm(one.translation())) for one in between)
+    return float(np.max([np.linalg.norm(one.translation()) for one in between]))
 
 
 if __name__ == "__main__":

@@ -113,7 +113,7 @@ def our(mechanism: ClosedLoopModel, robot: RPSRobot, step: float, **options: Any
         began = time.process_time()
         motion = simulate(mechanism, q, v, duration=DURATION, step=step, **options)
         spent = min(spent, time.process_time() - began)
-    gap = max(mechanism.loop_gap(q) for q in motion.q)
+    gap = float(np.max([mechanism.loop_gap(q) for q in motion.q]))
     name = options.get("closing") or "projection"
     name = f"rps_pin, {options.get('method', 'rk4')}, {name}"
     return Result(name, step, gap, drift(motion.kinetic, motion.energy), spent / DURATION / 1e3)
@@ -147,7 +147,7 @@ def _in_mujoco(
         spent += time.process_time() - began
         # `data` still holds the placements, and the energies, of the step's start.
         apart = data.site_xpos[ends[:, 0]] - data.site_xpos[ends[:, 1]]
-        gap = max(gap, float(np.linalg.norm(apart, axis=1).max()))
+        gap = float(np.max([gap, *np.linalg.norm(apart, axis=1)]))
         energies.append(data.energy.copy())
     potential, kinetic = np.array(energies).T
     settings = "stiffest solref" if stiff else "default solref"

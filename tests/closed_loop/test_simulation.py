@@ -30,6 +30,7 @@ from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.errors import ClosureError, InputError, SingularityError
 from tests.closed_loop.mechanisms import ALL, FOUR_BAR, GRAVITY, joint, link, robot, state
+from tests.worst import worst
 
 Array = NDArray[np.float64]
 State = tuple[Array, Array]
@@ -136,7 +137,7 @@ def drift(motion: Simulation) -> float:
 
 
 def widest(mechanism: ClosedLoopModel, motion: Simulation, every: int = 1) -> float:
-    return max(mechanism.loop_gap(q) for q in motion.q[::every])
+    return worst([mechanism.loop_gap(q) for q in motion.q[::every]])
 
 
 # Ten seconds at a millisecond ---------------------------------------------------------------------

@@ -17,6 +17,7 @@ from scipy.optimize import linprog, nnls
 
 from rps_pin import ClosedLoopModel
 from tests.closed_loop import mechanisms
+from tests.worst import worst
 
 Array = NDArray[np.float64]
 
@@ -104,4 +105,6 @@ class Distribution:
         pairs = zip(self.limits, beyond, strict=True)
         held = [row @ ways for (row, _), by in pairs if by > -1e-7 * scale]
         left = np.linalg.norm(slope) if not held else nnls(np.array(held).T, slope)[1]
-        return Quality(float(missing), max([0.0, *beyond]) / scale, float(left / size))
+        return Quality(
+            float(missing), worst(np.maximum(beyond, 0.0), 0.0) / scale, float(left / size)
+        )

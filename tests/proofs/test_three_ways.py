@@ -17,6 +17,7 @@ from rps_pin.rps.motion.time_optimal import time_optimal
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from tests.reference import newton_euler as ne
 from tests.strategies import Motion, random_motions, random_parameters
+from tests.worst import worst
 
 Array = NDArray[np.float64]
 
@@ -60,12 +61,12 @@ def disagreements(robot: RPSRobot, motion: Motion) -> tuple[dict[str, float], in
     }
     size = np.abs(ways["newton-euler"]).max(axis=-1)
     names = list(ways)
-    worst = {
+    apart = {
         f"{one} - {other}": float((np.abs(ways[one] - ways[other]).max(axis=-1) / size).max())
         for index, one in enumerate(names)
         for other in names[index + 1 :]
     }
-    return worst, int((~kept).sum())
+    return apart, int((~kept).sum())
 
 
 @pytest.mark.parametrize("tilted_gravity", [False, True], ids=["vertical", "tilted gravity"])
@@ -80,9 +81,9 @@ def test_three_ways_agree_on_2500_states_of_50_random_robots(
     for _ in range(robots):
         parameters = random_parameters(rng, heavy_rods=heavy_rods, tilted_gravity=tilted_gravity)
         motion = random_motions(rng, parameters, states)
-        worst, left_out = disagreements(RPSRobot(parameters), motion)
+        apart, left_out = disagreements(RPSRobot(parameters), motion)
         skipped += left_out
-        largest = {name: max(largest.get(name, 0.0), value) for name, value in worst.items()}
+        largest = {name: worst(largest.get(name, 0.0), value) for name, value in apart.items()}
     print({name: f"{value:.1e}" for name, value in largest.items()}, f"skipped: {skipped}")
     assert skipped < 0.01 * robots * states
     assert {name: value for name, value in largest.items() if not value < AGREEMENT} == {}
@@ -95,10 +96,10 @@ def test_three_ways_agree_along_helices(name: str, branch: str) -> None:
     preset, radius, pitch, height = HELICES[name]
     robot = RPSRobot.from_preset(preset)
     path = helix(robot, radius=radius, pitch=pitch, height=height, branch=branch)
-    worst, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)))
-    print({key: f"{value:.1e}" for key, value in worst.items()}, f"skipped: {skipped}")
+    apart, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)))
+    print({key: f"{value:.1e}" for key, value in apart.items()}, f"skipped: {skipped}")
     assert skipped <= 5
-    assert {key: value for key, value in worst.items() if not value < AGREEMENT} == {}
+    assert {key: value for key, value in apart.items() if not value < AGREEMENT} == {}
 
 
 @pytest.mark.parametrize("fastest", [False, True], ids=["as it is", "fastest"])
@@ -110,9 +111,9 @@ def test_three_ways_agree_along_every_trajectory_the_documentation_shows(
     path = load_trajectory(file, robot)
     if fastest:
         path = time_optimal(robot, path)
-    worst, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)))
+    apart, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)))
     assert skipped == 0
-    assert {key: value for key, value in worst.items() if not value < AGREEMENT} == {}
+    assert {key: value for key, value in apart.items() if not value < AGREEMENT} == {}
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from rps_pin.closed_loop.dynamics.force_distribution import ForceDistribution
 from rps_pin.closed_loop.editing.compose import Part, body, compose
 from tests.closed_loop import mechanisms
 from tests.proofs import common, optima, robot_data
+from tests.worst import worst
 
 Array = NDArray[np.float64]
 
@@ -258,7 +259,7 @@ def test_torque_limits_hold_and_the_rest_is_the_best_there_is(seed: int) -> None
     found = ForceDistribution(two_arms(), torque_limits=limit).solve(q, v, a)
     assert np.abs(found.tau).max() <= limit * (1 + 1e-9)
     assert found.at_limit
-    assert max(problem.quality(found.tau, found.constraint_forces)) < 1e-8
+    assert worst(*problem.quality(found.tau, found.constraint_forces)) < 1e-8
     check_balance(q, v, a, found.tau, found.constraint_forces)
     back = two_arms().forward_dynamics(q, v, found.tau)
     np.testing.assert_allclose(back, a, rtol=0, atol=1e-9 * np.abs(a).max())
@@ -295,7 +296,7 @@ def test_pressing_the_bar_with_at_least_40_newton() -> None:
     assert wrenches["right grip"][1] == pytest.approx(-40.0, rel=1e-9)  # at rest, weight along z
     problem = optima.Distribution(two_arms(), q, v, a)
     problem.limit_forces(np.eye(12)[two_arms().rows("left grip").start + 1], 40.0)
-    assert max(problem.quality(found.tau, found.constraint_forces)) < 1e-8
+    assert worst(*problem.quality(found.tau, found.constraint_forces)) < 1e-8
     check_balance(q, v, a, found.tau, found.constraint_forces)
 
 
@@ -318,4 +319,4 @@ def test_torques_near_to_those_preferred() -> None:
     found = ForceDistribution(two_arms(), torque_limits=60.0).solve(q, v, a, preferred=wish)
     problem = optima.Distribution(two_arms(), q, v, a)
     problem.limit_torques(60.0)
-    assert max(problem.quality(found.tau, found.constraint_forces, preferred=wish)) < 1e-8
+    assert worst(*problem.quality(found.tau, found.constraint_forces, preferred=wish)) < 1e-8

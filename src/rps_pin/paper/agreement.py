@@ -118,9 +118,8 @@ def _agreement(robot: RPSRobot, pose: Array, rate: Array, acceleration: Array) -
 
 def _joined(parts: list[Agreement]) -> Agreement:
     states, left_out = sum(p.states for p in parts), sum(p.left_out for p in parts)
-    return Agreement(
-        states, left_out, *(max(column) for column in list(zip(*parts, strict=True))[2:])
-    )
+    largest = np.max([part[2:] for part in parts], axis=0)  # NaN if one is
+    return Agreement(states, left_out, *map(float, largest))
 
 
 def _random_parameters(rng: np.random.Generator) -> RPSParameters:
