@@ -25,6 +25,7 @@ from PIL import Image
 from rps_pin import RPSRobot
 from rps_pin.control import ComputedTorque, Gains
 from rps_pin.trajectories import PathSample, circle
+from tests.processes import start
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 NAMES = sorted(path.name for path in EXAMPLES.glob("*.py"))
@@ -46,14 +47,12 @@ class Example:
 
     def start(self, name: str, *options: str) -> subprocess.Popen[str]:
         environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", MARK: self.mark}
-        self.process = subprocess.Popen(
-            [sys.executable, str(EXAMPLES / name), *options],
+        self.process = start(
+            [sys.executable, EXAMPLES / name, *options],
             cwd=self._folder,
             env=environment,
             stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            text=True,
             start_new_session=True,  # as in a terminal of its own, for its Ctrl-C
         )
         return self.process

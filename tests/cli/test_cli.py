@@ -17,6 +17,7 @@ from numpy.testing import assert_allclose
 
 from rps_pin import InputError, RPSParameters, RPSRobot, __version__, helix
 from rps_pin.cli.helix_options import middle_height
+from tests.processes import RPS_PIN, start
 
 FIGURES = [
     f"figure_{name}.{suffix}"
@@ -195,10 +196,7 @@ def test_a_robot_without_a_middle_is_told_to_give_a_height() -> None:
     ],
 )
 def test_view_serves_this_machine_until_ctrl_c(arguments: list[str], in_page: str) -> None:
-    command = [sys.executable, "-u", "-c", "from rps_pin.cli import main; main()", "view"]
-    process = subprocess.Popen(
-        [*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    process = start([*RPS_PIN, "view", *arguments])
     try:
         assert process.stdout is not None
         line = process.stdout.readline()

@@ -22,6 +22,7 @@ from rps_pin import RPSRobot
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.viewer import LiveView, LocalViewer, Recorder, Scene
 from rps_pin.viewer.server import live_view
+from tests.processes import start
 
 POSE = (0.22, 0.0, 0.0)
 PLATFORM = "/world/robot/platform"
@@ -346,14 +347,7 @@ def script(tmp_path) -> Iterator[subprocess.Popen]:
     """A loop with a view, as a terminal starts it: in a process group of its own."""
     path = tmp_path / "loop.py"
     path.write_text(textwrap.dedent(SCRIPT))
-    process = subprocess.Popen(
-        [sys.executable, str(path)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        process_group=0,
-    )
-    with process:
+    with start([sys.executable, path], process_group=0) as process:
         yield process
         if group_lives(process.pid):
             os.killpg(process.pid, signal.SIGKILL)

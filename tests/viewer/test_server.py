@@ -6,7 +6,6 @@ import http.client
 import os
 import signal
 import socket
-import subprocess
 import sys
 import textwrap
 import threading
@@ -22,6 +21,7 @@ from tornado.websocket import websocket_connect
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.viewer import LocalViewer, RawCommand, Scene, play
 from rps_pin.viewer.server import web
+from tests.processes import start
 
 ROOT = Path(__file__).parents[2]
 
@@ -285,11 +285,8 @@ except KeyboardInterrupt:
 
 
 def test_ctrl_c_ends_it_cleanly():
-    process = subprocess.Popen(
+    process = start(
         [sys.executable, "-c", textwrap.dedent(PROGRAM)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
     )
     try:

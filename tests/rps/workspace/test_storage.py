@@ -32,6 +32,7 @@ from rps_pin.rps.workspace import (
     workspace,
     workspace_to_file,
 )
+from tests.processes import start
 
 
 @pytest.fixture(scope="module")
@@ -216,12 +217,7 @@ def test_ctrl_c_in_a_real_process_leaves_no_file(tmp_path: Path) -> None:
         grid = leg_grid(micro, 400)
         workspace_to_file(micro, {str(tmp_path / "space.h5")!r}, grid, progress=progress)
     """
-    process = subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(script)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = start([sys.executable, "-c", textwrap.dedent(script)])
     assert process.stdout is not None
     assert process.stdout.readline() == "under way\n"
     process.send_signal(signal.SIGINT)

@@ -1,0 +1,47 @@
+"""Processes that tests start. Ctrl-C reaches each of them as it does one started in a terminal.
+
+A shell starts its background jobs with SIGINT ignored (``nohup make test &``), and a child keeps
+that: without `start`, a test's Ctrl-C would be lost on it there.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+#: The command line's entry point, in a process of its own.
+RPS_PIN = (
+    *(sys.executable, "-u", "-c"),
+    "import sys; sys.argv[0] = 'rps-pin'; from rps_pin.cli import main; main()",
+)
+
+
+def start(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[str]:
+    """Start a process with SIGINT at its default; its output is piped as text, unless told.
+
+    Call it from the main thread: only there Python sets signals.
+    """
+    piped = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    # A handler of this process becomes the default in the child; what is ignored stays ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return subprocess.Popen(list(command), **(piped | options))
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def run(
+    command: Sequence[str | Path], *, timeout: float = 240.0, **options: Any
+) -> subprocess.CompletedProcess[str]:
+    """Start a process as `start`, and return what it said when it has ended."""
+    with start(command, **options) as process:
+        try:
+            output, errors = process.communicate(timeout=timeout)
+        except BaseException:
+            process.kill()
+            raise
+    return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
