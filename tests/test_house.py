@@ -23,7 +23,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
 def folders_named(page: str) -> dict[str, set[str]]:
     """Return the folders of a page's tree: those at the top, and those of the package."""
-    tree = (ROOT / page).read_text("utf-8").partition("Where things are")[2]
+    tree = (ROOT / page).read_text("utf-8").partition("## Repository layout")[2]
     top = set(re.findall(r"^    (\S+)/ ", tree, re.MULTILINE)) - {"src/rps_pin"}
     return {"top": top, "package": set(re.findall(r"^      (\w+)/ ", tree, re.MULTILINE))}
 
@@ -78,31 +78,41 @@ def test_the_changelog_keeps_its_form() -> None:
     assert set(kinds) <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
 
 
-def test_dependencies_point_one_way() -> None:
-    """Of `rps_pin.closed_loop` and `rps_pin.rps` on what is built on them."""
-    below = {
-        "closed_loop": ("errors", "files", "config", "closed_loop"),
-        "trajectories": ("errors", "files", "config", "trajectories", "rps"),
-        "rps": ("errors", "files", "config", "closed_loop", "trajectories", "rps"),
-        "control": (
-            "errors",
-            "files",
-            "config",
-            "closed_loop",
-            "trajectories",
-            "rps",
-            "control",
-        ),
-    }
-    for name, allowed in below.items():
-        for path in (PACKAGE / name).rglob("*.py"):
-            for used in re.findall(r"^\s*from rps_pin\.(\w+)", path.read_text("utf-8"), re.M):
-                assert used in allowed, f"{path.relative_to(PACKAGE)} uses {used}"
+#: Each package may import those before it, and no other; all may import the modules beside them.
+LAYERS = (
+    "numerics",
+    "closed_loop",
+    "trajectories",
+    "rps",
+    "control",
+    "plots",
+    "paper",
+    "viewer",
+    "panel",
+    "cli",
+)
+
+
+@pytest.mark.parametrize("package", LAYERS)
+def test_dependencies_point_one_way(package: str) -> None:
+    """Of imports in functions and under TYPE_CHECKING too."""
+    above = LAYERS[LAYERS.index(package) + 1 :]
+    found = []
+    for path in sorted((PACKAGE / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names = [f"{node.module}.{one.name}" for one in node.names]
+            for name in names:
+                parts = name.split(".")
+                if parts[0] == "rps_pin" and len(parts) > 1 and parts[1] in above:
+                    found.append(f"{path.relative_to(PACKAGE)} imports {name}")
+    assert not found, "\n".join(found)
 
 
 def test_every_package_is_reached_from_the_top() -> None:
-    """Without an import of its own: ``rps_pin.control.Gains``. All but the command line."""
-    packages = {one.parent.name for one in PACKAGE.glob("*/__init__.py")} - {"cli"}
+    """Without an import of its own: ``rps_pin.control.Gains``. All public packages."""
+    packages = {one.parent.name for one in PACKAGE.glob("*/__init__.py")} - {"cli", "numerics"}
     assert packages <= set(rps_pin.__all__)
     code = "import sys, rps_pin; print(sorted({'numpy', 'pinocchio'} & set(sys.modules)));"
     code += " ".join(f"rps_pin.{name};" for name in sorted(packages))

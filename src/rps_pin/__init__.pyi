@@ -1,4 +1,15 @@
-from . import closed_loop, control, errors, panel, paper, plots, rps, trajectories, viewer
+from . import (
+    closed_loop,
+    control,
+    errors,
+    panel,
+    paper,
+    plots,
+    reproduction,
+    rps,
+    trajectories,
+    viewer,
+)
 from .closed_loop import (
     ClosedLoopModel,
     ForceBound,
@@ -49,6 +60,7 @@ __all__ = [
     "panel",
     "paper",
     "plots",
+    "reproduction",
     "rps",
     "trajectories",
     "viewer",

@@ -1,4 +1,7 @@
-"""The old name of `rps_pin.paper`: it keeps working, and says where it went."""
+"""The old name of `rps_pin.paper`, kept for programs that use it.
+
+Importing it gives `rps_pin.paper` itself, with a `DeprecationWarning` that names it.
+"""
 
 import sys
 import warnings
