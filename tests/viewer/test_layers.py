@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 import pytest
+import umsgpack
 
 from rps_pin import ClosedLoopModel, JointCoupling, RPSRobot, helix
 from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import InputError
 from rps_pin.rps import joint_reactions
+from rps_pin.rps.dynamics.motion_run import run_motion
 from rps_pin.viewer import (
     LAYERS,
     Forces,
@@ -26,6 +31,7 @@ from rps_pin.viewer import (
     View,
     WorkspaceSurface,
     fitting_layers,
+    save_html,
 )
 from rps_pin.viewer.layers.shapes import between, pointing, round_number, tube
 from rps_pin.viewer.motion import State
@@ -62,6 +68,24 @@ def placed(recorder: Recorder) -> dict[str, np.ndarray]:
 
 def legend(recorder: Recorder) -> list[dict]:
     return [m for m in recorder.messages if m.get("property") == "userData"][-1]["value"]["layers"]
+
+
+def page_scales(text: str) -> dict[str, np.ndarray]:
+    """Return the scales (n, 3) that a page's keyframes give to each node below the layers."""
+    packed = json.loads(re.search(r'id="commands">\n(.*?)\n</script>', text, re.DOTALL)[1])
+    [animation] = [
+        m
+        for m in (umsgpack.unpackb(base64.b64decode(item)) for item in packed)
+        if m["type"] == "set_animation"
+    ]
+    return {
+        clip["path"].removeprefix("/world/layers/"): np.frombuffer(
+            track["values"].data, dtype="<f4"
+        ).reshape(-1, 3)[:, 2:]
+        for clip in animation["animations"]
+        for track in clip["clip"]["tracks"]
+        if track["name"] == ".scale"
+    }
 
 
 def arrow(place: np.ndarray) -> np.ndarray:
@@ -114,6 +138,53 @@ def test_outside_wrenches_and_known_forces_are_shown(robot):
         length = np.linalg.norm(arrow(placed(recorder)[node]))
         assert length == pytest.approx(abs(expected[leg - 1]), rel=1e-9)
         assert np.linalg.norm(arrow(placed(other)[node])) == pytest.approx(leg)
+
+
+@pytest.mark.parametrize("writes", ["view", "page"])
+def test_arrows_of_a_motion_run_are_its_own_forces_with_its_wrench(robot, path, tmp_path, writes):
+    """The run knows its wrench only through its forces: they must not be computed again."""
+    push = [3.0, -2.0, -7.0, 0.1, 0.2, 0.0]
+    run = run_motion(robot, path, 100.0, wrench=push)
+    layers = [Forces(newtons_per_metre=4.0), Reactions(8.0)]
+    if writes == "view":
+        view, recorder = shown(robot, run, layers=layers)
+        times = run.time[[0, 77, 200, -1]]
+        arrows = []
+        for time in times:
+            view.show_moment(time)
+            arrows.append({node: arrow(place) for node, place in placed(recorder).items()})
+    else:
+        save_html(tmp_path / "page.html", robot, run, layers=layers)
+        scales = page_scales((tmp_path / "page.html").read_text("utf-8"))
+        count = len(scales["forces/leg_1_prismatic"])
+        times = np.linspace(0.0, run.time[-1], count)
+        arrows = [{node: scale[k] for node, scale in scales.items()} for k in range(count)]
+
+    def at(rows: np.ndarray, time: float) -> np.ndarray:
+        flat = rows.reshape(len(rows), -1).T
+        return np.array([np.interp(time, run.time, row) for row in flat]).reshape(rows.shape[1:])
+
+    free = run_motion(robot, path, 100.0)
+    assert np.abs(run.force - free.force).min() > 0.1
+    for time, found in zip(times, arrows, strict=True):
+        for leg in LEGS:
+            force = np.linalg.norm(found[f"forces/leg_{leg}_prismatic"])
+            assert force == pytest.approx(abs(at(run.force, time)[leg - 1]) / 4.0, rel=1e-6)
+            reaction = np.linalg.norm(found[f"reactions/leg_{leg}"])
+            expected = np.linalg.norm(at(run.reaction, time)[leg - 1])
+            assert reaction == pytest.approx(expected / 8.0, rel=1e-6)
+
+
+def test_reactions_of_a_simulation_are_its_own_with_its_wrench():
+    four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    push = {"coupler": [3.0, 0.0, -5.0, 0.0, 0.0, 0.0]}
+    run = four_bar.simulate(four_bar.home, duration=0.05, wrenches=push, forces=True)
+    view, recorder = shown(four_bar, run, layers=[Reactions(8.0)])
+    view.show_moment(run.time[-1])
+    wrench = four_bar.closure_wrenches(run.q[-1], run.constraint_forces[-1])["knee"]
+    np.testing.assert_allclose(
+        arrow(placed(recorder)["reactions/knee"]), wrench[:3] / 8.0, rtol=1e-9, atol=1e-12
+    )
 
 
 def test_torques_have_two_heads_and_lie_along_the_axis():

@@ -176,7 +176,7 @@ def _write(
     from rps_pin.rps.dynamics.force_causes import force_causes
 
     title = f"3-RPS {robot.parameters.name} along {trajectory.name}"
-    files = write_motion(folder, "dynamics", title, robot, run, wrench)
+    files = write_motion(folder, "dynamics", title, robot, run)
     causes = force_causes(robot, run.pose, run.rate, run.acceleration, wrench=wrench)
     files += save_figure(plot_force_causes(run.time, causes), folder, "forces_by_cause")
     files += save_figure(plot_sizing(sheet), folder, "force_over_speed")

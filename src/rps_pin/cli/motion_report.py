@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from rich.console import Console
@@ -32,15 +32,11 @@ def write_motion(
     title: str,
     robot: RPSRobot,
     run: MotionRun,
-    wrench: Sequence[float] | None = None,
 ) -> list[Path]:
-    """Write a motion's table, figures and animation into a folder; return the files.
-
-    The wrench is what something outside exerts on the platform, as for `run_motion`.
-    """
+    """Write a motion's table, figures and animation into a folder; return the files."""
     # Only commands that draw wait for these to be imported.
     from rps_pin.plots import plot_forces, plot_lengths, plot_path, save_figure
-    from rps_pin.viewer import Motion, fitting_layers, save_html
+    from rps_pin.viewer import fitting_layers, save_html
 
     table = folder / f"{name}.csv"
     write_csv(table, run)
@@ -53,10 +49,7 @@ def write_motion(
         files += save_figure(plot(run), folder, figure)
     page = folder / "viewer.html"
     shown, at_hand = chosen_layers(None, fitting_layers(robot.mechanism))
-    states = robot.state(run.pose, run.rate, run.acceleration)
-    wrenches = {} if wrench is None else {"platform": wrench}
-    motion = Motion(robot.mechanism.model, run.time, *states, forces=run.force, wrenches=wrenches)
-    save_html(page, robot, motion, layers=shown, hidden=at_hand, title=title)
+    save_html(page, robot, run, layers=shown, hidden=at_hand, title=title)
     return [*files, page]
 
 

@@ -28,7 +28,9 @@ class State(NamedTuple):
     a: Array
     """Acceleration, shape (nv,)."""
     tau: Array | None = None
-    """Actuator forces, where they are known, shape (na,); else the motion's inverse dynamics is."""
+    """Actuator forces, shape (na,); None where they follow from q, v and a by inverse dynamics."""
+    constraint_forces: Array | None = None
+    """Forces of the closures, shape (nc,); None where they follow from q, v, a and tau."""
 
 
 class Motion:
@@ -45,7 +47,10 @@ class Motion:
     velocities, accelerations : array_like, shape (n, nv)
         As Pinocchio has them; for the layers that show forces. Left out: at rest.
     forces : array_like, shape (n, na)
-        What the actuators exert. Left out: what the motion takes.
+        Actuator forces. Default: those of inverse dynamics.
+    constraint_forces : array_like, shape (n, nc)
+        Forces of the closures, as `InverseDynamics` has them. Default: those that follow from the
+        motion, its actuator forces and wrenches.
     wrenches
         What something outside exerts all the time, by frame name: force (N) and moment (N m) in
         world axes at the frame's origin, shape (6,); for these layers too.
@@ -66,6 +71,7 @@ class Motion:
         accelerations: ArrayLike | None = None,
         *,
         forces: ArrayLike | None = None,
+        constraint_forces: ArrayLike | None = None,
         wrenches: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         self._model = model
@@ -78,15 +84,8 @@ class Motion:
             )
         if not np.all(np.isfinite(self.times)) or np.any(np.diff(self.times) <= 0.0):
             raise InputError("times must be finite and strictly increasing")
-        self.forces = None if forces is None else np.asarray(forces, dtype=np.float64)
-        if self.forces is not None and (
-            self.forces.ndim != 2
-            or len(self.forces) != len(self.times)
-            or not np.isfinite(self.forces).all()
-        ):
-            raise InputError(
-                f"forces has shape {self.forces.shape}; it must be ({len(self.times)}, na), finite"
-            )
+        self.forces = self._known_forces(forces, "forces", "na")
+        self.constraint_forces = self._known_forces(constraint_forces, "constraint_forces", "nc")
         self.wrenches = dict(wrenches or {})
         self.at_rest = velocities is None and accelerations is None
         self.velocities = self._rates(velocities, "velocities")
@@ -100,6 +99,15 @@ class Motion:
         if rates.shape != wanted or not np.isfinite(rates).all():
             raise InputError(f"{name} has shape {rates.shape}; it must be {wanted}, all finite")
         return rates
+
+    def _known_forces(self, given: ArrayLike | None, name: str, size: str) -> Array | None:
+        if given is None:
+            return None
+        forces = np.asarray(given, dtype=np.float64)
+        n = len(self.times)
+        if forces.ndim != 2 or len(forces) != n or not np.isfinite(forces).all():
+            raise InputError(f"{name} has shape {forces.shape}; it must be ({n}, {size}), finite")
+        return forces
 
     @property
     def duration(self) -> float:
@@ -129,9 +137,10 @@ class Motion:
             row: Array = (1.0 - fraction) * rows[before] + fraction * rows[after]
             return row
 
-        tau = None if self.forces is None else between(self.forces)
-        v, a = between(self.velocities), between(self.accelerations)
-        return State(self.at(elapsed), v, a, tau)
+        known = (self.forces, self.constraint_forces)
+        tau, constraint = (None if rows is None else between(rows) for rows in known)
+        rates = between(self.velocities), between(self.accelerations)
+        return State(self.at(elapsed), *rates, tau, constraint)
 
     def _place(self, elapsed: float) -> tuple[int, float]:
         """Return the sample at or before a time, and the share of the way to the next one."""

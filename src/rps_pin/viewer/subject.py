@@ -84,12 +84,21 @@ def motion_of(subject: Subject, given: Any = None) -> Motion:
     if isinstance(given, Motion):
         return given
     if isinstance(given, Simulation):
-        return Motion(model, given.time, given.q, given.v, given.a, forces=given.tau)
+        return Motion(
+            model,
+            given.time,
+            given.q,
+            given.v,
+            given.a,
+            forces=given.tau,
+            constraint_forces=given.constraint_forces,
+        )
     if robot is None:
         return Motion(model, [0.0], _one(subject.mechanism.home if given is None else given, model))
     if isinstance(given, MotionRun):
         states = robot.state(given.pose, given.rate, given.acceleration)
-        return Motion(model, given.time, *states)
+        reactions = given.reaction.reshape(len(given.time), -1)
+        return Motion(model, given.time, *states, forces=given.force, constraint_forces=reactions)
     if hasattr(given, "sample") and hasattr(given, "duration"):
         times = sample_times(given.duration, _SAMPLE_RATE)
         return Motion(model, times, *robot.state(*given.sample(times)))

@@ -143,7 +143,7 @@ class View:
         if self.motion.duration == 0.0:
             stop.wait()
             return
-        follow_clock(self.motion.duration, self._show_moment, stop, frame_rate)
+        follow_clock(self.motion.duration, self.show_moment, stop, frame_rate)
 
     def animate(self, *, frame_rate: float = FRAME_RATE) -> None:
         """Let the window play the motion by itself, in a loop, layers included.
@@ -162,7 +162,8 @@ class View:
         ]
         self.scene.animate(self.motion, frame_rate=frame_rate, more=clips)
 
-    def _show_moment(self, elapsed: float) -> None:
+    def show_moment(self, elapsed: float) -> None:
+        """Show the motion's state `elapsed` seconds after its beginning."""
         state = self.motion.state_at(elapsed)
         self.scene.display(state.q)
         self._show(state)

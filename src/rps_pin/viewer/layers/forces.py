@@ -46,8 +46,7 @@ class Forces(Framed):
             try:
                 tau = state.tau
                 if tau is None:
-                    q, v, a, _ = state
-                    tau = mechanism.inverse_dynamics(q, v, a, wrenches=outside).tau
+                    tau = mechanism.inverse_dynamics(*state[:3], wrenches=outside).tau
             except SingularityError:
                 return {}
             pin.computeJointJacobians(model, data, state.q)

@@ -5,12 +5,15 @@ Where rows are redundant the reactions are not unique; those shown are of least 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
-from rps_pin.closed_loop import LoopClosure
+from rps_pin.arrays import Array
+from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
 from rps_pin.errors import InputError, SingularityError
 from rps_pin.viewer.layers.arrows import Sized, Vectors, arrows_drawing
 from rps_pin.viewer.layers.base import Context, Drawing, Framed
@@ -44,15 +47,10 @@ class Reactions(Framed):
 
         def vectors(state: State) -> Vectors:
             try:
-                q, v, a, tau = state
-                if tau is None:
-                    answer = mechanism.inverse_dynamics(q, v, a, wrenches=outside)
-                    forces = answer.constraint_forces
-                else:
-                    forces = mechanism.constraint_forces(q, v, a, tau, wrenches=outside)
+                forces = _constraint_forces(mechanism, state, outside)
             except SingularityError:
                 return {}
-            wrenches = mechanism.closure_wrenches(q, forces)
+            wrenches = mechanism.closure_wrenches(state.q, forces)
             pin.framesForwardKinematics(model, data, state.q)
             return {
                 _node(name): (np.array(data.oMf[frame].translation), wrenches[name][:3])
@@ -64,6 +62,17 @@ class Reactions(Framed):
         return arrows_drawing(
             "reactions", "forces in the closed joints", SKY, context, sized, vectors, given
         )
+
+
+def _constraint_forces(
+    mechanism: ClosedLoopModel, state: State, wrenches: Mapping[str, ArrayLike]
+) -> Array:
+    q, v, a, tau, known = state
+    if known is not None:
+        return known
+    if tau is not None:
+        return mechanism.constraint_forces(q, v, a, tau, wrenches=wrenches)
+    return mechanism.inverse_dynamics(q, v, a, wrenches=wrenches).constraint_forces
 
 
 def _node(closure: str) -> str:
