@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, RPSRobot, SingularityError
-from rps_pin.closed_loop.dynamics.inverse_dynamics import allowed_motions, condition_number
 from rps_pin.closed_loop.dynamics.null_space_solution import solve_by_allowed_motions
+from rps_pin.numerics.linear_algebra import null_space
 from tests import strategies
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import loop_jacobian
@@ -20,39 +20,6 @@ Array = NDArray[np.float64]
 def matrix(rank: int, rows: int, columns: int, seed: int = 0) -> Array:
     rng = np.random.default_rng(seed)
     return rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, columns))
-
-
-@pytest.mark.parametrize(("rank", "rows", "columns"), [(3, 3, 5), (2, 6, 5), (5, 6, 5), (1, 1, 1)])
-def test_allowed_motions_are_an_orthonormal_basis_of_the_null_space(
-    rank: int, rows: int, columns: int
-) -> None:
-    jacobian = matrix(rank, rows, columns)
-    motions = allowed_motions(jacobian)
-    assert motions.shape == (columns, columns - rank)
-    np.testing.assert_allclose(jacobian @ motions, 0, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(motions.T @ motions, np.eye(columns - rank), rtol=0, atol=1e-14)
-
-
-def test_without_closures_every_motion_is_allowed() -> None:
-    assert allowed_motions(np.zeros((0, 4))).shape == (4, 4)
-
-
-def test_condition_number_is_the_ratio_of_singular_values() -> None:
-    rotation = np.linalg.qr(matrix(3, 3, 3))[0]
-    assert condition_number(rotation @ np.diag([4.0, 2.0, 0.5])) == pytest.approx(8, rel=1e-14)
-    assert condition_number(rotation) == pytest.approx(1, rel=1e-14)
-    assert condition_number(matrix(2, 6, 2)) == pytest.approx(np.linalg.cond(matrix(2, 6, 2)))
-
-
-def test_condition_number_without_an_answer_is_infinite() -> None:
-    assert condition_number(np.ones((2, 3))) == np.inf
-    assert condition_number(np.zeros((3, 3))) == np.inf
-    assert condition_number(np.diag([1.0, 0.0])) == np.inf
-    assert condition_number(matrix(2, 3, 3)) > 1e14
-
-
-def test_condition_number_without_passive_joints_is_1() -> None:
-    assert condition_number(np.zeros((0, 0))) == condition_number(np.zeros((6, 0))) == 1
 
 
 @pytest.mark.parametrize("rank", [3, 2])
@@ -67,7 +34,7 @@ def test_answer_satisfies_the_kkt_equations(rank: int) -> None:
     total[actuated] += tau
     np.testing.assert_allclose(total, force, rtol=0, atol=1e-12)
     # Of least norm: no part of lambda that the rows do not feel.
-    np.testing.assert_allclose(allowed_motions(jacobian.T).T @ multipliers, 0, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(null_space(jacobian.T).T @ multipliers, 0, rtol=0, atol=1e-12)
 
 
 def test_answer_does_not_depend_on_the_scale() -> None:
@@ -88,7 +55,7 @@ def test_more_actuators_than_mobility_share_with_least_norm() -> None:
     total[:4] += tau
     np.testing.assert_allclose(total, force, rtol=0, atol=1e-11)
     # Any other solution tau + y, N' S' y = 0, is no shorter: scale * tau is orthogonal to all y.
-    others = allowed_motions(allowed_motions(jacobian)[:4].T)
+    others = null_space(null_space(jacobian)[:4].T)
     np.testing.assert_allclose((scale[:4] ** 2 * tau) @ others, 0, rtol=0, atol=1e-10)
 
 

@@ -97,6 +97,34 @@ def test_singular_home_is_left_for_a_regular_place() -> None:
     assert "the home configuration is singular" in str(found)
 
 
+def double_pendulum(closures: list[LoopClosure]) -> ClosedLoopModel:
+    """Two links that swing in one plane, which stands askew."""
+    model, turn, last = pin.Model(), pin.exp3(np.array([0.3, 0.4, 0.5])), 0
+    model.gravity.linear = turn @ np.array([0.0, 0.0, -9.81])
+    down = np.array([0.0, 0.0, -0.5])
+    for index in range(2):
+        placement = pin.SE3(np.eye(3), down) if index else pin.SE3(turn, np.zeros(3))
+        last = model.addJoint(last, pin.JointModelRY(), placement, f"joint_{index}")
+        model.appendBodyToJoint(last, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3(np.eye(3), down))
+    base, tip = pin.SE3(turn, np.zeros(3)), pin.SE3(np.eye(3), np.array([0.1, 0.0, -0.5]))
+    model.addFrame(pin.Frame("base", 0, 0, base, pin.FrameType.OP_FRAME))
+    model.addFrame(pin.Frame("tip", last, 0, tip, pin.FrameType.OP_FRAME))
+    return ClosedLoopModel(model, closures, ["joint_0", "joint_1"])
+
+
+def test_describe_and_simulate_have_one_rank() -> None:
+    """A closure that keeps a planar mechanism in its plane: its row is rounding error, rank 0."""
+    plane = LoopClosure("base", "tip", "point_on_plane", axis=[0.0, 1.0, 0.0])
+    held, free = double_pendulum([plane]), double_pendulum([])
+    q = np.array([0.3, 0.4])
+    assert 0 < np.abs(held.jacobian(q)).max() < 1e-15
+    found = held.describe(q)
+    assert (found.rank, found.mobility, found.actuation) == (0, 2, "sufficient")
+    moved, expected = (each.simulate(q, duration=0.5) for each in (held, free))
+    np.testing.assert_allclose(moved.q, expected.q, rtol=0, atol=1e-12)
+    assert np.ptp(expected.q) > 0.5  # it swings
+
+
 def test_as_data_it_is_plain_json() -> None:
     found = homed(mechanisms.three_rps()).describe()
     again = json.loads(json.dumps(found.as_dict(), allow_nan=False))

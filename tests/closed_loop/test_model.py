@@ -22,7 +22,7 @@ from rps_pin import (
     RPSRobot,
     SingularityError,
 )
-from rps_pin.closed_loop.dynamics.inverse_dynamics import allowed_motions
+from rps_pin.numerics.linear_algebra import null_space
 from tests import strategies
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import (
@@ -429,7 +429,7 @@ def test_fewer_actuators_than_mobility_do_not_determine_the_motion() -> None:
     assert "unproduced" in repr(found)
     # What is missing bears the weight in the motion that leaves the actuator at rest.
     motions = mechanism.allowed_motions(q)
-    at_rest = motions @ allowed_motions(motions[mechanism.actuated_indices])
+    at_rest = motions @ null_space(motions[mechanism.actuated_indices])
     weight = mechanism.generalised_force(q, still, still)
     np.testing.assert_allclose(at_rest.T @ found.unproduced, at_rest.T @ weight, rtol=1e-10)
 

@@ -17,8 +17,8 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure, LoopClosure
-from rps_pin.closed_loop.dynamics.inverse_dynamics import rank_of
 from rps_pin.errors import ClosureError
+from rps_pin.numerics.linear_algebra import rank, singular_values
 
 if TYPE_CHECKING:
     from rps_pin.closed_loop.model import ClosedLoopModel
@@ -195,20 +195,20 @@ def describe(mechanism: ClosedLoopModel, q: Array | None) -> MechanismDescriptio
     """Return what a mechanism is made of, at q or at a regular configuration near home."""
     at, singular = (q, False) if q is not None else _regular(mechanism)
     jacobian = _scaled(mechanism, at)
-    rank = _rank(jacobian)
+    found = _rank(jacobian)
     motions = mechanism.allowed_motions(at)[mechanism.actuated_indices]
     motions = motions / mechanism.velocity_scale[mechanism.actuated_indices][:, None]
     model = mechanism.model
     return MechanismDescription(
         name=mechanism.name,
         joints=tuple(_joint(model, i, mechanism.actuated) for i in range(1, model.njoints)),
-        closures=tuple(_closure(mechanism, c, jacobian, rank) for c in mechanism.closures),
+        closures=tuple(_closure(mechanism, c, jacobian, found) for c in mechanism.closures),
         configuration=at,
         home_is_singular=singular,
         nv=model.nv,
         rows=mechanism.constraint_size,
-        rank=rank,
-        singular_values=np.asarray(np.linalg.svd(jacobian, compute_uv=False), np.float64),
+        rank=found,
+        singular_values=singular_values(jacobian),
         actuated=mechanism.actuated,
         actuated_velocities=mechanism.actuated_indices.size,
         actuated_rank=_rank(motions),
@@ -241,7 +241,7 @@ def _scaled(mechanism: ClosedLoopModel, q: Array) -> Array:
 
 
 def _rank(matrix: Array) -> int:
-    return rank_of(np.asarray(np.linalg.svd(matrix, compute_uv=False), np.float64))
+    return rank(singular_values(matrix))
 
 
 def _joint(model: pin.Model, index: int, actuated: tuple[str, ...]) -> JointDescription:
@@ -265,14 +265,14 @@ def _joint(model: pin.Model, index: int, actuated: tuple[str, ...]) -> JointDesc
 
 
 def _closure(
-    mechanism: ClosedLoopModel, closure: Closure, jacobian: Array, rank: int
+    mechanism: ClosedLoopModel, closure: Closure, jacobian: Array, found: int
 ) -> ClosureDescription:
     others = np.delete(jacobian, mechanism.rows(closure.name), axis=0)
     if isinstance(closure, LoopClosure):
         kind, between = str(closure.kind), (closure.frame_a, closure.frame_b)
     else:
         kind, between = "coupling", (closure.joint, closure.other)
-    return ClosureDescription(closure.name, kind, between, closure.size, rank - _rank(others))
+    return ClosureDescription(closure.name, kind, between, closure.size, found - _rank(others))
 
 
 def _plain(values: Any) -> list[float | None]:

@@ -26,7 +26,6 @@ from rps_pin.closed_loop.dynamics.derivatives import (
     linearisation,
 )
 from rps_pin.closed_loop.dynamics.dynamics import ClosedLoopDynamics
-from rps_pin.closed_loop.dynamics.inverse_dynamics import pseudo_inverse
 from rps_pin.closed_loop.dynamics.kinematics import MAX_CONDITION
 from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED, JointEffects
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
@@ -38,6 +37,7 @@ from rps_pin.closed_loop.io.urdf import model_from_urdf
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.errors import InputError
+from rps_pin.numerics.linear_algebra import pseudo_inverse
 from rps_pin.validation import real_vector
 
 

@@ -15,8 +15,8 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 from rps_pin.closed_loop.constraints.loops import Loops
-from rps_pin.closed_loop.dynamics.inverse_dynamics import allowed_motions
 from rps_pin.errors import ClosureError
+from rps_pin.numerics.linear_algebra import null_space
 from rps_pin.numerics.quadratic_program import by_least_squares
 
 #: The search ends when a step would be below this, in characteristic lengths.
@@ -90,7 +90,7 @@ class NearestSearch:
 
     def _step(self, q: Array, towards: Array) -> Array:
         """Return the allowed motion nearest to `towards` that stays within the limits, (nv,)."""
-        motions = allowed_motions(
+        motions = null_space(
             self._loops.row_scale[:, None] * self._loops.jacobian(q) * self._loops.column_scale
         )
         y = motions.T @ towards

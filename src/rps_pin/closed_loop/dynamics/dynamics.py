@@ -19,7 +19,7 @@ from rps_pin.closed_loop.dynamics.forward_dynamics import (
     basis_and_drift,
     solve_reduced,
 )
-from rps_pin.closed_loop.dynamics.inverse_dynamics import InverseDynamics, least_norm
+from rps_pin.closed_loop.dynamics.inverse_dynamics import InverseDynamics
 from rps_pin.closed_loop.dynamics.kinematics import MAX_CONDITION, ClosedLoopKinematics
 from rps_pin.closed_loop.dynamics.null_space_solution import (
     scaled_motions,
@@ -32,6 +32,7 @@ from rps_pin.closed_loop.dynamics.passive_joint_forces import (
 )
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, checked_wrench, generalised_force
 from rps_pin.errors import InputError, MechanismError
+from rps_pin.numerics.linear_algebra import least_norm
 from rps_pin.validation import real_vector
 
 _INFINITY = math.inf

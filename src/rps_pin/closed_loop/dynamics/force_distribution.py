@@ -31,15 +31,14 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.column_names import column_names
 from rps_pin.closed_loop.dynamics.force_bounds import ForceBound
 from rps_pin.closed_loop.dynamics.least_effort import (
-    full_svd,
     least_effort,
-    numerical_rank,
     refuse_nearly_singular,
     unproduced_force,
 )
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.errors import InfeasibleError, InputError, LimitExcess
+from rps_pin.numerics.linear_algebra import full_svd, rank
 from rps_pin.numerics.quadratic_program import LeastDistance, NearestPoint, least_violation
 from rps_pin.validation import real_vector
 
@@ -119,6 +118,7 @@ class ForceDistribution:
             if not (self.weights > 0).all():
                 raise InputError(f"weights = {self.weights}: they must be positive")
         self._levers = self._own_columns / self.weights
+        self._largest_lever = float(self._levers.max())
         self.lower, self.upper = self._torque_limits(torque_limits)
         self.bounds: Sequence[ForceBound] = tuple(bounds)
         # Each bound's direction over all rows; and times the scaled multipliers.
@@ -213,8 +213,8 @@ class ForceDistribution:
         rest[self._actuated] -= self._own_columns * aim
         reduced = motions @ rest
         own = (motions.take(self._actuated, axis=1) * self._levers).T  # W^-1 S N
-        best = least_effort(own, reduced)
-        refuse_nearly_singular(best.values, self.mechanism.max_condition)
+        best = least_effort(own, reduced, size=self._largest_lever)
+        refuse_nearly_singular(best.values, self.mechanism.max_condition, self._largest_lever)
         if best.missing @ best.missing > _PRODUCED**2 * (reduced @ reduced):
             motions = self._columns[:, None] * motions.T
             raise self._unproduced(unproduced_force(motions, best.missing, self._columns))
@@ -329,7 +329,7 @@ class _Factors:
 
     def __init__(self, left: Array, values: Array, right: Array) -> None:
         self.left, self.values, self.right = left, values, right
-        self.rank = numerical_rank(values)
+        self.rank = rank(values)
 
     def least_norm(self, force: Array) -> Array:
         """Return the scaled lambda of least norm with J' lambda = force, (nv,) or (nv, n)."""

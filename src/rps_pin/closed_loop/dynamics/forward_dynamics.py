@@ -17,8 +17,8 @@ import pinocchio as pin
 from scipy.linalg.lapack import dposv
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.dynamics.inverse_dynamics import RANK_TOLERANCE, rank_of
 from rps_pin.errors import MechanismError, SingularityError
+from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, rank
 
 #: Relative to the largest: what counts as no inertia at all.
 _NO_INERTIA = 1e-14
@@ -37,9 +37,9 @@ def basis_and_drift(jacobian: Array, drift: Array, scale: Array) -> tuple[Array,
         Scaling of the velocities to one unit, shape (nv,).
     """
     left, values, right = np.linalg.svd(jacobian * scale)
-    rank = rank_of(values)
-    along = (left[:, :rank].T @ drift) / values[:rank]
-    return scale[:, None] * right[rank:].T, -scale * (right[:rank].T @ along)
+    count = rank(values)
+    along = (left[:, :count].T @ drift) / values[:count]
+    return scale[:, None] * right[count:].T, -scale * (right[:count].T @ along)
 
 
 def solve_reduced(mass: Array, force: Array) -> Array:

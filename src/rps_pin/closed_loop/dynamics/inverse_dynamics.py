@@ -15,9 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from rps_pin.arrays import Array
-
-#: Below this a singular value counts as zero, relative to the largest (or to 1 if that is less).
-RANK_TOLERANCE = 1e-10
+from rps_pin.numerics.linear_algebra import condition_number
 
 
 class InverseDynamics:
@@ -86,51 +84,3 @@ class InverseDynamics:
             f"residual={self.residual:.3g}"
             + (")" if self.unproduced is None else f", unproduced={self.unproduced})")
         )
-
-
-def condition_number(passive_jacobian: Array) -> float:
-    """Return largest over smallest singular value of J_p, ``inf`` if passive joints stay free.
-
-    Parameters
-    ----------
-    passive_jacobian
-        J_p, shape (nc, np), scaled so that all its entries have one unit.
-    """
-    rows, columns = passive_jacobian.shape
-    if columns == 0:
-        return 1.0
-    if rows < columns:
-        return np.inf
-    values = np.linalg.svd(passive_jacobian, compute_uv=False)
-    return float(values[0] / values[-1]) if values[-1] > 0 else np.inf
-
-
-def rank_of(values: Array) -> int:
-    """Return how many singular values, largest first, of a matrix in one unit are not rounding.
-
-    In one unit a row that says anything has entries of about 1: if all are far smaller, they are
-    rounding themselves (rows that a plane mechanism fulfils anyway).
-    """
-    if not values.size:
-        return 0
-    return int(np.count_nonzero(values > RANK_TOLERANCE * max(float(values[0]), 1.0)))
-
-
-def allowed_motions(jacobian: Array) -> Array:
-    """Return an orthonormal basis N of the motions with J N = 0, shape (nv, m); J in one unit."""
-    _, values, vectors = np.linalg.svd(jacobian)
-    return vectors[rank_of(values) :].T
-
-
-def pseudo_inverse(jacobian: Array) -> Array:
-    """Return the pseudo-inverse of a matrix in one unit, rounding taken as zero."""
-    left, values, right = np.linalg.svd(jacobian, full_matrices=False)
-    rank = rank_of(values)
-    inverse: Array = (right[:rank].T / values[:rank]) @ left[:, :rank].T
-    return inverse
-
-
-def least_norm(matrix: Array, right: Array) -> Array:
-    """Return the least-squares solution of least norm, rounding in the matrix taken as zero."""
-    solution: Array = pseudo_inverse(matrix) @ right
-    return solution

@@ -18,9 +18,14 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.assembly.positions import ClosedLoopPositions
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.constraints.loops import refuse_twice
-from rps_pin.closed_loop.dynamics.inverse_dynamics import allowed_motions, condition_number
 from rps_pin.closed_loop.dynamics.passive_factors import PassiveSolver
 from rps_pin.errors import ClosureError, InputError, SingularityError
+from rps_pin.numerics.linear_algebra import (
+    condition_number,
+    least_norm,
+    null_space,
+    singular_values,
+)
 from rps_pin.validation import real_vector
 
 #: Past this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
@@ -67,7 +72,7 @@ class ClosedLoopKinematics(ClosedLoopPositions):
         """
         scale = self._loops.column_scale
         jacobian = self._scaled(self._loops.jacobian(real_vector(q, self.model.nq, "q")))
-        return scale[:, None] * allowed_motions(jacobian)
+        return scale[:, None] * null_space(jacobian)
 
     def motion_basis(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
         """Return T, shape (nv, m): v = T u, u the velocities of m joints moving independently.
@@ -101,7 +106,7 @@ class ClosedLoopKinematics(ClosedLoopPositions):
             )
         # N is orthonormal in one unit: joints that take part in all motions have a block of size 1.
         scaled = own / self._loops.column_scale[chosen][:, None]
-        smallest = float(np.linalg.svd(scaled, compute_uv=False).min(initial=1.0))
+        smallest = float(singular_values(scaled).min(initial=1.0))
         condition = 1 / smallest if smallest > 0 else np.inf
         if not condition <= self.max_condition:
             raise SingularityError(
@@ -262,7 +267,7 @@ class ClosedLoopKinematics(ClosedLoopPositions):
         left = rows * jacobian[:, rest] * columns
         self._refuse(condition_number(left))
         right = -rows[:, 0] * (jacobian[:, given] @ values + drift)
-        scaled, *_ = np.linalg.lstsq(left, right, rcond=None)
+        scaled = least_norm(left, right)
         opening = float(np.abs(left @ scaled - right).max(initial=0.0))
         size = float(np.abs(right).max(initial=0.0))
         if opening > _CONSISTENT * max(size, 1e-3):

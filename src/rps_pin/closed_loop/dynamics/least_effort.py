@@ -13,12 +13,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from scipy.linalg.lapack import dgesdd
-
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.dynamics.inverse_dynamics import RANK_TOLERANCE
 from rps_pin.errors import SingularityError
+from rps_pin.numerics.linear_algebra import full_svd, rank
 
 
 class LeastEffort(NamedTuple):
@@ -35,7 +32,7 @@ class LeastEffort(NamedTuple):
 
 
 def least_effort(
-    actuator_motions: Array, reduced_force: Array, weights: Array | None = None
+    actuator_motions: Array, reduced_force: Array, weights: Array | None = None, size: float = 1.0
 ) -> LeastEffort:
     """Return the actuator forces tau with (S N)' tau = N' f and least |W tau|.
 
@@ -48,12 +45,14 @@ def least_effort(
         N' f, shape (m,).
     weights
         Diagonal of W, shape (na,), positive; one if left out.
+    size
+        Largest singular value that W^-1 S N can have, for the rule of rank.
     """
     weighted = actuator_motions if weights is None else actuator_motions / weights[:, None]
     left, values, right = full_svd(weighted.T)  # of (S N)' W^-1, which takes W tau to N' f
-    rank = numerical_rank(values)
-    along = (reduced_force @ left[:, :rank]) / values[:rank]
-    tau, free = along @ right[:rank], right[rank:].T
+    count = rank(values, size=size)
+    along = (reduced_force @ left[:, :count]) / values[:count]
+    tau, free = along @ right[:count], right[count:].T
     if weights is not None:
         tau, free = tau / weights, free / weights[:, None]
     missing = reduced_force - tau @ actuator_motions
@@ -81,38 +80,17 @@ def unproduced_force(motions: Array, missing: Array, scale: Array) -> Array:
     return force
 
 
-def refuse_nearly_singular(values: Array, max_condition: float) -> None:
+def refuse_nearly_singular(values: Array, max_condition: float, size: float = 1.0) -> None:
     """Raise `SingularityError` if a motion is moved by actuators, but hardly.
 
-    Singular values below the rank tolerance are taken as zero: those motions are not actuated.
+    Singular values that do not count (see `rank`) are of motions that are not actuated.
     """
-    rank = numerical_rank(values)
-    if rank and not values[0] <= max_condition * values[rank - 1]:
-        condition = float(values[0] / values[rank - 1])
+    count = rank(values, size=size)
+    if count and not values[0] <= max_condition * values[count - 1]:
+        condition = float(values[0] / values[count - 1])
         raise SingularityError(
             "the actuators hardly move one of the mechanism's motions here: the condition number "
             f"is {condition:.3g}, and at most {max_condition:.3g} is accepted",
             condition,
             max_condition,
         )
-
-
-def numerical_rank(values: Array) -> int:
-    """Return how many singular values, given largest first, are not rounding error."""
-    if values.size and values[-1] > RANK_TOLERANCE * values[0]:
-        return values.size
-    return int(np.count_nonzero(values > RANK_TOLERANCE * values[0])) if values.size else 0
-
-
-def full_svd(matrix: Array) -> tuple[Array, Array, Array]:
-    """Return U, the singular values and V' of a matrix, U and V square; finite entries only.
-
-    LAPACK's own routine: NumPy's wrapper costs several times as much on matrices of this size.
-    """
-    rows, columns = matrix.shape
-    if not (rows and columns):
-        return np.eye(rows), np.zeros(0), np.eye(columns)
-    left, values, right, info = dgesdd(matrix)
-    if info:
-        raise np.linalg.LinAlgError(f"LAPACK's dgesdd did not converge (info = {info})")
-    return left, values, right

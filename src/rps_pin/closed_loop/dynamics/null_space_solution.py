@@ -12,17 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array, Indices
-from rps_pin.closed_loop.dynamics.inverse_dynamics import (
-    RANK_TOLERANCE,
-    allowed_motions,
-    least_norm,
-)
 from rps_pin.closed_loop.dynamics.least_effort import (
     least_effort,
     refuse_nearly_singular,
     unproduced_force,
 )
 from rps_pin.errors import SingularityError
+from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, least_norm, null_space
 
 #: What actuators may leave of N' f, relative to it, before it counts as unproduced.
 _PRODUCED = 1e-9
@@ -89,7 +85,7 @@ def solve_by_allowed_motions(
 
 def scaled_motions(jacobian: Array, scale: Array) -> Array:
     """Return N, shape (nv, m), with J N = 0 and N / scale orthonormal."""
-    return scale[:, None] * allowed_motions(jacobian * scale)
+    return scale[:, None] * null_space(jacobian * scale)
 
 
 def _exact(of_actuators: Array, reduced: Array, max_condition: float) -> Array:

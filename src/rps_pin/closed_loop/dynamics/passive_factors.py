@@ -19,7 +19,7 @@ from scipy.linalg.blas import dasum, dtrsm
 from scipy.linalg.lapack import dgeqp3, dormqr
 
 from rps_pin.arrays import Array, Indices
-from rps_pin.closed_loop.dynamics.inverse_dynamics import RANK_TOLERANCE, condition_number
+from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, condition_number, rank
 
 #: What no well conditioned J_p, in one unit, makes of a right side of 1.
 _HUGE = 1e12
@@ -47,7 +47,7 @@ class PassiveFactors:
         self._largest, smallest = float(pivots.max()), float(pivots.min())
         #: Estimate of the condition number from the pivots; the true one is rarely 10 times larger.
         self.condition = np.inf
-        if smallest > RANK_TOLERANCE * max(1.0, self._largest):  # more than rounding (`rank_of`)
+        if rank(np.array([self._largest, smallest])) == 2:  # the pivots stand for singular values
             self.condition = self._largest / smallest
 
     def multipliers(self, force: Array) -> Array:

@@ -24,9 +24,9 @@ from scipy.linalg.lapack import dposv
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.dynamics.forward_dynamics import solve_reduced
-from rps_pin.closed_loop.dynamics.inverse_dynamics import RANK_TOLERANCE
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.errors import ClosureError, SingularityError
+from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, rank, singular_values
 
 if TYPE_CHECKING:
     from rps_pin.closed_loop.model import ClosedLoopModel
@@ -111,33 +111,29 @@ class ClosedManifold:
         jacobian, gaps = self._evaluate(q)
         # Rows that are redundant where the loops are closed differ here by about the gap.
         nearly = _OF_GAPS * self._worst(gaps) / self._mechanism.characteristic_length
-        tolerance = max(RANK_TOLERANCE, nearly)
-        rank = 0
-        if jacobian.size:
-            values = np.linalg.svd(jacobian, compute_uv=False)
-            rank = int(np.count_nonzero(values > tolerance * values[0]))
-        if self._rank >= 0 and rank != self._rank:
+        found = rank(singular_values(jacobian), max(RANK_TOLERANCE, nearly))
+        if self._rank >= 0 and found != self._rank:
             raise SingularityError(
-                f"the closures had {self._rank} independent rows and have {rank} here: the motion "
+                f"the closures had {self._rank} independent rows and have {found} here: the motion "
                 "is not determined any more",
                 np.inf,
                 self._mechanism.max_condition,
             )
-        self._rank, nv = rank, self.model.nv
-        if rank == 0:
+        self._rank, nv = found, self.model.nv
+        if found == 0:
             self._rows, self._dependent = np.zeros(0, np.intp), np.zeros(0, np.intp)
         else:
             *_, order = qr(jacobian.T, mode="economic", pivoting=True)
-            self._rows = np.sort(order[:rank]).astype(np.intp)
+            self._rows = np.sort(order[:found]).astype(np.intp)
             *_, order = qr(jacobian[self._rows], mode="economic", pivoting=True)
-            self._dependent = np.sort(order[:rank]).astype(np.intp)
+            self._dependent = np.sort(order[:found]).astype(np.intp)
         self._independent = np.setdiff1d(np.arange(nv), self._dependent)
-        self._all_rows = rank == self._loops.size
-        self._factors = eigenpy.PartialPivLU(max(rank, 1))
-        self._basis = np.zeros((nv, nv - rank))
+        self._all_rows = found == self._loops.size
+        self._factors = eigenpy.PartialPivLU(max(found, 1))
+        self._basis = np.zeros((nv, nv - found))
         self._basis[self._independent] = np.diag(self._columns[self._independent])
         self._rcond = self._chosen_rcond = 1.0
-        if rank:
+        if found:
             self._factors.compute(jacobian[np.ix_(self._rows, self._dependent)])
             self._rcond = self._chosen_rcond = self._factors.rcond()
 

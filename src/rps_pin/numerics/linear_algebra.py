@@ -1,0 +1,98 @@
+"""Linear algebra with one rule of rank: null space, pseudo-inverse, least norm, condition number.
+
+**The rule of rank.** Of a matrix whose entries have one unit, so that a row or column that says
+anything has entries of the order of 1, a singular value counts if
+
+    s_i > tolerance * max(s_0, 1),
+
+s_0 the largest. Where all singular values are far below 1 the whole matrix is rounding error and
+its rank is 0: such are the rows of a closure that keeps a planar mechanism in its plane. A matrix
+of another size (weighted, for example) is compared with `size` instead of 1. Every rank, null
+space and pseudo-inverse in the package is determined by `rank`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.linalg.lapack import dgesdd
+
+from rps_pin.arrays import Array
+
+#: A singular value below this, relative to the largest (or to 1 if that is less), counts as zero.
+RANK_TOLERANCE = 1e-10
+
+
+def rank(values: Array, tolerance: float = RANK_TOLERANCE, size: float = 1.0) -> int:
+    """Return the rank of a matrix by its singular values; see the module's text.
+
+    Parameters
+    ----------
+    values
+        Singular values, largest first.
+    tolerance
+        What counts as zero, relative to the largest or to `size`.
+    size
+        Largest singular value of a matrix of this kind that is not rounding error.
+    """
+    if not values.size:
+        return 0
+    least = tolerance * max(float(values[0]), size)
+    return values.size if values[-1] > least else int(np.count_nonzero(values > least))
+
+
+def singular_values(matrix: Array) -> Array:
+    """Return the singular values, largest first."""
+    return np.asarray(np.linalg.svd(matrix, compute_uv=False), np.float64)
+
+
+def full_svd(matrix: Array) -> tuple[Array, Array, Array]:
+    """Return U, the singular values and V' of a matrix, U and V square; finite entries only.
+
+    LAPACK's own routine: NumPy's wrapper costs several times as much on matrices of this size.
+    """
+    rows, columns = matrix.shape
+    if not (rows and columns):
+        return np.eye(rows), np.zeros(0), np.eye(columns)
+    left, values, right, info = dgesdd(matrix)
+    if info:
+        raise np.linalg.LinAlgError(f"LAPACK's dgesdd did not converge (info = {info})")
+    return left, values, right
+
+
+def null_space(matrix: Array) -> Array:
+    """Return an orthonormal basis N of all x with A x = 0, shape (n, n - rank)."""
+    _, values, right = np.linalg.svd(matrix)
+    return right[rank(values) :].T
+
+
+def pseudo_inverse(matrix: Array) -> Array:
+    """Return the pseudo-inverse, singular values that do not count taken as zero."""
+    left, values, right = np.linalg.svd(matrix, full_matrices=False)
+    count = rank(values)
+    inverse: Array = (right[:count].T / values[:count]) @ left[:, :count].T
+    return inverse
+
+
+def least_norm(matrix: Array, right: Array) -> Array:
+    """Return the least-squares solution x of A x = b of least norm, shape (n,) or (n, k)."""
+    solution: Array = pseudo_inverse(matrix) @ right
+    return solution
+
+
+def condition_number(matrix: Array) -> float:
+    """Return the largest singular value over the smallest of a matrix that must not lose a column.
+
+    ``inf`` where A x = 0 for some x other than 0: fewer rows than columns, a singular value of
+    zero, or nothing but rounding error. 1 without columns.
+    """
+    rows, columns = matrix.shape
+    if columns == 0:
+        return 1.0
+    if rows < columns:
+        return math.inf
+    values = singular_values(matrix)
+    if rank(values) == 0 or not values[-1] > 0:
+        return math.inf
+    return float(values[0] / values[-1])

@@ -1,0 +1,94 @@
+"""Linear algebra: the rule of rank, null spaces, condition numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rps_pin.numerics.linear_algebra import (
+    condition_number,
+    full_svd,
+    least_norm,
+    null_space,
+    pseudo_inverse,
+    rank,
+    singular_values,
+)
+
+Array = NDArray[np.float64]
+
+
+def matrix(rank: int, rows: int, columns: int, seed: int = 0) -> Array:
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, columns))
+
+
+@pytest.mark.parametrize(("rank", "rows", "columns"), [(3, 3, 5), (2, 6, 5), (5, 6, 5), (1, 1, 1)])
+def test_null_space_is_an_orthonormal_basis(rank: int, rows: int, columns: int) -> None:
+    jacobian = matrix(rank, rows, columns)
+    motions = null_space(jacobian)
+    assert motions.shape == (columns, columns - rank)
+    np.testing.assert_allclose(jacobian @ motions, 0, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(motions.T @ motions, np.eye(columns - rank), rtol=0, atol=1e-13)
+
+
+def test_without_closures_every_motion_is_allowed() -> None:
+    assert null_space(np.zeros((0, 4))).shape == (4, 4)
+
+
+def test_condition_number_is_the_ratio_of_singular_values() -> None:
+    rotation = np.linalg.qr(matrix(3, 3, 3))[0]
+    assert condition_number(rotation @ np.diag([4.0, 2.0, 0.5])) == pytest.approx(8, rel=1e-14)
+    assert condition_number(rotation) == pytest.approx(1, rel=1e-14)
+    assert condition_number(matrix(2, 6, 2)) == pytest.approx(np.linalg.cond(matrix(2, 6, 2)))
+
+
+def test_condition_number_without_an_answer_is_infinite() -> None:
+    assert condition_number(np.ones((2, 3))) == np.inf
+    assert condition_number(np.zeros((3, 3))) == np.inf
+    assert condition_number(np.diag([1.0, 0.0])) == np.inf
+    assert condition_number(matrix(2, 3, 3)) > 1e14
+
+
+def test_condition_number_without_passive_joints_is_1() -> None:
+    assert condition_number(np.zeros((0, 0))) == condition_number(np.zeros((6, 0))) == 1
+
+
+# The rule of rank ---------------------------------------------------------------------------------
+
+
+def test_rank_counts_what_is_more_than_rounding() -> None:
+    assert rank(np.array([3.0, 1.0, 1e-9])) == 3
+    assert rank(np.array([3.0, 1.0, 1e-11])) == 2
+    assert rank(np.array([3.0, 1.0, 1e-9]), tolerance=1e-6) == 2
+    assert rank(np.zeros(0)) == 0
+
+
+def test_a_matrix_of_rounding_errors_has_no_rank() -> None:
+    """In one unit. Of matrices of another size, that size tells."""
+    assert rank(np.array([1e-12, 1e-23])) == 0
+    assert rank(np.array([1e-12, 1e-23]), size=1e-12) == 1
+    assert rank(np.array([1e6, 1.0, 1e-5])) == 2
+    assert null_space(np.full((2, 3), 1e-15)).shape == (3, 3)
+    assert condition_number(np.full((2, 1), 1e-15)) == np.inf
+    np.testing.assert_array_equal(pseudo_inverse(np.full((2, 3), 1e-15)), np.zeros((3, 2)))
+
+
+@pytest.mark.parametrize(("r", "rows", "columns"), [(3, 3, 5), (2, 6, 5), (5, 6, 5), (1, 1, 1)])
+def test_least_norm_solution_is_numpy_s(r: int, rows: int, columns: int) -> None:
+    a, b = matrix(r, rows, columns), np.random.default_rng(1).normal(size=(rows, 2))
+    expected, *_ = np.linalg.lstsq(a, b, rcond=1e-9)
+    np.testing.assert_allclose(least_norm(a, b), expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(pseudo_inverse(a), np.linalg.pinv(a, 1e-9), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(3, 5), (5, 3), (4, 4), (0, 3), (3, 0)])
+def test_full_svd_is_one(shape: tuple[int, int]) -> None:
+    a = np.random.default_rng(2).normal(size=shape)
+    left, values, right = full_svd(a)
+    middle = np.zeros(shape)
+    np.fill_diagonal(middle, values)
+    np.testing.assert_allclose(left @ middle @ right, a, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(left @ left.T, np.eye(shape[0]), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(values, singular_values(a), rtol=1e-13)
