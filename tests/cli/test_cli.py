@@ -1,12 +1,11 @@
-"""The commands as a person types them: in a process of their own."""
+"""The commands as a person types them; a real process where the process is what is tested."""
 
 from __future__ import annotations
 
 import csv
 import json
+import os
 import signal
-import subprocess
-import sys
 import time
 import urllib.request
 from pathlib import Path
@@ -17,6 +16,8 @@ from numpy.testing import assert_allclose
 
 from rps_pin import InputError, RPSParameters, RPSRobot, __version__, helix
 from rps_pin.cli.helix_options import middle_height
+from tests import processes
+from tests.cli.commands import rps_pin
 from tests.processes import RPS_PIN, start
 
 FIGURES = [
@@ -24,13 +25,6 @@ FIGURES = [
     for name in ("7_path", "8_lengths", "9_forces")
     for suffix in ("png", "svg")
 ]
-
-
-def rps_pin(*arguments: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from rps_pin.cli import main; main()", *arguments]
-    return subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, timeout=120, check=False
-    )
 
 
 @pytest.fixture(scope="module")
@@ -134,10 +128,30 @@ def test_an_error_is_one_clear_line(arguments: list[str], words: str, tmp_path: 
     assert words in line
 
 
-def test_wrong_usage_ends_with_status_two() -> None:
-    run = rps_pin("helix", "--no-such-option")
-    assert run.returncode == 2
-    assert "Traceback" not in run.stderr
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["ik", "--pose", "0.4", "0", "0", "--json"], 0, '"reachable": true'),
+        (["ik", "--robot", "nope", "--pose", "0.4", "0", "0"], 1, "error: "),
+        (["ik", "--no-such-option"], 2, "--no-such-option"),
+    ],
+)
+def test_the_exit_status_of_the_process(arguments: list[str], status: int, words: str) -> None:
+    ended = processes.run([*RPS_PIN, *arguments], env={**os.environ, "TERM": "dumb"})
+    assert ended.returncode == status
+    assert words in (ended.stderr if status else ended.stdout)
+    assert (ended.stdout if status else ended.stderr) == ""
+    assert "Traceback" not in ended.stderr
+
+
+def test_a_reader_that_leaves_ends_the_process_quietly() -> None:
+    """As ``rps-pin urdf | true`` does: its output has no reader any more."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w") as pipe:
+        ended = processes.run([*RPS_PIN, "urdf"], stdout=pipe)
+    assert ended.returncode == 1
+    assert ended.stderr == ""
 
 
 def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ import pytest
 from rps_pin import SingularityError
 from rps_pin.cli.control import control_command
 from rps_pin.control import Plant
+from tests.cli.commands import rps_pin
 
 SCENARIO = """robot: micro
 trajectory: {kind: circle, height: 0.223, tilt: 0.05, duration: 0.4}
@@ -27,20 +26,13 @@ FILES = {
     *("report.md", "loop.csv", "summary.json", "viewer.html"),
     *("tracking.png", "tracking.svg", "forces.png", "forces.svg"),
 }
-COMMAND = [sys.executable, "-c", "from rps_pin.cli import main; main()", "control"]
-
-
-def control(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=240, check=False
-    )
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("control")
     (folder / "weekday.yaml").write_text(SCENARIO)
-    run = control(folder, "weekday.yaml", "--json")
+    run = rps_pin("control", "weekday.yaml", "--json", folder=folder)
     assert run.returncode == 0, run.stderr
     assert run.stderr == ""
     return folder / "weekday-control", run.stdout
@@ -103,7 +95,7 @@ def test_the_report_says_what_ran_and_what_came_of_it(finished: tuple[Path, str]
 def test_mistakes_are_told_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "bad.yaml").write_text(SCENARIO.replace("bandwidth", "bandwith"))
     for name, words in (("bad.yaml", "unknown key 'bandwith'"), ("none.yaml", "cannot read")):
-        run = control(tmp_path, name)
+        run = rps_pin("control", name, folder=tmp_path)
         assert run.returncode == 1
         assert words in " ".join(run.stderr.split())
         assert "Traceback" not in run.stderr

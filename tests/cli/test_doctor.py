@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -13,6 +12,8 @@ from packaging.requirements import Requirement
 
 from rps_pin.cli.doctor import _BROWSERS, PARTS, _browser
 from rps_pin.viewer.files.browser import BROWSERS
+from tests import processes
+from tests.cli.commands import rps_pin
 
 ROOT = Path(__file__).resolve().parents[2]
 #: A stranger's Python in which a package cannot be imported.
@@ -31,13 +32,11 @@ main()
 
 def doctor(*arguments: str, hidden: str = "nothing", reason: str = "it is not there"):
     code = BROKEN.format(name=hidden, reason=reason, arguments=list(arguments))
-    return subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=False
-    )
+    return processes.run([sys.executable, "-c", code])
 
 
 def test_all_is_well_here() -> None:
-    run = doctor("doctor", "--json")
+    run = rps_pin("doctor", "--json")
     assert run.returncode == 0
     answer = json.loads(run.stdout)
     assert answer["ok"]

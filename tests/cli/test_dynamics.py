@@ -1,10 +1,8 @@
-"""``rps-pin dynamics``: any trajectory file on any robot, in a process of its own."""
+"""``rps-pin dynamics``: any trajectory file on any robot."""
 
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +12,7 @@ from numpy.testing import assert_allclose
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.rps import Payload
 from rps_pin.trajectories import circle
+from tests.cli.commands import rps_pin
 
 CIRCLE = "kind: circle\nheight: 0.223\ntilt: 0.1\nduration: 2.0\n"
 FIGURES = [
@@ -24,13 +23,6 @@ FIGURES = [
     )
     for suffix in ("png", "svg")
 ]
-
-
-def rps_pin(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from rps_pin.cli import main; main()", *arguments]
-    return subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, timeout=120, check=False
-    )
 
 
 @pytest.fixture(scope="module")

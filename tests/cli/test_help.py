@@ -11,24 +11,16 @@ import pytest
 from typer.testing import CliRunner
 
 from rps_pin.cli.app import app
+from tests.cli.commands import rps_pin
+from tests.processes import RPS_PIN, run
 
-PROGRAM = "import sys; sys.argv[0] = 'rps-pin'; from rps_pin.cli import main; main()"
-MAIN = [sys.executable, "-c", PROGRAM]
 COMMANDS = sorted(str(one.name) for one in app.registered_commands)
 
 
 def said(*arguments: str, folder: Path | None = None, **environment: str) -> str:
-    run = subprocess.run(
-        [*MAIN, *arguments],
-        cwd=folder,
-        env={**os.environ, "COLUMNS": "80", "TERM": "dumb", **environment},
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-    assert run.stderr == ""
-    return run.stdout
+    found = rps_pin(*arguments, folder=folder, **{"COLUMNS": "80", "TERM": "dumb"} | environment)
+    assert found.stderr == ""
+    return found.stdout
 
 
 def test_the_help_fits_a_screen() -> None:
@@ -52,11 +44,14 @@ def completed(folder: Path, *words: str) -> set[str]:
 
 
 def test_the_shell_is_told_how_to_complete(tmp_path: Path) -> None:
-    """As ``--install-completion`` writes it down; bash must understand it."""
+    """As ``--install-completion`` writes it down; bash must understand it, and get its answer."""
     script = said(_RPS_PIN_COMPLETE="source_bash")
     assert "complete -o default -F _rps_pin_completion rps-pin" in script
     (tmp_path / "completion.sh").write_text(script)
     subprocess.run(["bash", "-n", tmp_path / "completion.sh"], check=True)
+    asked = {"_RPS_PIN_COMPLETE": "complete_bash", "COMP_WORDS": "rps-pin he", "COMP_CWORD": "1"}
+    answered = run(RPS_PIN, env=os.environ | asked)
+    assert (answered.stdout.split(), answered.stderr) == (["helix"], "")
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rps_pin import ClosedLoopModel
-from tests.cli.test_cli import rps_pin
+from tests.cli.commands import rps_pin
 
 URDF = Path(__file__).resolve().parents[2] / "urdf"
 

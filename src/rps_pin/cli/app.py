@@ -74,7 +74,7 @@ def rps_pin(
 def run() -> None:
     """Run the command line."""
     try:
-        app()
+        app(prog_name="rps-pin")
     except RPSPinError as error:
         _complain(str(error))
         sys.exit(1)
