@@ -1,8 +1,21 @@
-"""Settings of every test: Hypothesis draws the same examples each time, and takes its time."""
+"""Settings of every test, and what several test files share.
+
+Hypothesis draws the same examples each time, and takes its time. The quick reproduction of the
+paper is computed once for all test processes.
+"""
 
 from __future__ import annotations
 
+import fcntl
+import os
+import pickle
+from typing import TYPE_CHECKING
+
+import pytest
 from hypothesis import HealthCheck, Phase, settings
+
+if TYPE_CHECKING:
+    from rps_pin.paper.compute import Reproduction
 
 settings.register_profile(
     "rps_pin",
@@ -14,3 +27,20 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("rps_pin")
+
+
+@pytest.fixture(scope="session")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Reproduction:
+    """The quick reproduction; parallel test processes share one through a file."""
+    from rps_pin.paper.compute import compute
+
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent  # of this run, of all its processes
+    kept = folder / "reproduction.pickle"
+    with (folder / "reproduction.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not kept.exists():
+            kept.write_bytes(pickle.dumps(compute(quick=True)))
+        reproduction: Reproduction = pickle.loads(kept.read_bytes())
+    return reproduction

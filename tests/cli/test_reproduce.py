@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from rps_pin.cli.reproduce import reproduce_command
 from rps_pin.paper import compute, write
+from rps_pin.paper.compute import Reproduction
 from rps_pin.paper.figures import pictures
 from rps_pin.paper.page import render
 from rps_pin.paper.reading_tables import readings_csv
@@ -19,12 +20,13 @@ app = typer.Typer()
 app.command()(reproduce_command)
 
 
-def test_a_quick_run_writes_everything_and_the_same_twice(tmp_path: Path) -> None:
+def test_a_quick_run_writes_everything_and_the_same_twice(
+    tmp_path: Path, found: Reproduction
+) -> None:
     run = CliRunner().invoke(app, ["--quick", "-o", str(tmp_path / "new" / "one")])
     assert run.exit_code == 0, run.output
     folder = tmp_path / "new" / "one"
-    again = compute.compute(quick=True)
-    names = {f"{name}.png" for name in pictures(again)}
+    names = {f"{name}.png" for name in pictures(found)}
     assert {path.name for path in folder.iterdir()} == {"reproduction.md", "reproduction"}
     beside = folder / "reproduction"
     assert {path.name for path in beside.iterdir()} == names | {"readings.csv"}
@@ -36,8 +38,8 @@ def test_a_quick_run_writes_everything_and_the_same_twice(tmp_path: Path) -> Non
     for words in ("reproduction.md", "readings.csv", "figure_9.png", "closest to Table 2"):
         assert words in run.output
 
-    assert (folder / "reproduction.md").read_text("utf-8") == render(again)
-    assert (beside / "readings.csv").read_text("utf-8") == readings_csv(again)
+    assert (folder / "reproduction.md").read_text("utf-8") == render(found)
+    assert (beside / "readings.csv").read_text("utf-8") == readings_csv(found)
 
 
 def test_an_interrupted_computation_leaves_nothing(
