@@ -38,7 +38,7 @@ from benchmarks.tick_peers import MujocoTick, PlainTick, QPTick
 from rps_pin import LoopClosure, RPSRobot
 from rps_pin.control import ComputedTorque, Gains, RealTimeRobot, Status
 from rps_pin.control.estimator.constrained_forces import ConstrainedForces
-from rps_pin.control.estimator.effective_inertia import ReducedMass
+from rps_pin.control.estimator.effective_inertia import TaskSpaceInertia
 from rps_pin.control.estimator.place import place_of
 from rps_pin.control.estimator.scalar_rates import leg_gains
 from rps_pin.control.estimator.scalar_state import state_at
@@ -102,7 +102,7 @@ def stages(robot: RPSRobot) -> dict[str, Callable[[int], object]]:
 
 def limited(robot: RPSRobot, places: list) -> Callable[[int], object]:
     """Return what limits forces that are half as much again as the actuators allow."""
-    reduced, limits = ReducedMass(robot), ForceLimits((4.0, 4.0, 4.0))
+    reduced, limits = TaskSpaceInertia(robot), ForceLimits((4.0, 4.0, 4.0))
     h = robot.parameters.platform_radius
     cases = [(reduced.of(one), leg_gains(one.pose, one.way, one.coefficient, h)) for one in places]
     path = (0.01, 0.1, 0.1)

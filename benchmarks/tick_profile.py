@@ -27,7 +27,7 @@ from rich.table import Table
 from benchmarks.latency import GAINS, PERIOD, machine, motion
 from rps_pin import RPSRobot
 from rps_pin.control import ComputedTorque
-from rps_pin.control.estimator.numbers import three_floats
+from rps_pin.control.estimator.loop_arguments import three_floats
 from rps_pin.control.estimator.reading import reading_of
 from rps_pin.control.estimator.scalar_state import state_at
 from rps_pin.rps.kinematics.tracking import follow
@@ -47,13 +47,13 @@ def parts() -> dict[str, Callable[[], object]]:
     for i in range(_HALF_WAY):
         controller.tick(lengths[i], targets[i])
     loop, reading = controller.estimate, lengths[_HALF_WAY]
-    place, rate, speed, _ = loop.known
+    place, rate, speed, _ = loop.state
     d = three_floats(reading)
     assert d is not None
     turned, _, _ = follow(place.length, place.way, d, g, h, 1e6, 20)
     wanted = (1.0, 2.0, 3.0)
     state = state_at(place, rate, wanted, h)
-    goal = controller._targets.goal
+    goal = controller._setpoints.current
     motions = itertools.cycle(
         list(
             zip(
@@ -72,11 +72,12 @@ def parts() -> dict[str, Callable[[], object]]:
         ),
         "pose, rates, twist, gains": lambda: reading_of(d, turned, speed, g, h),
         "limits, answers written": lambda: (
-            loop._limits.broken(place),
+            loop._limits.violated(place),
             loop._limits.too_fast(speed),
-            loop._write(place.pose, rate, (0.0,) * 6, place.angle, speed),
         ),
-        "target: legs, limits, singularity": lambda: controller._targets._allowed(goal.place.pose),
+        "target: legs, limits, singularity": lambda: controller._setpoints._allowed(
+            goal.geometry.pose
+        ),
         "the law": lambda: controller._pid(errors, rate, rate, PERIOD),
         "state completion": lambda: state_at(place, rate, wanted, h),
         "inverse dynamics (Pinocchio, LU)": lambda: loop.dynamics.solve(state),

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rps_pin.control.loop.speed_filter import SpeedFilter
+from rps_pin.control.loop.filters import SpeedFilter
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Axis(NamedTuple):
             speed = v
         else:
             speeds = SpeedFilter(self.cut_off)
-            speeds.follow((last,) * 3, (filtered,) * 3)
+            speeds.update((last,) * 3, (filtered,) * 3)
             speed = filtered = speeds.after((x,) * 3, T)[1]
         integral += T * self.integral * (0 - x)
         waiting.append(self.derivative * (0 - speed) + self.proportional * (0 - x) + integral)

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import cont2discrete
 
 from rps_pin.control.axis_loop import AxisLoop, axis_loop
-from rps_pin.control.loop.speed_filter import SpeedFilter
+from rps_pin.control.loop.filters import SpeedFilter
 from tests.control.axis_ticks import Axis, random_axis
 
 
@@ -63,7 +63,7 @@ def test_filtered_speed_of_a_sine(cut_off: float, t: float) -> None:
     for tick in range(ticks):
         length = (math.cos(t * tick),) * 3
         speed = speeds.after(length, T)
-        speeds.follow(length, speed)
+        speeds.update(length, speed)
         found = speed[0]
     angle = np.array(t)
     with_speed = axis_loop(0, 1.0, 0, T, 3, cut_off, 1).response(angle)

@@ -98,13 +98,16 @@ def test_no_noise_takes_nothing_from_the_generator() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"resolution": -1e-9}, "encoder resolution = -1e-09: it must be zero or more"),
+        (
+            {"resolution": -1e-9},
+            "encoder resolution = -1e-09: it must be a number of m, zero",
+        ),
         ({"resolution": math.nan}, "encoder resolution = nan"),
         ({"resolution": math.inf}, "encoder resolution = inf"),
         ({"noise": -1.0}, "encoder noise = -1.0"),
         ({"noise": math.nan}, "encoder noise = nan"),
         ({"noise": math.inf}, "encoder noise = inf"),
-        ({"seed": -1}, "encoder seed = -1: it must be zero or more"),
+        ({"seed": -1}, "encoder seed = -1: it must be a whole number, at least 0"),
     ],
 )
 def test_numbers_that_do_not_fit_are_refused(changes: dict[str, Any], said: str) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from rps_pin import RPSRobot
-from rps_pin.control.estimator.effective_inertia import ReducedMass
+from rps_pin.control.estimator.effective_inertia import TaskSpaceInertia
 from rps_pin.control.estimator.place import place_of
 from rps_pin.control.estimator.scalar_rates import LegGains, leg_gains
 from rps_pin.control.loop.force_limits import ForceLimits
@@ -24,7 +24,7 @@ def places(count: int, seed: int) -> list[tuple[Array, LegGains]]:
     found = []
     while len(found) < count:
         p = strategies.random_parameters(rng)
-        reduced = ReducedMass(RPSRobot(p))
+        reduced = TaskSpaceInertia(RPSRobot(p))
         for x, y, z in strategies.random_motions(rng, p, 20)[0].tolist():
             place = place_of((x, y, z), p.base_radius, p.platform_radius)
             assert place is not None
@@ -65,12 +65,12 @@ def test_forces_are_the_optimum(size: float) -> None:
         assert cost - best.cost <= 1e-7 * scale
         missing = np.linalg.solve(mass, np.array(gains.K).T @ (force - wanted))
         np.testing.assert_allclose(
-            found.missing, missing, rtol=0, atol=1e-9 * np.abs(missing).max()
+            found.acceleration_error, missing, rtol=0, atol=1e-9 * np.abs(missing).max()
         )
         # Of the target's rate s x the best second derivative, in the same norm, by least squares.
         root = np.linalg.cholesky(mass).T
         hurry = np.linalg.lstsq((root @ path)[:, None], root @ missing, rcond=None)[0][0]
-        assert found.hurry == pytest.approx(hurry, rel=1e-7, abs=1e-7 * abs(hurry) + 1e-12)
+        assert found.pace_rate == pytest.approx(hurry, rel=1e-7, abs=1e-7 * abs(hurry) + 1e-12)
         cut = np.clip(wanted, -limit, limit)
         moved += not np.allclose(force, cut, rtol=0, atol=1e-3 * limit.max())
     assert moved > 30 or size < 2  # cutting off one by one is another thing
@@ -93,4 +93,4 @@ def test_within_and_cut_know_unlimited_actuators() -> None:
     limits = ForceLimits((1.0, math.inf, 2.0))
     assert limits.within((1.0, 1e300, -2.0))
     assert not limits.within((1.0, 0.0, -2.0000001))
-    assert limits.cut((3.0, -1e9, -5.0)) == (1.0, -1e9, -2.0)
+    assert limits.clipped((3.0, -1e9, -5.0)) == (1.0, -1e9, -2.0)

@@ -302,8 +302,8 @@ def test_ctrl_c_in_the_progress_keeps_the_tick_that_was_told() -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"speeds": "guessed"}, "speeds = 'guessed'; it must be 'filtered' or 'measured'"),
-        ({"duration": 0.0}, "duration = 0.0: it must be positive and finite"),
+        ({"speeds": "guessed"}, "speeds = 'guessed': it must be 'filtered' or 'measured'"),
+        ({"duration": 0.0}, "duration = 0.0: it must be a positive number of s"),
         ({"duration": np.inf}, "duration = inf"),
         ({"duration": np.nan}, "duration = nan"),
         ({"settle": -0.1}, "settle = -0.1"),

@@ -123,10 +123,10 @@ def test_on_the_way_back_to_a_target_the_words_say_so() -> None:
     controller, still = made("task"), np.zeros(3)
     length = RPSRobot.from_preset("micro").inverse_kinematics(START).length
     controller.tick(length, (START + 0.1, still, still))
-    assert "the last good target is held" in controller.status_text
+    assert "the last valid target is held" in controller.status_text
     for target in ((START, still, still), None):
         assert controller.tick(length, target) == Status.TARGET_HELD
-        assert "coming back to the target: 0.09" in controller.status_text
+        assert "returning to the target: 0.09" in controller.status_text
 
 
 @pytest.mark.parametrize(("speed", "near"), [(0.4, 0.15), (2.0, 0.05)])
@@ -222,7 +222,7 @@ def test_anti_windup_forgets_what_the_limits_did_not_give() -> None:
     for kind in ("with", "without"):
         controller = made("task", robot)
         if kind == "without":
-            controller._give = (0.0, 0.0, 0.0)
+            controller._tracking_rate = (0.0, 0.0, 0.0)
         plant = Plant(robot, START)
         normal = controller._limits.limit
         heights = [0.0]

@@ -179,7 +179,7 @@ def test_mistakes_are_told_with_their_place(
         ("plant: {colour: red}", "line 4: unknown key 'colour' in plant; the keys are: masses, "),
         ("faults: [{kind: fire, start: 1.0}]", r"line 4: faults\[0\].kind = 'fire': .*'lost'"),
         ("faults: [{kind: lost}]", r"line 4: faults\[0\] needs start"),
-        ("faults: [{kind: jump, start: 1.0}]", "line 4: fault size = 0.0: a jump"),
+        ("faults: [{kind: jump, start: 1.0}]", "line 4: fault size = 0.0: a size"),
         ("faults: [{kind: lost, start: 1.0, leg: 4}]", r"faults\[0\].leg = 4"),
         ("faults:\n  - {kind: lost, start: 1.0}\n  - {kind: lost, begin: 1.0}", "line 6: unknown"),
         ("period: .nan", "line 4: period = nan"),

@@ -1,10 +1,11 @@
-"""The robot's inertia by its pose: M_x = T' M T, with T the tree's velocity for a unit rate each.
+"""Inertia of the robot in task and actuator space: M_x = T' M T.
 
-With K the legs' speeds by the pose's rate, actuator forces f accelerate the pose by
+T is the tree's velocity per unit rate of the pose. With K = d(length)/d(pose), actuator forces f
+accelerate the pose by
 
     x'' = M_x^-1 (K' f - ...),
 
-and the inertia that the actuators see, with d' = K x', is K^-T M_x K^-1.
+and the inertia in actuator space, with d' = K x', is K^-T M_x K^-1.
 """
 
 from __future__ import annotations
@@ -19,18 +20,18 @@ from rps_pin.arrays import Array
 from rps_pin.control.estimator.place import Place, place_of
 from rps_pin.control.estimator.scalar_rates import leg_gains
 from rps_pin.control.estimator.scalar_state import state_at
-from rps_pin.errors import InputError, SingularityError, UnreachableError
-from rps_pin.rps.kinematics.pose import checked_pose
+from rps_pin.errors import SingularityError, UnreachableError
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.validation import choice, real_vector
 
 _UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-_STILL = (0.0, 0.0, 0.0)
-#: T (12, 3), column by column, and q (13), one after the other: packed at once.
+_ZERO = (0.0, 0.0, 0.0)
+#: T (12, 3), column by column, and q (13) in one buffer: faster to fill at once.
 _NUMBERS = struct.Struct("49d")
 
 
-class ReducedMass:
-    """M_x of one robot; for use in one thread. Its memory is allocated once.
+class TaskSpaceInertia:
+    """M_x of one robot, with its memory allocated once; for use in one thread.
 
     Parameters
     ----------
@@ -47,14 +48,14 @@ class ReducedMass:
         self._basis, self._q = numbers[:36].reshape(12, 3, order="F"), numbers[36:]
         self._half = np.triu(np.ones((12, 12)), 1) + np.eye(12) / 2
 
-    def of(self, place: Place) -> Array:
-        """Return M_x at a place, shape (3, 3): kg, kg m and kg m^2."""
+    def of(self, geometry: Place) -> Array:
+        """Return M_x in a pose, shape (3, 3): kg, kg m and kg m^2."""
         numbers: list[float] = []
         for unit in _UNITS:
-            state = state_at(place, unit, _STILL, self._h)
+            state = state_at(geometry, unit, _ZERO, self._h)
             (w1, s1, _, _), (w2, s2, _, _), (w3, s3, _, _) = state.legs
             numbers += (w1, s1, w2, s2, w3, s3, *state.velocity)
-        (phi1, phi2, phi3), (d1, d2, d3) = place.angle, place.length
+        (phi1, phi2, phi3), (d1, d2, d3) = geometry.angle, geometry.length
         numbers += (phi1, d1, phi2, d2, phi3, d3, *state.placement)
         _NUMBERS.pack_into(self._memory, 0, *numbers)
         # crba fills the upper triangle only: M = U + U', U with half of the diagonal.
@@ -64,11 +65,11 @@ class ReducedMass:
 
 
 def effective_inertia(robot: RPSRobot, pose: ArrayLike, *, space: str = "actuator") -> Array:
-    """Return the inertia that each error of a control law sees in a pose, shape (3,).
+    """Return the inertia of each error of a control law in a pose, shape (3,).
 
-    What `Gains.times` takes, to make a law that commands forces as stiff as one that commands
-    accelerations, at this pose. It is the diagonal of the inertia matrix; the rest, by which one
-    error moves another, is what computed torque takes care of and such a law does not.
+    Argument of `Gains.times`, which gives a law that commands forces the stiffness of one that
+    commands accelerations. It is the diagonal of the inertia matrix: the coupling between the
+    errors, which computed torque compensates, is not in it.
 
     Parameters
     ----------
@@ -88,26 +89,22 @@ def effective_inertia(robot: RPSRobot, pose: ArrayLike, *, space: str = "actuato
     SingularityError
         If the pose is singular, in actuator space.
     """
-    if space not in ("actuator", "task"):
-        raise InputError(f"space = {space!r}; it must be 'actuator' or 'task'")
-    x = checked_pose(pose)
-    if x.shape != (3,):
-        raise InputError(f"pose has shape {x.shape}; it must be (3,)")
+    choice(space, "space", ("actuator", "task"))
     p = robot.parameters
-    z, tilt_x, tilt_y = x.tolist()
-    place = place_of((z, tilt_x, tilt_y), p.base_radius, p.platform_radius)
-    if place is None:
+    z, tilt_x, tilt_y = real_vector(pose, 3, "pose").tolist()
+    geometry = place_of((z, tilt_x, tilt_y), p.base_radius, p.platform_radius)
+    if geometry is None:
         raise UnreachableError("a leg has no length in the pose", ())
-    mass = ReducedMass(robot).of(place)
+    mass = TaskSpaceInertia(robot).of(geometry)
     if space == "task":
         return mass.diagonal().copy()
-    gains = leg_gains(place.pose, place.way, place.coefficient, p.platform_radius)
-    if abs(gains.determinant) < 1e-8:
+    jacobian = leg_gains(geometry.pose, geometry.way, geometry.coefficient, p.platform_radius)
+    if abs(jacobian.determinant) < 1e-8:
         raise SingularityError(
-            f"the pose is singular: determinant {gains.determinant:.3g}",
-            1 / max(abs(gains.determinant), 1e-300),
+            f"the pose is singular: determinant {jacobian.determinant:.3g}",
+            1 / max(abs(jacobian.determinant), 1e-300),
             1e8,
         )
-    inverse = np.linalg.inv(np.array(gains.K))
+    inverse = np.linalg.inv(np.array(jacobian.K))
     diagonal: Array = np.einsum("ji,jk,ki->i", inverse, mass, inverse)
     return diagonal

@@ -1,7 +1,8 @@
-"""Where a control loop's answers go: arrays that the caller may own."""
+"""Output arrays of a state estimate, which the caller may own."""
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -11,20 +12,20 @@ from rps_pin.errors import InputError
 
 
 class Answers(NamedTuple):
-    """Arrays of floats that `RealTimeRobot` writes into; SI units."""
+    """Float arrays that `RealTimeRobot` writes its results to; SI units."""
 
     pose: Array
     """(z, tilt_x, tilt_y), shape (3,)."""
     rate: Array
-    """The pose's time derivative, shape (3,)."""
+    """Time derivative of the pose, shape (3,)."""
     twist: Array
     """Velocity of the platform's centre, then its angular velocity, base axes, shape (6,)."""
     angle: Array
     """Leg angles phi, shape (3,)."""
     speed: Array
-    """Leg speeds, as given or filtered, shape (3,)."""
+    """Leg speeds, measured or filtered, shape (3,)."""
     forces: Array
-    """Actuator forces of the last `RealTimeRobot.inverse_dynamics`, shape (3,)."""
+    """Actuator forces of the last inverse dynamics, shape (3,)."""
     reactions: Array
     """Force of each leg on the platform in base axes, of the same call, shape (9,)."""
 
@@ -34,14 +35,15 @@ class Answers(NamedTuple):
         return cls(*(np.zeros(size) for size in _SIZES))
 
     def checked(self) -> Answers:
-        """Return these arrays if a loop can write into them.
+        """Return these arrays if a loop can write to them.
 
         Raises
         ------
         InputError
-            If one is no writeable float64 array of its shape, or two share memory.
+            If one is not a writeable float64 array of its shape, or two share memory.
         """
-        for name, array, size in zip(self._fields, self, _SIZES, strict=True):
+        named = self._asdict()
+        for (name, array), size in zip(named.items(), _SIZES, strict=True):
             if not (isinstance(array, np.ndarray) and array.dtype == np.float64):
                 raise InputError(f"answers.{name} must be a float64 array")
             if array.shape != (size,) or not array.flags.writeable:
@@ -49,12 +51,9 @@ class Answers(NamedTuple):
                     f"answers.{name} has shape {array.shape}, writeable: {array.flags.writeable}; "
                     f"it must be ({size},) and writeable"
                 )
-        for place, array in enumerate(self):
-            for name, other in list(zip(self._fields, self, strict=True))[place + 1 :]:
-                if np.shares_memory(array, other):
-                    raise InputError(
-                        f"answers.{self._fields[place]} and answers.{name} share memory"
-                    )
+        for (name, array), (other, second) in combinations(named.items(), 2):
+            if np.shares_memory(array, second):
+                raise InputError(f"answers.{name} and answers.{other} share memory")
         return self
 
 

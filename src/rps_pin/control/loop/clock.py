@@ -1,10 +1,10 @@
-"""A clock for control loops: ticks at multiples of a period, and what became of them.
+"""Clock of a control loop: ticks at multiples of a period, and statistics of their timing.
 
-Deadlines are absolute, t_k = t_0 + k T, so that no lateness adds up. (`loop-rate-limiters`, which
-would be the library for this, counts each period from when the last sleep returned: 5000 ticks of
-1 ms took 5.46 s here; and it keeps no count of what is late.) A tick whose body ends
-after the next deadline is an overrun: the deadlines that have passed are skipped and counted, never
-made up for by a burst of short ticks. Tick k is always at time k T, whatever was skipped.
+Deadlines are absolute, t_k = t_0 + k T, so that lateness does not accumulate. (The library
+`loop-rate-limiters` counts each period from the end of the last sleep, which took 5.46 s for 5000
+ticks of 1 ms, and does not count late ticks.) A tick that ends after the next deadline is an
+overrun: the deadlines that have passed are skipped and counted, without a burst of short ticks
+afterwards. Tick k is always at time k T, whatever was skipped.
 """
 
 from __future__ import annotations
@@ -14,45 +14,44 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from numbers import Integral
 from typing import Any
 
 from rich.table import Table
 
 from rps_pin.errors import InputError
-from rps_pin.rps.kinematics.leg_equations import checked_positive
+from rps_pin.validation import non_negative_number, positive_number, whole_number
 
-#: Resolution of the percentiles, s, where the period is at most 10 ms; maxima are exact.
+#: Resolution of the percentiles, s, for periods up to 10 ms; maxima are exact.
 RESOLUTION = 1e-6
-_PART = 1e-4
+_RELATIVE_RESOLUTION = 1e-4
 _BINS = 20_000
 
 
 @dataclass(frozen=True)
 class ClockReport:
-    """What became of a loop's ticks; times in s, maxima exact.
+    """Timing statistics of a loop; times in s, maxima exact.
 
-    Percentiles are rounded up to 1 us or 1e-4 periods, whichever is more; one that is above 20000
-    of these is told as the maximum.
+    Percentiles are rounded up to 1 us or 1e-4 periods, whichever is larger; one above 20000 of
+    these is reported as the maximum.
 
     Attributes
     ----------
     period
         As asked for.
     ticks
-        That were begun.
+        Ticks that have begun.
     overruns
-        Whose body ended after the next deadline.
+        Ticks that ended after the next deadline.
     longest_overrun
-        By how much at most.
+        Largest lateness of an end.
     skipped
-        Deadlines that passed meanwhile, and were not run.
+        Deadlines skipped after overruns.
     interval_median, interval_p99, interval_p999, interval_max
         From the beginning of a tick to that of the next one: the period and its jitter.
     late_median, late_p99, late_p999, late_max
-        From a deadline until its tick began.
+        From a deadline to the beginning of its tick.
     busy_median, busy_p99, busy_p999, busy_max
-        From there until its body ended; one left by ``break`` or an exception has no end.
+        From there to the end of the tick's body; not of one left by ``break`` or an exception.
     """
 
     period: float
@@ -75,15 +74,15 @@ class ClockReport:
 
     @property
     def load(self) -> float:
-        """Share of the period that the body takes: its median time over the period."""
+        """The body's median time over the period."""
         return self.busy_median / self.period
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the figures, and the load, as plain data."""
+        """Return the statistics and the load as plain data."""
         return {**asdict(self), "load": self.load}
 
     def table(self) -> Table:
-        """Return the figures for a terminal."""
+        """Return the statistics as a table for a terminal."""
         title = (
             f"{self.ticks} ticks of {1e3 * self.period:.6g} ms, load {100 * self.load:.3g} %: "
             f"{self.overruns} overruns, the longest by {1e6 * self.longest_overrun:.0f} us, "
@@ -99,22 +98,22 @@ class ClockReport:
 
 
 class LoopClock:
-    """Keeps a loop's rate: ``with LoopClock(1e-3) as clock: for k in clock.ticks(1000): ...``.
+    """Fixed rate of a loop: ``with LoopClock(1e-3) as clock: for k in clock.ticks(1000): ...``.
 
-    While its ``with`` block lasts, the garbage collector is frozen and switched off, unless told
-    otherwise: a collection takes milliseconds. It is as it was afterwards, whatever happened; what
-    the program itself has frozen stays so.
+    In its ``with`` block the garbage collector is frozen and off by default, since a collection
+    takes milliseconds. Its state is restored afterwards, also after an exception; objects that the
+    program itself has frozen stay frozen.
 
     Parameters
     ----------
     period
         T, s; positive.
     spin
-        For how long before a deadline to wait without sleeping, s: less lateness, more heat.
+        Time before a deadline in which to wait without sleeping, s: less lateness, more load.
     pause_gc
         Whether to switch off the garbage collector.
     now, sleep
-        Where time comes from, for tests.
+        Source of time, for tests.
 
     Raises
     ------
@@ -131,58 +130,54 @@ class LoopClock:
         now: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.period = checked_positive(period, "period")
-        if not 0.0 <= spin < math.inf:
-            raise InputError(f"spin = {spin}: it must be a time, zero or more")
-        self._spin, self._pause_gc = spin, pause_gc
+        self.period = positive_number(period, "period", "s")
+        self._spin, self._pause_gc = non_negative_number(spin, "spin", "s"), pause_gc
         self._now, self._sleep = now, sleep
-        self._collecting = self._freezing = False
-        resolution = max(RESOLUTION, _PART * self.period)
-        self._interval, self._late, self._busy = (_Times(resolution) for _ in range(3))
+        self._was_enabled = self._freezes = False
+        resolution = max(RESOLUTION, _RELATIVE_RESOLUTION * self.period)
+        self._interval, self._late, self._busy = (_Histogram(resolution) for _ in range(3))
         self._overruns = self._skipped = 0
         self._longest_overrun = 0.0
 
     def __enter__(self) -> LoopClock:
-        self._collecting = self._pause_gc and gc.isenabled()
-        # unfreeze() would also thaw what the program has frozen: then it is left alone.
-        self._freezing = self._collecting and gc.get_freeze_count() == 0
-        if self._collecting:
+        self._was_enabled = self._pause_gc and gc.isenabled()
+        # unfreeze() would also unfreeze the program's own frozen objects: then do not freeze.
+        self._freezes = self._was_enabled and gc.get_freeze_count() == 0
+        if self._was_enabled:
             gc.collect()
             gc.disable()
-        if self._freezing:
+        if self._freezes:
             gc.freeze()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._freezing:
+        if self._freezes:
             gc.unfreeze()
-        if self._collecting:
+        if self._was_enabled:
             gc.enable()
 
     def ticks(self, count: int | None = None, *, duration: float | None = None) -> Iterator[int]:
-        """Yield 0, 1, 2, ... at their times, the first at once; some are skipped by overruns.
+        """Yield 0, 1, 2, ... at their deadlines, the first at once; overruns skip some.
 
         Parameters
         ----------
         count
-            How many deadlines there are: the last tick is number count - 1 or, if that was skipped,
-            one before. For ever if left out.
+            Number of deadlines: the last tick is count - 1, or an earlier one if that is skipped.
+            Default: endless.
         duration
-            Instead of a count, s: every deadline before it.
+            Instead of a count, s: all deadlines before it.
 
         Raises
         ------
         InputError
-            If count or duration is not one, or both are given.
+            If count or duration is out of range, or both are given.
         """
         if count is not None and duration is not None:
             raise InputError("count and duration: only one of them can be given")
         if duration is not None:
-            # 1e-9: 0.3 s of 0.1 ms are 3000 deadlines, though the quotient is rounded.
-            count = math.ceil(checked_positive(duration, "duration") / self.period - 1e-9)
-        if count is not None and (not isinstance(count, Integral) or count < 0):
-            raise InputError(f"count = {count!r}: it must be a whole number, zero or more")
-        return self._run(None if count is None else int(count))
+            # 1e-9: 0.3 s of 0.1 ms are 3000 deadlines in spite of rounding.
+            count = math.ceil(positive_number(duration, "duration", "s") / self.period - 1e-9)
+        return self._run(None if count is None else whole_number(count, "count", 0))
 
     def _run(self, count: int | None) -> Iterator[int]:
         now, period = self._now, self.period
@@ -206,43 +201,44 @@ class LoopClock:
                 k += passed
 
     def report(self) -> ClockReport:
-        """Return what became of the ticks so far."""
+        """Return the statistics of the ticks so far."""
         run = (self._late.count, self._overruns, self._longest_overrun, self._skipped)
         times = (*self._interval.figures(), *self._late.figures(), *self._busy.figures())
         return ClockReport(self.period, *run, *times)
 
     def _wait(self, deadline: float) -> float:
-        """Return the time once a deadline has come."""
+        """Wait for a deadline and return the time."""
         time_left = deadline - self._now()
         if time_left > self._spin:
             self._sleep(time_left - self._spin)
-        while (at := self._now()) < deadline:  # spin, and what a sleep was short of
+        while (at := self._now()) < deadline:  # spin, also after a sleep that was too short
             pass
         return at
 
 
-class _Times:
-    """A histogram of times: memory is allocated once, however many there are."""
+class _Histogram:
+    """A histogram of times in memory that is allocated once."""
 
     def __init__(self, resolution: float) -> None:
         self._resolution = resolution
         self._bins = [0] * (_BINS + 1)
-        self.count, self.most = 0, 0.0
+        self.count, self.largest = 0, 0.0
 
     def add(self, value: float) -> None:
         self._bins[min(int(value / self._resolution), _BINS)] += 1
         self.count += 1
-        self.most = max(self.most, value)
+        self.largest = max(self.largest, value)
 
     def figures(self) -> tuple[float, float, float, float]:
         """Return median, p99, p99.9 and maximum, s."""
-        return self._percentile(0.5), self._percentile(0.99), self._percentile(0.999), self.most
+        p = self._percentile
+        return p(0.5), p(0.99), p(0.999), self.largest
 
     def _percentile(self, share: float) -> float:
-        """Return a time that so many are not above, to the resolution, s."""
+        """Return a time that is not exceeded by this share, to the resolution, s."""
         wanted, found = share * self.count, 0
-        for place, count in enumerate(self._bins[:_BINS]):
+        for index, count in enumerate(self._bins[:_BINS]):
             found += count
             if found >= wanted and found:
-                return min((place + 1) * self._resolution, self.most)
-        return self.most  # beyond the last bin: the only time that is known not to be exceeded
+                return min((index + 1) * self._resolution, self.largest)
+        return self.largest  # in the last bin, which has no upper end

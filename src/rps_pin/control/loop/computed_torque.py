@@ -1,20 +1,21 @@
-"""Computed torque: the command is an acceleration, and inverse dynamics its forces.
+"""Computed torque control: commanded accelerations, and their forces by inverse dynamics.
 
 In task space, with x the pose and x_d its target,
 
     u = x_d'' + Kd (x_d' - x') + Kp (x_d - x) + I,    I' = Ki (x_d - x),
     f = inverse dynamics of (x, x', u).
 
-In actuator space the same of the leg lengths d, whose accelerations then follow from u by
+In actuator space the same law acts on the leg lengths d. The pose's acceleration then follows from
+the commanded u by
 
     x'' = K^-1 (u - K' x'),    K = dd/dx,
 
-where K' x' is the legs' acceleration at x'' = 0. If the model is right, each error then obeys
-e'' + Kd e' + Kp e + integral = 0, by itself: what the target does, and how the robot's parts move
-each other, is cancelled. If the model's inertia is wrong by a factor, the loop's gain is.
+where K' x' is the legs' acceleration at x'' = 0. With an exact model each error obeys
+e'' + Kd e' + Kp e + integral = 0 independently of the others and of the target's motion. A factor
+on the model's inertia is a factor on the loop gain.
 
-**Tuning.** `Gains.placed`: as high a bandwidth as `loop_margins` allows (noise and delay set it),
-damping 1, and an integral as far as the model's weight is in doubt.
+**Tuning.** Use `Gains.placed` with the highest bandwidth that `loop_margins` allows (noise and
+delay limit it), damping 1, and as much integral action as the uncertainty of the weight needs.
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from rps_pin.control.estimator.real_time_robot import Known
 from rps_pin.control.estimator.scalar_rates import leg_speed, pose_rate
-from rps_pin.control.estimator.scalar_state import leg_motion, state_at
+from rps_pin.control.estimator.scalar_state import leg_motion
+from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.loop.controller import Controller, Space
 from rps_pin.control.loop.gains import Gains
-from rps_pin.control.loop.setpoints import Goal, difference
+from rps_pin.control.loop.setpoints import Setpoint, difference
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
 
-_STILL = (0.0, 0.0, 0.0)
+_ZERO = (0.0, 0.0, 0.0)
 
 
 class ComputedTorque(Controller):
@@ -43,8 +44,8 @@ class ComputedTorque(Controller):
     robot, near, gains
         As for `Controller`.
     space
-        ``"task"``: errors of the pose, each axis of it by itself. ``"actuator"``: errors of the
-        leg lengths.
+        ``"task"``: errors of the pose, one per coordinate. ``"actuator"``: errors of the leg
+        lengths.
     **settings
         As for `Controller`.
     """
@@ -58,22 +59,21 @@ class ComputedTorque(Controller):
         space: Space = "task",
         **settings: Any,
     ) -> None:
-        self._in_task_space = space == "task"
         super().__init__(robot, near, gains, space=space, **settings)
 
-    def _law(self, known: Known, goal: Goal, elapsed: float) -> Triple | None:
-        place, rate, speed, gains = known
+    def _law(self, state: StateEstimate, setpoint: Setpoint, elapsed: float) -> Triple | None:
+        geometry, rate, speed, jacobian = state
         if self._in_task_space:
-            e = difference(goal.place.pose, place.pose)
-            c1, c2, c3 = self._pid(e, goal.rate, rate, elapsed)
-            a1, a2, a3 = goal.acceleration
-            return self._solve(state_at(place, rate, (a1 + c1, a2 + c2, a3 + c3), self._h))
-        speed_wanted, (a1, a2, a3) = leg_motion(goal.place, goal.rate, goal.acceleration, self._h)
-        e = difference(goal.place.length, place.length)
+            e = difference(setpoint.geometry.pose, geometry.pose)
+            c1, c2, c3 = self._pid(e, setpoint.rate, rate, elapsed)
+            a1, a2, a3 = setpoint.acceleration
+            return self._solve(geometry, rate, (a1 + c1, a2 + c2, a3 + c3))
+        speed_wanted, (a1, a2, a3) = leg_motion(*setpoint, self._h)
+        e = difference(setpoint.geometry.length, geometry.length)
         c1, c2, c3 = self._pid(e, speed_wanted, speed, elapsed)
-        _, (b1, b2, b3) = leg_motion(place, rate, _STILL, self._h)
+        _, (b1, b2, b3) = leg_motion(geometry, rate, _ZERO, self._h)
         u = (a1 + c1 - b1, a2 + c2 - b2, a3 + c3 - b3)
-        return self._solve(state_at(place, rate, pose_rate(gains, u), self._h))
+        return self._solve(geometry, rate, pose_rate(jacobian, u))
 
-    def _missed(self, known: Known, force: Triple, acceleration: Triple) -> Triple:
-        return acceleration if self._in_task_space else leg_speed(known.gains, acceleration)
+    def _command_error(self, state: StateEstimate, force: Triple, acceleration: Triple) -> Triple:
+        return acceleration if self._in_task_space else leg_speed(state.jacobian, acceleration)

@@ -1,6 +1,6 @@
-"""Gains of a control law: proportional, derivative and integral, one for each of three errors.
+"""Gains of a control law: proportional, derivative and integral, for each of three errors.
 
-What they multiply, and so their units, is the law's: see `ComputedTorque` and `PDControl`.
+Their units depend on the law: see `ComputedTorque` and `PDControl`.
 """
 
 from __future__ import annotations
@@ -14,23 +14,22 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.rps.checks import finite_entries
-from rps_pin.rps.kinematics.leg_equations import checked_positive
 from rps_pin.rps.kinematics.tracking import Triple
+from rps_pin.validation import positive_number, read_only, real_array
 
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """Gains, a number for all three errors or three numbers each.
+    """Gains, one number for all three errors or three numbers each.
 
     Parameters
     ----------
     proportional
-        Kp, not negative; shape () or (3,), kept as (3,).
+        Kp, not negative; shape () or (3,), stored as (3,).
     derivative
         Kd, likewise.
     integral
-        Ki, likewise; zero for none, and only with a positive Kd: `tracking_time` follows from both.
+        Ki, likewise; zero for none. A positive Ki needs a positive Kd (see `tracking_time`).
 
     Raises
     ------
@@ -44,26 +43,23 @@ class Gains:
 
     def __post_init__(self) -> None:
         for name in ("proportional", "derivative", "integral"):
-            given = finite_entries(getattr(self, name), (), f"gain {name}")
+            given = real_array(getattr(self, name), f"gain {name}")
             if given.shape not in ((), (3,)):
                 raise InputError(f"gain {name} has shape {given.shape}; it must be () or (3,)")
             if (given < 0).any():
                 raise InputError(f"gain {name} = {given.tolist()}: it must not be negative")
-            array = np.broadcast_to(given, 3).copy()
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, read_only(np.broadcast_to(given, 3)))
         integral, derivative = np.asarray(self.integral), np.asarray(self.derivative)
         if ((integral > 0) & (derivative == 0)).any():
-            raise InputError("an integral gain needs a derivative gain: without, nothing is damped")
+            raise InputError("an integral gain needs a derivative gain, which provides the damping")
 
     @classmethod
     def placed(cls, bandwidth: float, *, damping: float = 1.0, integral: float = 0.0) -> Self:
-        """Return gains for laws that command accelerations (1/s^2, 1/s, 1/s^3).
+        """Return gains for laws that command accelerations (1/s^2, 1/s, 1/s^3), by pole placement.
 
         With w = 2 pi bandwidth they are Kp = w^2, Kd = 2 damping w and Ki = integral w^3: without
-        integral the error obeys s^2 + 2 damping w s + w^2 = 0. A continuous loop is stable while
-        integral < 2 damping; a sampled one, with a filter and a delay, is looked at by
-        `loop_margins`.
+        integral the error obeys s^2 + 2 damping w s + w^2 = 0. A continuous loop is stable for
+        integral < 2 damping; for a sampled one, with filter and delay, see `loop_margins`.
 
         Parameters
         ----------
@@ -72,25 +68,25 @@ class Gains:
         damping
             1 for critical damping; positive.
         integral
-            How much of the integral action, 0 for none.
+            Integral action as a multiple of w^3, 0 for none.
         """
-        w = 2 * math.pi * checked_positive(bandwidth, "bandwidth")
-        return cls(w**2, 2 * checked_positive(damping, "damping") * w, integral * w**3)
+        w = 2 * math.pi * positive_number(bandwidth, "bandwidth", "Hz")
+        return cls(w**2, 2 * positive_number(damping, "damping") * w, integral * w**3)
 
     def times(self, inertia: ArrayLike) -> Gains:
-        """Return gains that command forces: these, times an inertia for each error.
+        """Return gains for laws that command forces: these multiplied by the inertia of each error.
 
         Parameters
         ----------
         inertia
             Shape () or (3,), kg (or kg m^2 for tilts); see `effective_inertia`.
         """
-        factor = finite_entries(inertia, (), "inertia")
+        factor = real_array(inertia, "inertia")
         return Gains(self.proportional * factor, self.derivative * factor, self.integral * factor)
 
     @property
     def rows(self) -> tuple[Triple, Triple, Triple]:
-        """Kp, Kd and Ki as plain floats."""
+        """Kp, Kd and Ki as floats."""
         kp, kd, ki = (
             tuple(np.asarray(one).tolist())
             for one in (self.proportional, self.derivative, self.integral)
@@ -99,10 +95,10 @@ class Gains:
 
     @property
     def tracking_time(self) -> Triple:
-        """Time in which the integral gives way to a force limit, s: sqrt(Kd / Ki).
+        """Time constant of the back-calculation at a force limit, s: sqrt(Kd / Ki).
 
-        The geometric mean of the integral's time Kp / Ki and the derivative's Kd / Kp, as Astrom
-        and Hagglund propose (Advanced PID Control, 2006, 3.5). Infinite without integral.
+        The geometric mean of the integral time Kp / Ki and the derivative time Kd / Kp (Astrom and
+        Hagglund, Advanced PID Control, 2006, 3.5). Infinite without integral.
         """
         one, two, three = (
             math.sqrt(kd / ki) if ki > 0 else math.inf

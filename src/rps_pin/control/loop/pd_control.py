@@ -1,47 +1,42 @@
-"""PD control, with what the robot's weight or motion takes added: the command is a force.
+"""PD and PID control with compensation of the weight or of the target's dynamics.
 
-In actuator space, with d the leg lengths and d_d their target,
+In actuator space, with d the leg lengths and d_d their target, the command is a force,
 
     f = f_0 + Kd (d_d' - d') + Kp (d_d - d) + I,    I' = Ki (d_d - d).
 
-In task space the same law of the pose makes a wrench on it, and f = f_0 + K^-T wrench, K = dd/dx.
-f_0 is, by choice,
+In task space the same law of the pose gives a wrench, and f = f_0 + K^-T wrench, K = dd/dx. The
+compensation f_0 is
 
-- ``"gravity"``: the forces that hold the robot still where it is;
-- ``"feed_forward"``: those of the target's motion, by inverse dynamics;
-- ``"none"``: nothing, for comparison.
+- ``"gravity"``: the forces that hold the robot at rest in its pose;
+- ``"feed_forward"``: the inverse dynamics of the target;
+- ``"none"``: zero, for comparison.
 
-With ``"gravity"`` and without integral the robot comes to rest on its target (Takegaki and Arimoto
-1981), but falls behind a moving one by what its motion takes, over Kp.
+With ``"gravity"`` and without integral the robot settles on a target at rest (Takegaki and Arimoto
+1981); behind a moving target it lags by the forces of the motion divided by Kp.
 
-**Tuning.** `Gains.placed(...).times(effective_inertia(robot, pose, space=...))` makes it as stiff
-at a pose as computed torque; elsewhere, and across its axes, it is not.
+**Tuning.** `Gains.placed(...).times(effective_inertia(robot, pose, space=...))` gives the stiffness
+of computed torque in that pose, without the coupling between the errors.
 """
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from numpy.typing import ArrayLike
 
-from rps_pin.control.estimator.real_time_robot import Known
-from rps_pin.control.estimator.scalar_rates import (
-    force_of_wrench,
-    leg_gains,
-    leg_speed,
-    wrench_of_force,
-)
-from rps_pin.control.estimator.scalar_state import state_at
+from rps_pin.control.estimator.scalar_rates import force_of_wrench, wrench_of_force
+from rps_pin.control.estimator.scalar_state import leg_motion
+from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.loop.controller import Controller, Space
 from rps_pin.control.loop.gains import Gains
-from rps_pin.control.loop.setpoints import Goal, difference
-from rps_pin.errors import InputError
+from rps_pin.control.loop.setpoints import Setpoint, difference
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.validation import choice
 
 Compensation = Literal["gravity", "feed_forward", "none"]
 
-_STILL = (0.0, 0.0, 0.0)
+_ZERO = (0.0, 0.0, 0.0)
 
 
 class PDControl(Controller):
@@ -72,35 +67,24 @@ class PDControl(Controller):
         compensation: Compensation = "gravity",
         **settings: Any,
     ) -> None:
-        if compensation not in ("gravity", "feed_forward", "none"):
-            raise InputError(
-                f"compensation = {compensation!r}; it must be 'gravity', 'feed_forward' or 'none'"
-            )
-        self.compensation = compensation
-        self._in_task_space = space == "task"
+        self.compensation = choice(compensation, "compensation", get_args(Compensation))
         super().__init__(robot, near, gains, space=space, **settings)
 
-    def _law(self, known: Known, goal: Goal, elapsed: float) -> Triple | None:
-        place, rate, speed, gains = known
+    def _law(self, state: StateEstimate, setpoint: Setpoint, elapsed: float) -> Triple | None:
+        geometry, rate, speed, jacobian = state
         if self._in_task_space:
-            e = difference(goal.place.pose, place.pose)
-            c = force_of_wrench(gains, self._pid(e, goal.rate, rate, elapsed))
+            e = difference(setpoint.geometry.pose, geometry.pose)
+            c = force_of_wrench(jacobian, self._pid(e, setpoint.rate, rate, elapsed))
         else:
-            goal_gains = leg_gains(goal.place.pose, goal.place.way, goal.place.coefficient, self._h)
-            e = difference(goal.place.length, place.length)
-            c = self._pid(e, leg_speed(goal_gains, goal.rate), speed, elapsed)
-        base = self._compensation(known, goal)
-        if base is None:
-            return None
-        return base[0] + c[0], base[1] + c[1], base[2] + c[2]
-
-    def _compensation(self, known: Known, goal: Goal) -> Triple | None:
-        """Return f_0."""
+            speed_wanted, _ = leg_motion(*setpoint, self._h)
+            e = difference(setpoint.geometry.length, geometry.length)
+            c = self._pid(e, speed_wanted, speed, elapsed)
+        base: Triple | None = _ZERO
         if self.compensation == "gravity":
-            return self._solve(state_at(known.place, _STILL, _STILL, self._h))
-        if self.compensation == "feed_forward":
-            return self._solve(state_at(goal.place, goal.rate, goal.acceleration, self._h))
-        return _STILL
+            base = self._solve(geometry, _ZERO, _ZERO)
+        elif self.compensation == "feed_forward":
+            base = self._solve(*setpoint)
+        return None if base is None else (base[0] + c[0], base[1] + c[1], base[2] + c[2])
 
-    def _missed(self, known: Known, force: Triple, acceleration: Triple) -> Triple:
-        return wrench_of_force(known.gains, force) if self._in_task_space else force
+    def _command_error(self, state: StateEstimate, force: Triple, acceleration: Triple) -> Triple:
+        return wrench_of_force(state.jacobian, force) if self._in_task_space else force

@@ -1,10 +1,10 @@
-"""Targets of a control loop: taken as they come, or refused and the last good one held.
+"""Setpoints of a control loop: valid targets, held targets, and the return from a hold.
 
 A target is refused if it is not finite, if a leg's length, angle or ball joint would be beyond its
-limits there, or if it is nearer to a singularity than allowed, or beyond one: the sign of Eq. 8's
-determinant must stay what it was at the start. A refused target is replaced by the pose of the last
-good one, at rest. From there the robot comes back to the next good one without a step
-(`rps_pin.control.loop.rejoining`), if the way there is allowed.
+limits, or if it is too near a singularity or beyond one (the determinant of Eq. 8 must keep the
+sign that it had at the start). While targets are refused the setpoint is the last one, at rest.
+From there the setpoint returns to the next valid target smoothly
+(`rps_pin.control.loop.rejoining`), if every pose on the way is valid.
 """
 
 from __future__ import annotations
@@ -12,27 +12,27 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from rps_pin.control.estimator.numbers import three_floats
+from rps_pin.control.estimator.loop_arguments import three_floats
 from rps_pin.control.estimator.place import Place, place_of, turning_determinant
-from rps_pin.control.loop.limit_check import LimitCheck
+from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.rejoining import Rejoining, rejoining_time
 from rps_pin.rps.kinematics.tracking import Triple
 
-_STILL = (0.0, 0.0, 0.0)
-#: Below a whole turn (tilt_x, tilt_y) are coordinates; see `rps_pin.rps.singularity.measures`.
+_ZERO = (0.0, 0.0, 0.0)
+#: (tilt_x, tilt_y) are coordinates below a whole turn; see `rps_pin.rps.singularity.measures`.
 LARGEST_TILT_SQUARED = (2 * math.pi * (1 - 1e-6)) ** 2
 
 
-class Goal(NamedTuple):
-    """A target that can be gone to."""
+class Setpoint(NamedTuple):
+    """A desired motion at one time, checked."""
 
-    place: Place
+    geometry: Place
     rate: Triple
     acceleration: Triple
 
 
-class Targets:
-    """The targets of one robot.
+class Setpoints:
+    """The setpoints of one robot.
 
     Parameters
     ----------
@@ -40,64 +40,55 @@ class Targets:
         The robot's.
     g, h
         Radii of base and platform, m.
-    nearest
-        Least size of Eq. 8's determinant, 0 to 1.
-    farthest
-        Heights beyond it, and rates and accelerations, make no sense; m, m/s, rad/s and so on.
+    near_singular
+        Least absolute value of Eq. 8's determinant, 0 to 1.
+    largest
+        Largest height, and largest entry of rate and acceleration; m, m/s, rad/s, m/s^2, rad/s^2.
     speed_limit
-        Of the actuators, m/s: half of it is for coming back to a target.
+        Of the actuators, m/s: half of it is used for the return to a target.
     """
 
     def __init__(
         self,
-        limits: LimitCheck,
+        limits: RobotLimits,
         g: float,
         h: float,
-        nearest: float,
-        farthest: float,
+        near_singular: float,
+        largest: float,
         speed_limit: float,
     ) -> None:
         self._limits, self._g, self._h = limits, g, h
-        self._nearest, self._farthest, self._fastest = nearest, farthest, speed_limit
+        self._near, self._largest, self._speed_limit = near_singular, largest, speed_limit
 
-    def reset(self, place: Place) -> None:
-        """Start from a place, at rest: what is held until there is a target."""
-        self._goal = self._asked = Goal(place, _STILL, _STILL)
-        self._side = math.copysign(1.0, turning_determinant(place, self._g, self._h))
+    def reset(self, geometry: Place) -> None:
+        """Start at rest in a pose, the setpoint until there is a target."""
+        self.current = self._target = Setpoint(geometry, _ZERO, _ZERO)
+        self._side = math.copysign(1.0, turning_determinant(geometry, self._g, self._h))
         self._held = False
         self._refused: Triple | None = None
-        self._back: Rejoining | None = None
+        self._rejoining: Rejoining | None = None
 
-    @property
-    def goal(self) -> Goal:
-        """The last one taken, the way back to it, or what is held."""
-        return self._goal
-
-    def take(self, target: Any, elapsed: float) -> bool:
-        """Take a target, and return whether `goal` is it: it may be held, or not yet reached again.
+    def update(self, target: Any, elapsed: float) -> bool:
+        """Set `current`, and return whether it is the target; it is not during hold and return.
 
         Parameters
         ----------
         target
-            Pose (m, rad, rad), rate and acceleration, three times (3,); None for the last good one.
+            Pose (m, rad, rad), rate and acceleration, (3,) each; None for the last valid one.
         elapsed
             Time since the last call, s.
         """
-        if target is None:
-            if not self._held and self._back is None:
-                return True
-            return self._follow(self._asked, elapsed)
-        asked = self._good(target)
-        if asked is None:
+        wanted = self._target if target is None else self._valid(target)
+        if wanted is None:
             self._hold()
-            return False
-        if self._held or self._back is not None:
-            return self._follow(asked, elapsed)
-        self._goal = self._asked = asked
-        return True
+        elif self._held or self._rejoining is not None:
+            return self._return_to(wanted, elapsed)
+        elif target is not None:
+            self.current = self._target = wanted
+        return wanted is not None
 
-    def _good(self, target: Any) -> Goal | None:
-        """Return a target as floats, if it can be gone to; else note it."""
+    def _valid(self, target: Any) -> Setpoint | None:
+        """Return a target as floats; None, and the pose in `_refused`, if it is not valid."""
         self._refused = None
         try:
             pose, rate, acceleration = target
@@ -107,80 +98,85 @@ class Targets:
         if x is None or dx is None or ddx is None:
             return None
         self._refused = x
-        place = self._allowed(x)
-        if place is None or not -self._farthest < min(*dx, *ddx) <= max(*dx, *ddx) < self._farthest:
+        geometry = self._allowed(x)
+        largest = self._largest
+        if geometry is None or not -largest < min(*dx, *ddx) <= max(*dx, *ddx) < largest:
             return None
-        return Goal(place, dx, ddx)
+        return Setpoint(geometry, dx, ddx)
 
-    def _follow(self, asked: Goal, elapsed: float) -> bool:
-        """Go on towards a good target from where it was held."""
-        self._asked = asked
-        if self._held or self._back is None:
-            self._held, self._back = False, self._way_back(asked)
-        gap = self._back.after(elapsed if 0.0 < elapsed < math.inf else 0.0)
-        if gap is None:
-            self._back, self._goal = None, asked
+    def _return_to(self, target: Setpoint, elapsed: float) -> bool:
+        """Advance from the held setpoint towards a valid target."""
+        self._target = target
+        if self._held or self._rejoining is None:
+            self._held, self._rejoining = False, self._rejoining_to(target)
+        offset = self._rejoining.after(elapsed if 0.0 < elapsed < math.inf else 0.0)
+        if offset is None:
+            self._rejoining, self.current = None, target
             return True
-        pose = _sum(asked.place.pose, gap[0])
-        place = self._allowed(pose)
-        if place is None:
+        pose = _sum(target.geometry.pose, offset[0])
+        geometry = self._allowed(pose)
+        if geometry is None:
             self._refused = pose
             self._hold()
             return False
-        self._goal = Goal(place, _sum(asked.rate, gap[1]), _sum(asked.acceleration, gap[2]))
+        rate, acceleration = _sum(target.rate, offset[1]), _sum(target.acceleration, offset[2])
+        self.current = Setpoint(geometry, rate, acceleration)
         return False
 
-    def _way_back(self, asked: Goal) -> Rejoining:
-        held = self._goal
-        far = max(map(abs, difference(held.place.length, asked.place.length)))
+    def _rejoining_to(self, target: Setpoint) -> Rejoining:
+        held = self.current
+        distance = max(map(abs, difference(held.geometry.length, target.geometry.length)))
         return Rejoining(
-            difference(held.place.pose, asked.place.pose),
-            difference(held.rate, asked.rate),
-            difference(held.acceleration, asked.acceleration),
-            rejoining_time(far, self._fastest),
+            difference(held.geometry.pose, target.geometry.pose),
+            difference(held.rate, target.rate),
+            difference(held.acceleration, target.acceleration),
+            rejoining_time(distance, self._speed_limit),
         )
 
     def _allowed(self, pose: Triple) -> Place | None:
-        """Return where a pose puts the legs, if it can be gone to."""
-        if not self._sensible(pose):
+        """Return the leg geometry of a pose, None if the pose is not allowed."""
+        if not self._in_range(pose):
             return None
-        place = place_of(pose, self._g, self._h)
-        if place is None or self._limits.broken(place):
+        geometry = place_of(pose, self._g, self._h)
+        if geometry is None or self._limits.violated(geometry):
             return None
-        inside = self._side * turning_determinant(place, self._g, self._h) >= self._nearest
-        return place if inside else None
+        return geometry if self._determinant(geometry) >= self._near else None
 
-    def _sensible(self, pose: Triple) -> bool:
+    def _in_range(self, pose: Triple) -> bool:
         z, wx, wy = pose
-        return wx * wx + wy * wy < LARGEST_TILT_SQUARED and abs(z) < self._farthest
+        return wx * wx + wy * wy < LARGEST_TILT_SQUARED and abs(z) < self._largest
 
-    def words(self) -> list[str]:
-        """Return why the goal is not the last target."""
-        if self._back is not None:
-            return [f"coming back to the target: {self._back.left:.3g} s to go"]
-        return [*self._words_of(self._refused), "the last good target is held"]
+    def _determinant(self, geometry: Place) -> float:
+        """Return Eq. 8's determinant, positive on the side of the start."""
+        return self._side * turning_determinant(geometry, self._g, self._h)
 
-    def _words_of(self, x: Triple | None) -> list[str]:
+    def messages(self) -> list[str]:
+        """Return why the setpoint is not the last target."""
+        if self._rejoining is not None:
+            return [f"returning to the target: {self._rejoining.left:.3g} s remain"]
+        return [*self._refusals(self._refused), "the last valid target is held"]
+
+    def _refusals(self, x: Triple | None) -> list[str]:
         if x is None:
             return ["the target is not three finite triples: pose, rate and acceleration"]
-        shown = "the target (" + ", ".join(f"{value:.6g}" for value in x) + ") m, rad, rad"
-        if not self._sensible(x):
-            return [f"{shown} is beyond all sense"]
-        place = place_of(x, self._g, self._h)
-        if place is None:
-            return [f"{shown} gives a leg no length"]
-        words = [f"at {shown}, {one}" for one in self._limits.words(place)]
-        determinant = self._side * turning_determinant(place, self._g, self._h)
-        if not determinant >= self._nearest:
-            words.append(
-                f"{shown} is too near a singularity, or beyond one: determinant "
-                f"{determinant:.3g}, at least {self._nearest:.3g} is asked for"
+        target = "the target (" + ", ".join(f"{value:.6g}" for value in x) + ") m, rad, rad"
+        if not self._in_range(x):
+            return [f"{target} is out of range"]
+        geometry = place_of(x, self._g, self._h)
+        if geometry is None:
+            return [f"{target} makes the length of a leg zero"]
+        found = [f"at {target}, {one}" for one in self._limits.messages(geometry)]
+        determinant = self._determinant(geometry)
+        if not determinant >= self._near:
+            found.append(
+                f"{target} is too near a singularity, or beyond one: determinant "
+                f"{determinant:.3g}, at least {self._near:.3g} is required"
             )
-        return words or [f"{shown} has rates beyond all sense"]
+        return found or [f"{target} has a rate or acceleration out of range"]
 
     def _hold(self) -> None:
-        self._held, self._back = True, None
-        self._goal = Goal(self._goal.place, _STILL, _STILL)
+        self._held, self._rejoining = True, None
+        self.current = Setpoint(self.current.geometry, _ZERO, _ZERO)
 
 
 def _sum(a: Triple, b: Triple) -> Triple:

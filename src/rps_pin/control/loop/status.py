@@ -1,4 +1,4 @@
-"""What a call in a control loop says of its answer, instead of raising."""
+"""Status of a call in a control loop, returned instead of an exception."""
 
 from __future__ import annotations
 
@@ -6,40 +6,40 @@ from enum import IntFlag
 
 
 class Status(IntFlag):
-    """Reasons, which can come together; `OK` (zero) if there is none.
+    """Flags, which can be combined; `OK` is zero.
 
-    With `BAD_INPUT`, `JUMP` or `NOT_CONVERGED` there is no new answer: the last good one is kept
-    (see `kept`). With the others the answer is new and right, and asks for attention. The last
-    three are a controller's own.
+    With `BAD_INPUT`, `JUMP` or `NOT_CONVERGED` there is no new result: the last good one is kept
+    (see `kept`). With the others the result is new and valid. The last three are set by controllers
+    only.
     """
 
     OK = 0
-    #: An argument is not three numbers, not finite, or beyond all sense.
+    #: An argument is not three numbers, not finite, or out of range.
     BAD_INPUT = 1
-    #: A leg's reading is further than `largest_jump` from where the last good one was going.
+    #: A leg length differs from its prediction by more than `largest_jump`.
     JUMP = 2
-    #: No answer was found: the lengths cannot be followed, or the forces are not determined.
+    #: The lengths cannot be followed, or the forces are not determined.
     NOT_CONVERGED = 4
-    #: The distance to a singularity is below `near_singular`; of a kept answer, that answer's.
+    #: The distance to a singularity, of the result in use, is below `near_singular`.
     NEAR_SINGULAR = 8
     #: A leg's length, angle, ball joint, speed or force is beyond the robot's limits.
     BEYOND_LIMIT = 16
-    #: The law's forces are beyond a limit: those nearest in effect are sent.
+    #: The law's forces are beyond a limit and were replaced by the nearest in effect.
     SATURATED = 32
-    #: The target was refused: not finite, beyond the robot's limits, or too near a singularity; or
-    #: it is good again, and the robot on its way back to it.
+    #: The target was refused (not finite, beyond the robot's limits, or too near a singularity), or
+    #: it is valid again and the robot is returning to it.
     TARGET_HELD = 64
-    #: The controller has given up: it holds a pose, or else the weight, until it is reset.
+    #: The controller has stopped; it holds a pose, or the weight, until it is reset.
     STOPPED = 128
 
     @property
     def kept(self) -> bool:
-        """Whether the answer is the last good one, kept, and not that of this call."""
+        """Whether the result is the last good one and not that of this call."""
         return bool(self & KEPT)
 
 
-#: The reasons for which there is no new answer.
+#: The flags of calls without a new result.
 KEPT = Status.BAD_INPUT | Status.JUMP | Status.NOT_CONVERGED
 
-#: Every combination, by its number: making one anew takes microseconds.
+#: All combinations, by number: creating one takes microseconds.
 STATUSES = tuple(Status(number) for number in range(256))

@@ -1,26 +1,25 @@
-"""Encoders of the legs' lengths: noise, then quantisation."""
+"""Encoders of the leg lengths: noise and quantisation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from numbers import Integral, Real
 
 import numpy as np
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError
+from rps_pin.validation import non_negative_number, whole_number
 
 
 @dataclass(frozen=True)
 class Encoders:
-    """What the three encoders make of lengths: round((d + noise) / resolution) resolution.
+    """Readings of lengths d: round((d + noise) / resolution) resolution.
 
     Parameters
     ----------
     resolution
         m; zero for none.
     noise
-        Standard deviation of each reading, m: Gaussian, anew at each.
+        Standard deviation, m: Gaussian, independent in each reading.
     seed
         Of the noise: equal seeds give equal readings.
 
@@ -36,14 +35,11 @@ class Encoders:
 
     def __post_init__(self) -> None:
         for name in ("resolution", "noise"):
-            value = getattr(self, name)
-            if not (isinstance(value, Real) and 0.0 <= float(value) < np.inf):
-                raise InputError(f"encoder {name} = {value}: it must be zero or more, and finite")
-        if not (isinstance(self.seed, Integral) and self.seed >= 0):
-            raise InputError(f"encoder seed = {self.seed}: it must be zero or more, a whole number")
+            non_negative_number(getattr(self, name), f"encoder {name}", "m")
+        whole_number(self.seed, "encoder seed", 0)
 
     def generator(self) -> np.random.Generator:
-        """Return where the noise comes from."""
+        """Return the noise's random generator."""
         return np.random.default_rng(self.seed)
 
     def read(self, length: Array, generator: np.random.Generator) -> Array:

@@ -1,22 +1,28 @@
-"""What goes wrong in a loop, at a time and for a while: readings and targets."""
+"""Faults of readings and targets in a simulated loop, each with a start and a duration."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from numbers import Integral, Real
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.validation import (
+    choice,
+    finite_number,
+    non_negative_number,
+    positive_number,
+    real_array,
+    whole_number,
+)
 
 Kind = Literal["lost", "nan", "jump", "stuck", "target", "target_nan"]
-_KINDS = ("lost", "nan", "jump", "stuck", "target", "target_nan")
-_OF_A_LEG = ("nan", "jump", "stuck")
-#: Times are compared to this, s: 0.3 is 300 ticks of 1 ms, though 300 * 0.001 is not 0.1 + 0.2.
+_LEG_KINDS = ("nan", "jump", "stuck")
+#: Tolerance of times, s: 300 ticks of 1 ms are 0.3 s in spite of rounding.
 _ROUNDING = 1e-9
 
 
@@ -28,14 +34,14 @@ class Fault:
     ----------
     kind
         ``"lost"``: no reading. ``"nan"``: a reading that is not a number. ``"jump"``: a reading
-        off by `size`. ``"stuck"``: a reading that stays what it was. ``"target"``: a target whose
-        pose is off by `offset`. ``"target_nan"``: a target that is not a number.
+        with an error of `size`. ``"stuck"``: a reading that does not change. ``"target"``: a target
+        whose pose has an error of `offset`. ``"target_nan"``: a target that is not a number.
     start
-        From when on, s.
+        s.
     duration
-        For how long, s; for ever if left out. Half a period hits one tick.
+        s; default: endless. Half a period affects one tick.
     leg
-        Which leg's reading, 1 to 3; all if left out.
+        The leg whose reading is affected, 1 to 3; default: all.
     size
         Of a jump, m.
     offset
@@ -44,7 +50,8 @@ class Fault:
     Raises
     ------
     InputError
-        If there is no such fault or leg, or a number is not finite or negative where it must not.
+        If the kind or the leg does not exist, or a number is out of range or does not go with the
+        kind.
     """
 
     kind: Kind
@@ -55,46 +62,29 @@ class Fault:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if self.kind not in _KINDS:
-            raise InputError(f"fault kind {self.kind!r}; there are: {', '.join(_KINDS)}")
-        for name in ("start", "duration", "size"):
-            value = getattr(self, name)
-            if not isinstance(value, Real) or isinstance(value, bool):
-                raise InputError(f"fault {name} = {value!r}: it must be a number")
-        try:
-            offset = tuple(float(entry) for entry in self.offset)
-        except (TypeError, ValueError):
+        choice(self.kind, "fault kind", get_args(Kind))
+        non_negative_number(self.start, "fault start", "s")
+        if self.duration != math.inf:
+            positive_number(self.duration, "fault duration", "s")
+        if self.leg is not None and (whole_number(self.leg, "fault leg") > 3):
+            raise InputError(f"fault leg = {self.leg}: legs are 1, 2 and 3")
+        if self.leg is not None and self.kind not in _LEG_KINDS:
             raise InputError(
-                f"fault offset = {self.offset!r}: it must be three finite numbers"
-            ) from None
-        object.__setattr__(self, "offset", offset)
-        if not 0.0 <= self.start < math.inf:
-            raise InputError(f"fault start = {self.start}: it must be a time, zero or more")
-        if not self.duration > 0.0:
-            raise InputError(f"fault duration = {self.duration}: it must be positive")
-        if self.leg is not None and not (isinstance(self.leg, Integral) and self.leg in (1, 2, 3)):
-            raise InputError(f"fault leg = {self.leg}; legs are 1, 2 and 3")
-        if self.leg is not None and self.kind not in _OF_A_LEG:
-            raise InputError(
-                f"fault leg = {self.leg}: a fault {self.kind!r} has none; of one leg are: "
-                f"{', '.join(_OF_A_LEG)}"
+                f"fault leg = {self.leg}: a fault {self.kind!r} has no leg; faults of one leg are: "
+                f"{', '.join(_LEG_KINDS)}"
             )
-        if not math.isfinite(self.size) or (self.kind == "jump") != (self.size != 0.0):
-            raise InputError(f"fault size = {self.size}: a jump, and no other, has a size, in m")
-        if len(self.offset) != 3 or not all(map(math.isfinite, self.offset)):
-            raise InputError(f"fault offset = {self.offset}: it must be three finite numbers")
-        if (self.kind == "target") != any(self.offset):
+        if (self.kind == "jump") != (finite_number(self.size, "fault size", "m") != 0.0):
+            raise InputError(f"fault size = {self.size}: a size, in m, is for a jump only")
+        offset = real_array(self.offset, "fault offset", (3,))
+        object.__setattr__(self, "offset", tuple(offset.tolist()))
+        if (self.kind == "target") != offset.any():
             raise InputError(
-                f"fault offset = {self.offset}: a fault of the target, and no other, has one"
+                f"fault offset = {self.offset}: an offset is for a fault of the target only"
             )
 
     def on(self, time: float) -> bool:
-        """Return whether it is there at a time, s."""
+        """Return whether the fault is present at a time, s."""
         return -_ROUNDING <= time - self.start < self.duration - _ROUNDING
-
-    @property
-    def _of_reading(self) -> slice:
-        return slice(None) if self.leg is None else slice(self.leg - 1, self.leg)
 
     def __str__(self) -> str:
         which = "" if self.leg is None else f" of leg {self.leg}"
@@ -105,7 +95,7 @@ class Fault:
 
 
 class Faults:
-    """Faults of one run; they may overlap.
+    """The faults of one run; they may overlap.
 
     Parameters
     ----------
@@ -118,14 +108,14 @@ class Faults:
         self._stuck: dict[Fault, Array] = {}
 
     def reading(self, time: float, true: Array) -> Array | None:
-        """Return what arrives of a reading (3,), m; None if it is lost."""
+        """Return the faulty reading (3,), m, of a true one; None if it is lost."""
         reading, lost = np.array(true, dtype=np.float64), False
         for fault in self.faults:
             if not fault.on(time):
                 if fault.kind == "stuck":
                     self._stuck[fault] = np.array(true)
                 continue
-            legs = fault._of_reading
+            legs = slice(None) if fault.leg is None else slice(fault.leg - 1, fault.leg)
             lost |= fault.kind == "lost"
             if fault.kind == "nan":
                 reading[legs] = np.nan
@@ -136,7 +126,7 @@ class Faults:
         return None if lost else reading
 
     def target(self, time: float, true: tuple[Array, Array, Array]) -> tuple[Any, Any, Any]:
-        """Return what arrives of a target: pose, rate and acceleration."""
+        """Return the faulty target of a true one: pose, rate and acceleration."""
         pose, rate, acceleration = true
         for fault in self.faults:
             if fault.on(time) and fault.kind == "target":

@@ -1,4 +1,4 @@
-"""What a controlled motion was worth: errors in micrometres and microradians, forces, statuses."""
+"""Figures of a simulated run: errors in micrometres and microradians, forces, statuses."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from rps_pin.arrays import Array
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.control.simulation.loop_run import LoopRun
 from rps_pin.errors import InputError
+from rps_pin.rps.kinematics.legs import leg_angles_and_lengths, tips
 from rps_pin.rps.kinematics.pose import position, rotation
 
-#: Of a window's ends, s.
+#: Tolerance of a window's ends, s.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class TrackingErrors:
-    """How far the plant is from its target, n ticks.
+    """Errors of the plant's motion, n ticks.
 
     Attributes
     ----------
@@ -41,21 +42,12 @@ class TrackingErrors:
         """Return the errors of every tick."""
         p = run.parameters
         h = p.platform_radius
-        centre = run.configuration[:, 6:9] - position(run.target, h)
-        return cls(centre, _turn(run), run.length - _lengths(run.target, p.base_radius, h))
-
-
-def _turn(run: LoopRun) -> Array:
-    """Return the angle of R_target' R, from |R - R_target| = 2 sqrt(2) sin(angle / 2)."""
-    apart = np.linalg.norm(rotation(run.pose) - rotation(run.target), axis=(-2, -1))
-    angle: Array = 2 * np.arcsin(np.minimum(apart / np.sqrt(8.0), 1.0))
-    return angle
-
-
-def _lengths(pose: Array, g: float, h: float) -> Array:
-    from rps_pin.rps.kinematics.legs import leg_angles_and_lengths, tips  # noqa: PLC0415
-
-    return leg_angles_and_lengths(tips(position(pose, h), rotation(pose), h), g)[0]
+        centre, turned = position(run.target, h), rotation(run.target)
+        length, _ = leg_angles_and_lengths(tips(centre, turned, h), p.base_radius)
+        # The angle of R_target' R, from |R - R_target| = 2 sqrt(2) sin(angle / 2).
+        apart = np.linalg.norm(rotation(run.pose) - turned, axis=(-2, -1))
+        angle = 2 * np.arcsin(np.minimum(apart / np.sqrt(8.0), 1.0))
+        return cls(run.configuration[:, 6:9] - centre, angle, run.length - length)
 
 
 @dataclass(frozen=True)
@@ -71,7 +63,7 @@ class LoopSummary:
     length_rms, length_max
         Over all legs, um.
     force_peak, force_rms
-        Of the actuators, worst of three, N.
+        Of the actuators, largest of three, N.
     saturated
         Share of ticks at a force limit.
     nearest_singular
@@ -79,11 +71,11 @@ class LoopSummary:
     gap
         Largest gap of the plant's loops, m.
     ticks
-        In the window.
+        Number in the window.
     statuses
-        Ticks by name of each status that came up, over the whole run.
+        Number of ticks with each status that occurred, by name, over the whole run.
     first
-        When each first did, s.
+        Time of the first of these ticks, s.
     """
 
     centre_rms: float
@@ -105,12 +97,12 @@ class LoopSummary:
 
     @classmethod
     def of(cls, run: LoopRun, *, begin: float = 0.0, end: float = np.inf) -> LoopSummary:
-        """Return the figures of the ticks from `begin` until before `end`, s.
+        """Return the figures of the ticks from `begin` to `end`, s, that not included.
 
         Raises
         ------
         InputError
-            If there is no tick in the window.
+            If no tick is in the window.
         """
         here = (run.time >= begin - _ROUNDING) & (run.time < end - _ROUNDING)
         if not here.any():
@@ -120,6 +112,7 @@ class LoopSummary:
         turn, length = 1e6 * errors.turn[here], 1e6 * np.abs(errors.length[here])
         force = run.applied[here]
         flags = {flag: (run.status & int(flag)) != 0 for flag in Status if flag}
+        occurred = {_name(flag): on for flag, on in flags.items() if on.any()}
         return cls(
             centre_rms=_rms(centre),
             centre_max=float(centre.max()),
@@ -135,8 +128,8 @@ class LoopSummary:
             nearest_singular=float(run.distance[here].min()),
             gap=float(run.gap[here].max()),
             ticks=int(here.sum()),
-            statuses={_name(flag): int(on.sum()) for flag, on in flags.items() if on.any()},
-            first={_name(f): float(run.time[on.argmax()]) for f, on in flags.items() if on.any()},
+            statuses={name: int(on.sum()) for name, on in occurred.items()},
+            first={name: float(run.time[on.argmax()]) for name, on in occurred.items()},
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -164,7 +157,7 @@ class LoopSummary:
 
 
 def status_name(number: int) -> str:
-    """Return a status as words, ``"ok"`` or its flags."""
+    """Return the names of a status's flags, or ``"ok"``."""
     status = STATUSES[number]
     return ", ".join(_name(flag) for flag in Status if flag and flag in status) or "ok"
 

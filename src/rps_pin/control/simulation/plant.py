@@ -1,14 +1,13 @@
-"""The machine itself, simulated: what a controller sends forces to and reads encoders of.
+"""The simulated machine that a controller commands and whose encoders it reads.
 
-It moves by the closed-loop model in full coordinates, its loops closed at every step, and shares
-with the controllers nothing but Pinocchio. Between a command and the actuators lie a delay of whole
-ticks and the actuators' own limits; between the lengths and a reading, the encoders.
+It is integrated by the closed-loop model in full coordinates, with the loops closed at each step,
+and shares only Pinocchio with the controllers. A command passes a delay of whole ticks and the
+actuators' limits; a length passes the encoders.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from numbers import Integral
 
 import numpy as np
 import pinocchio as pin
@@ -20,15 +19,12 @@ from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.motion import WrenchesInTime
 from rps_pin.control.simulation.encoders import Encoders
 from rps_pin.errors import InputError
-from rps_pin.rps.checks import finite_entries
-from rps_pin.rps.kinematics.leg_equations import checked_positive
-from rps_pin.rps.kinematics.pose import checked_pose
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.validation import positive_number, real_vector, whole_number
 
-#: Of the prismatic joints, in q and in v.
+#: Indices of the prismatic joints in q and v.
 _LENGTHS = [1, 3, 5]
-#: Free of encoders' faults.
-_PERFECT = Encoders()
+_EXACT = Encoders()
 
 
 class Plant:
@@ -37,19 +33,19 @@ class Plant:
     Parameters
     ----------
     robot
-        As it is, which is not what its controller believes (see `wrong_parameters`).
+        The machine, which may differ from the controller's model (see `wrong_parameters`).
     pose
-        Where it stands at the start, at rest, shape (3,), m and rad.
+        At the start, at rest, shape (3,), m and rad.
     period
         Time between two ticks, s.
     substeps
-        Into how many integration steps a tick is divided.
+        Integration steps in a tick.
     delay
         Ticks between a command and its effect; before the first, the weight is held.
     encoders
-        Perfect ones if left out.
+        Default: exact ones.
     wrenches
-        What acts on its frames from outside: as for `simulate`.
+        External wrenches on its frames: as for `simulate`.
 
     Attributes
     ----------
@@ -72,23 +68,17 @@ class Plant:
         period: float = 1e-3,
         substeps: int = 2,
         delay: int = 0,
-        encoders: Encoders = _PERFECT,
+        encoders: Encoders = _EXACT,
         wrenches: Wrenches | WrenchesInTime | None = None,
     ) -> None:
-        x = checked_pose(pose)
-        if x.shape != (3,):
-            raise InputError(f"pose has shape {x.shape}; it must be (3,)")
-        for name, value, least in (("substeps", substeps, 1), ("delay", delay, 0)):
-            whole = isinstance(value, Integral) and not isinstance(value, bool)
-            if not (whole and value >= least):
-                raise InputError(f"{name} = {value!r}: it must be a whole number, {least} or more")
+        x = real_vector(pose, 3, "pose")
+        self._substeps = whole_number(substeps, "substeps")
+        delay = whole_number(delay, "delay", 0)
         if not isinstance(encoders, Encoders):
             raise InputError(f"encoders is a {type(encoders).__name__}; it must be Encoders")
         self.robot, self.encoders = robot, encoders
-        self.period = checked_positive(period, "period")
-        self._substeps = int(substeps)
-        still = np.zeros(3)
-        q, v, a = robot.state(x, still, still)
+        self.period = positive_number(period, "period", "s")
+        q, v, a = robot.state(x, np.zeros(3), np.zeros(3))
         self._stepper = Stepper(robot.mechanism, q, v, wrenches=wrenches)
         hold = robot.inverse_dynamics(q, v, a).tau
         self._limit = robot.parameters.actuator_force_limit
@@ -97,32 +87,29 @@ class Plant:
         self._generator = encoders.generator()
 
     def step(self, forces: ArrayLike) -> None:
-        """Take a command and move on by a period.
+        """Take a command and advance by a period.
 
         Parameters
         ----------
         forces
-            Shape (3,), N. What is beyond the actuators' limits is cut off, as they do.
+            Shape (3,), N; limited to what the actuators can do.
 
         Raises
         ------
         InputError
             If a force is not finite.
         RPSPinError
-            If the motion is not determined any more: see `Stepper.advance`.
+            If the motion is no longer determined: see `Stepper.advance`.
         """
-        command = finite_entries(forces, (3,), "forces")
-        if command.shape != (3,):
-            raise InputError(f"forces has shape {command.shape}; it must be (3,)")
-        self._queue.append(command)
+        self._queue.append(real_vector(forces, 3, "forces").copy())
         self.applied = np.clip(self._queue.popleft(), -self._limit, self._limit)
         self._stepper.advance(self.applied, self.period, self._substeps)
 
     def reading(self) -> Array:
-        """Return what the encoders say of the legs' lengths now, shape (3,), m."""
+        """Return the encoders' reading of the leg lengths, shape (3,), m."""
         return self.encoders.read(self.length, self._generator)
 
-    # As it is -------------------------------------------------------------------------------------
+    # True state -----------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -148,17 +135,16 @@ class Plant:
 
     @property
     def pose(self) -> Array:
-        """(z, tilt_x, tilt_y), shape (3,): that of the free platform, m and rad."""
+        """(z, tilt_x, tilt_y) of the free platform, shape (3,), m and rad."""
         return platform_pose(self._stepper.q)
 
     @property
     def rate(self) -> Array:
-        """The pose's time derivative, shape (3,), from the free platform's velocity."""
+        """Time derivative of the pose, shape (3,), from the free platform's velocity."""
         q, v = self._stepper.q, self._stepper.v
-        turn = pin.Quaternion(q[9:13]).matrix()
-        rise = turn[2] @ v[6:9]
-        tilting = pin.Jlog3(turn) @ v[9:12]
-        return np.array([rise, tilting[0], tilting[1]])
+        rotation = pin.Quaternion(q[9:13]).matrix()
+        tilting = pin.Jlog3(rotation) @ v[9:12]
+        return np.array([rotation[2] @ v[6:9], tilting[0], tilting[1]])
 
     @property
     def gap(self) -> float:
@@ -174,7 +160,7 @@ def platform_pose(configuration: Array) -> Array:
     q = np.asarray(configuration)
     x, y, z, w = np.moveaxis(q[..., 9:13], -1, 0)
     sine = np.sqrt(x * x + y * y + z * z)
-    side = np.where(w < 0, -1.0, 1.0)
     angle = 2 * np.arctan2(sine, np.abs(w))
-    factor = side * np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-9)
+    factor = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-9)
+    factor = np.where(w < 0, -factor, factor)
     return np.stack([q[..., 8], factor * x, factor * y], axis=-1)

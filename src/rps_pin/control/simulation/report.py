@@ -1,4 +1,4 @@
-"""The report of a control scenario, as Markdown: what it was, its margins, errors and statuses."""
+"""Report of a control scenario in Markdown: settings, margins, errors and statuses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rps_pin.control.simulation.loop_summary import LoopSummary, status_name
 from rps_pin.control.simulation.scenario import Scenario
 from rps_pin.errors import InputError
 
-#: Changes of the status that are written out.
+#: Most changes of the status in the report.
 _MOST_SHOWN = 50
 
 
@@ -24,7 +24,7 @@ def report(
     title
         Of the page.
     scenario, run, summary
-        What ran, what became of it, and its figures after settling.
+        The scenario, its run, and the run's figures after settling.
     figures
         Captions by file name.
     """
@@ -49,7 +49,8 @@ def report(
 
 def _rows(name: str, values: Mapping[str, Any]) -> list[str]:
     shown = ", ".join(f"{key} {_plain(value)}" for key, value in values.items() if value != {})
-    return [f"- {name}: {shown or 'as the controller believes'}"]
+    shown = shown or "the same as the controller's model"
+    return [f"- {name}: {shown}"]
 
 
 def _plain(value: Any) -> str:
@@ -68,9 +69,9 @@ def _gains(scenario: Scenario) -> list[str]:
 
 def _margins(scenario: Scenario) -> str:
     try:
-        return f"One axis, as the model has it: {scenario.margins()}."
+        return f"One axis, by the model: {scenario.margins()}."
     except InputError as error:
-        return f"No margins are given: {error}."
+        return f"Margins are not available: {error}."
 
 
 def _errors(summary: LoopSummary) -> list[str]:
@@ -94,8 +95,8 @@ def _statuses(run: LoopRun, summary: LoopSummary) -> list[str]:
         for name, count in summary.statuses.items()
     ]
     if not run.events:
-        return ["ok throughout."]
-    lines += ["", "| t (s) | status | in words |", "|---:|---|---|"]
+        return ["ok in all ticks."]
+    lines += ["", "| t (s) | status | text |", "|---:|---|---|"]
     lines += [
         f"| {event.time:.6g} | {status_name(event.status)} | {event.text} |"
         for event in run.events[:_MOST_SHOWN]

@@ -1,10 +1,10 @@
-"""A machine that is not what its controller believes: other masses, and friction."""
+"""Parameters of a machine that differs from its controller's model: masses and friction."""
 
 from __future__ import annotations
 
 from rps_pin.errors import InputError
-from rps_pin.rps.kinematics.leg_equations import checked_positive
 from rps_pin.rps.parameters import RPSParameters
+from rps_pin.validation import positive_number
 
 _FRICTION = (
     *("prismatic_damping", "prismatic_friction", "revolute_damping"),
@@ -21,38 +21,33 @@ def wrong_parameters(
     rods: float = 1.0,
     **friction: float,
 ) -> RPSParameters:
-    """Return parameters with other masses and inertias; centres of mass stay where they are.
+    """Return parameters with scaled masses and inertias, the centres of mass unchanged.
 
     Parameters
     ----------
     parameters
-        What the controller believes.
+        The controller's.
     masses
         Factor of all masses and inertias; 1.2 for 20 % more.
     platform, legs, rods
-        Further factors of the platform's, the cylinders' and the rods' own.
+        Further factors for the platform, the cylinders and the rods.
     **friction
         ``prismatic_damping`` (N s/m), ``prismatic_friction`` (N), ``revolute_damping`` (N m s/rad),
-        ``revolute_friction`` (N m), ``friction_speed`` (rad/s or m/s), instead of the believed.
+        ``revolute_friction`` (N m), ``friction_speed`` (rad/s or m/s): replaces the controller's.
 
     Raises
     ------
     InputError
-        If a factor is not positive, or friction negative.
+        If a factor is not positive, or friction is negative.
     """
     for name in friction:
         if name in RPSParameters.model_fields and name not in _FRICTION:
-            raise InputError(f"{name} is no friction; that is: {', '.join(_FRICTION)}")
+            raise InputError(f"{name} is not a friction parameter; these are: {_FRICTION}")
     factors = {"masses": masses, "platform": platform, "legs": legs, "rods": rods}
-    for name, factor in factors.items():
-        checked_positive(factor, name)
-    p = parameters
-    return p.replace(
-        platform_mass=p.platform_mass * masses * platform,
-        platform_inertia=p.platform_inertia * masses * platform,
-        leg_mass=p.leg_mass * masses * legs,
-        leg_inertia=p.leg_inertia * masses * legs,
-        rod_mass=p.rod_mass * masses * rods,
-        rod_inertia=p.rod_inertia * masses * rods,
-        **friction,
-    )
+    whole, *parts = (positive_number(factor, name) for name, factor in factors.items())
+    scaled = {
+        f"{part}_{quantity}": getattr(parameters, f"{part}_{quantity}") * whole * factor
+        for part, factor in zip(("platform", "leg", "rod"), parts, strict=True)
+        for quantity in ("mass", "inertia")
+    }
+    return parameters.replace(**scaled, **friction)

@@ -1,4 +1,4 @@
-"""The speed filter against the closed form of a first-order low pass."""
+"""The filters against the closed form of a first-order low pass."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rps_pin.control.loop.speed_filter import SpeedFilter
+from rps_pin.control.loop.filters import SetpointRateFilter, SpeedFilter
 
 Triple = tuple[float, float, float]
 
@@ -18,7 +18,7 @@ def fed(lengths: list[Triple], periods: list[float], cut_off: float) -> list[Tri
     answers = []
     for length, period in zip(lengths, periods, strict=True):
         speed = speeds.after(length, period)
-        speeds.follow(length, speed)
+        speeds.update(length, speed)
         answers.append(speed)
     return answers
 
@@ -62,3 +62,27 @@ def test_slow_sine_is_that_of_the_differential_equation() -> None:
 def test_infinite_cut_off_gives_the_bare_difference() -> None:
     found = fed([(0.1, 0.2, 0.3), (0.11, 0.19, 0.3)], [0.01, 0.01], math.inf)
     np.testing.assert_allclose(found[1], [1.0, -1.0, 0.0], atol=1e-14)
+
+
+@pytest.mark.parametrize("cut_off", [5.0, 50.0, np.inf])
+def test_filtered_rate_of_a_parabola_is_that_of_its_positions(
+    cut_off: float,
+) -> None:
+    """The mean of two rates is the difference of positions, exactly while rates are straight."""
+    rng = np.random.default_rng(0)
+    pull = rng.normal(size=3)
+    rates, positions = SetpointRateFilter(cut_off), SpeedFilter(cut_off)
+    t = 0.0
+    rates.after((0.0, 0.0, 0.0), 1e-3)
+    positions.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    for step in rng.uniform(2e-4, 2e-3, 300):
+        t += step
+        x1, x2, x3 = (pull * t**2 / 2).tolist()
+        v1, v2, v3 = (pull * t).tolist()
+        found = rates.after((v1, v2, v3), step)
+        expected = positions.after((x1, x2, x3), step)
+        positions.update((x1, x2, x3), expected)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(pull).max())
+    assert np.abs(found).max() > 0
+    rates.reset()
+    assert rates.after((0.0, 0.0, 0.0), 1e-3) == (0.0, 0.0, 0.0)

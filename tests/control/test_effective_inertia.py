@@ -8,7 +8,7 @@ import pytest
 
 from rps_pin import InputError, RPSParameters, RPSRobot, SingularityError
 from rps_pin.control import effective_inertia
-from rps_pin.control.estimator.effective_inertia import ReducedMass
+from rps_pin.control.estimator.effective_inertia import TaskSpaceInertia
 from rps_pin.control.estimator.place import place_of
 from rps_pin.rps.dynamics.loads import Payload
 from tests import strategies
@@ -20,7 +20,7 @@ def test_energy_of_any_motion_is_that_of_the_tree() -> None:
         p = strategies.random_parameters(rng, heavy_rods=bool(k % 2))
         load = Payload(2.0, [0.1, -0.05, 0.2], np.diag([0.02, 0.03, 0.04])) if k % 2 else None
         robot = RPSRobot(p, load)
-        reduced, data = ReducedMass(robot), robot.mechanism.model.createData()
+        reduced, data = TaskSpaceInertia(robot), robot.mechanism.model.createData()
         for pose, rate, none in zip(*strategies.random_motions(rng, p, 40), strict=True):
             q, v, _ = robot.state(pose, rate, 0 * none)
             energy = pin.computeKineticEnergy(robot.mechanism.model, data, q, v)

@@ -1,9 +1,8 @@
-"""What a loop is given, made plain floats without ever raising."""
+"""Arguments of calls in a control loop, converted to floats without exceptions."""
 
 from __future__ import annotations
 
 import math
-from math import isfinite as _isfinite
 from typing import Any
 
 import numpy as np
@@ -11,12 +10,12 @@ from numpy.typing import ArrayLike
 
 from rps_pin.rps.kinematics.tracking import Triple
 
-#: Three numbers; None where there are none.
+#: Three numbers; None where they are missing.
 Numbers = ArrayLike | None
 
 
 def three_floats(values: Numbers) -> Triple | None:
-    """Return three finite floats, or None if these are not."""
+    """Return three finite floats, or None if the argument is anything else."""
     try:
         three: Any = values.tolist() if isinstance(values, np.ndarray) else values
         a, b, c = three
@@ -24,11 +23,11 @@ def three_floats(values: Numbers) -> Triple | None:
             a, b, c = float(a), float(b), float(c)
     except (TypeError, ValueError, OverflowError):
         return None
-    return (a, b, c) if _isfinite(a + b + c) else None
+    return (a, b, c) if math.isfinite(a + b + c) else None
 
 
 def elapsed_time(value: Any) -> float:
-    """Return a time as a float; NaN if it is none."""
+    """Return a time as a float, or NaN if the argument is anything else."""
     try:
         return float(value)
     except (TypeError, ValueError, OverflowError):

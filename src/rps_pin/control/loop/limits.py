@@ -1,4 +1,4 @@
-"""Whether a tick keeps the robot's limits: plain floats in the loop, words on demand."""
+"""The robot's limits in a control loop: checks on floats in each tick, messages on demand."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ROUNDING = 1e-12
 (_E1, _E2, _E3) = ((float(x), float(y)) for x, y, _ in RADIAL)
 
 
-class LimitCheck:
+class RobotLimits:
     """The limits of one robot.
 
     Parameters
@@ -39,25 +39,25 @@ class LimitCheck:
         rest = parameters.spherical_rest_angle
         self._along, self._across = math.cos(rest), math.sin(rest)
 
-    def broken(self, place: Place) -> bool:
+    def violated(self, geometry: Place) -> bool:
         """Return whether a leg's length, angle or ball joint is beyond its limits."""
-        _, (d1, d2, d3), (phi1, phi2, phi3), _, _ = place
+        _, (d1, d2, d3), (phi1, phi2, phi3), _, _ = geometry
         low, high = self._shortest, self._longest
         if not (low <= d1 <= high and low <= d2 <= high and low <= d3 <= high):
             return True
         low, high = self._least_angle, self._greatest_angle
         if not (low <= phi1 <= high and low <= phi2 <= high and low <= phi3 <= high):
             return True
-        return self._cones and self._cone_broken(place)
+        return self._cones and self._cone_violated(geometry)
 
-    def _cone_broken(self, place: Place) -> bool:
-        """Return whether a leg leaves its ball's cone.
+    def _cone_violated(self, geometry: Place) -> bool:
+        """Return whether a leg leaves its ball joint's cone.
 
         With e and t of `rps_pin.rps.kinematics.rates` and the leg's direction l = -cos(phi) e_i +
         sin(phi) z, l . n = C sin(phi) - A t cos(phi) and l . R e_i = -(C + B e^2) cos(phi) - A t
         sin(phi).
         """
-        (_, wx, wy), _, _, way, coefficient = place
+        (_, wx, wy), _, _, way, coefficient = geometry
         a, b, c = coefficient[:3]
         c1, c2, c3, s1, s2, s3 = way
         along, across, least = self._along, self._across, self._least_cosine
@@ -77,18 +77,18 @@ class LimitCheck:
         """Return whether an actuator is beyond its force limit."""
         return max(force) > self._greatest_force or min(force) < -self._greatest_force
 
-    def words(self, place: Place) -> list[str]:
-        """Return a sentence for each limit of length, angle or ball joint that is broken."""
+    def messages(self, geometry: Place) -> list[str]:
+        """Return a sentence for each violated limit of length, angle or ball joint."""
         p = self._parameters
-        length, angle = np.array(place.length), np.array(place.angle)
-        cone = cone_angles(angle, rotation(np.array(place.pose)), p.spherical_rest_angle)
+        length, angle = np.array(geometry.length), np.array(geometry.angle)
+        cone = cone_angles(angle, rotation(np.array(geometry.pose)), p.spherical_rest_angle)
         return [str(one) for one in violations(p, length, angle, cone)]
 
-    def words_of_speeds(self, speed: Triple) -> list[str]:
+    def speed_messages(self, speed: Triple) -> list[str]:
         """Return a sentence for each actuator beyond its speed limit."""
         return _beyond("speed", speed, self._greatest_speed, "m/s")
 
-    def words_of_forces(self, force: Triple) -> list[str]:
+    def force_messages(self, force: Triple) -> list[str]:
         """Return a sentence for each actuator beyond its force limit."""
         return _beyond("force", force, self._greatest_force, "N")
 

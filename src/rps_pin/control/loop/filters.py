@@ -1,0 +1,89 @@
+"""First-order low-pass filters of leg speeds and of the setpoint's rate.
+
+Both integrate s' = 2 pi f (u - s) exactly over a tick of length T with a constant input u:
+
+    s += (1 - exp(-2 pi f T)) (u - s).
+
+`SpeedFilter` estimates leg speeds from encoder lengths: u is the lengths' backward difference. The
+response to a constant speed v is v (1 - exp(-2 pi f t)); the lag behind a ramp of speed is
+1 / (2 pi f) + T / 2.
+
+`SetpointRateFilter` applies the same filter to the setpoint's rate, so that a law's derivative term
+is the filtered difference of the error. An unfiltered rate would leave an error of Kd times the lag
+times the acceleration. Its input is the mean of two ticks' rates, not the difference of two
+positions, which would turn a step of the setpoint into an impulse.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rps_pin.rps.kinematics.tracking import Triple
+
+_ZERO = (0.0, 0.0, 0.0)
+
+
+class SpeedFilter:
+    """Filtered speeds of three legs, zero until the second reading.
+
+    Parameters
+    ----------
+    cut_off
+        f, Hz; infinite for the unfiltered difference.
+    """
+
+    def __init__(self, cut_off: float) -> None:
+        self._rate = 2 * math.pi * cut_off
+        self.reset()
+
+    def reset(self) -> None:
+        """Discard all readings."""
+        self._last: Triple | None = None
+        self.speed: Triple = _ZERO
+
+    def after(self, length: Triple, elapsed: float) -> Triple:
+        """Return the speeds (m/s) at lengths (m), a time (s) after the last; changes nothing."""
+        if self._last is None:
+            return self.speed
+        share = -math.expm1(-self._rate * elapsed)
+        (d1, d2, d3), (e1, e2, e3), (s1, s2, s3) = length, self._last, self.speed
+        return (
+            s1 + share * ((d1 - e1) / elapsed - s1),
+            s2 + share * ((d2 - e2) / elapsed - s2),
+            s3 + share * ((d3 - e3) / elapsed - s3),
+        )
+
+    def update(self, length: Triple, speed: Triple) -> None:
+        """Set the last reading and its speeds, measured or from `after`."""
+        self._last, self.speed = length, speed
+
+
+class SetpointRateFilter:
+    """Filtered rates of three coordinates, starting at rest.
+
+    Parameters
+    ----------
+    cut_off
+        f, Hz; infinite for the mean of two ticks.
+    """
+
+    def __init__(self, cut_off: float) -> None:
+        self._rate = 2 * math.pi * cut_off
+        self.reset()
+
+    def reset(self) -> None:
+        """Start again at rest."""
+        self._last: Triple = _ZERO
+        self._filtered: Triple = _ZERO
+
+    def after(self, rate: Triple, elapsed: float) -> Triple:
+        """Return the filtered rates, a time (s) after the last call."""
+        share = -math.expm1(-self._rate * elapsed)
+        (x1, x2, x3), (y1, y2, y3), (s1, s2, s3) = rate, self._last, self._filtered
+        self._last = rate
+        self._filtered = filtered = (
+            s1 + share * ((x1 + y1) / 2.0 - s1),
+            s2 + share * ((x2 + y2) / 2.0 - s2),
+            s3 + share * ((x3 + y3) / 2.0 - s3),
+        )
+        return filtered
