@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -124,6 +125,28 @@ def test_nothing_is_compiled_in_a_loop() -> None:
             controller.tick(None)
         controller.tick(length, None)
     assert {f: len(f.signatures) for f in COMPILED} == before
+
+
+def test_a_changed_kernel_is_compiled_anew(tmp_path: Path) -> None:
+    kernels, user = tmp_path / "some_kernels.py", tmp_path / "some_user.py"
+    user.write_text(
+        "from rps_pin.numerics.compiled import compiled\n"
+        "from some_kernels import scaled\n"
+        "@compiled\n"
+        "def answer(x):\n    return scaled(x) + 1.0\n"
+        "print(answer(2.0), sum(answer.stats.cache_hits.values()))\n"
+    )
+    printed = []
+    for factor in (3, 3, 5):
+        kernels.write_text(
+            "from rps_pin.numerics.compiled import kernel\n"
+            f"@kernel\ndef scaled(x):\n    return {factor} * x\n"
+        )
+        told = subprocess.run(
+            [sys.executable, user], capture_output=True, text=True, check=True, cwd=tmp_path
+        )
+        printed.append(told.stdout.split())
+    assert printed == [["7.0", "0"], ["7.0", "1"], ["11.0", "0"]]
 
 
 def test_it_can_be_switched_off() -> None:

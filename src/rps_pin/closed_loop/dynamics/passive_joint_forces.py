@@ -21,10 +21,29 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.errors import InputError, MechanismError
+from rps_pin.numerics.compiled import kernel
+from rps_pin.numerics.elementary import Number, tanh
 from rps_pin.validation import real_vector
 
 #: rad/s or m/s.
 FRICTION_SPEED = 1e-2
+
+
+@kernel
+def friction_force(
+    speed: Number, damping: Number, friction: Number, friction_speed: Number
+) -> Number:
+    """Return d v + f tanh(v / v_s): viscous damping and dry friction, N or N m."""
+    return damping * speed + friction * tanh(speed / friction_speed)
+
+
+@kernel
+def friction_slope(
+    speed: Number, damping: Number, friction: Number, friction_speed: Number
+) -> Number:
+    """Return the derivative of `friction_force` by the speed."""
+    share = tanh(speed / friction_speed)
+    return damping + friction / friction_speed * (1.0 - share * share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,14 +127,14 @@ class JointEffects:
 
     def force(self, q: Array, v: Array, q_of_v: Indices) -> Array:
         """Return e(q, v), shape (nv,); `q_of_v` from `coordinate_indices`."""
-        force = self.damping * v + self.friction * np.tanh(v / self.friction_speed)
+        force: Array = friction_force(v, self.damping, self.friction, self.friction_speed)
         force += self.stiffness * (q[q_of_v] - self.rest)
         return force
 
     def slopes(self, v: Array) -> tuple[Array, Array]:
         """Return the derivatives of e with respect to q and v, both diagonal, shapes (nv,)."""
-        steep = self.friction / self.friction_speed
-        return self.stiffness, self.damping + steep * (1 - np.tanh(v / self.friction_speed) ** 2)
+        slope: Array = friction_slope(v, self.damping, self.friction, self.friction_speed)
+        return self.stiffness, slope
 
     def energy(self, q: Array, q_of_v: Indices) -> float:
         """Return what the springs hold, k (q - q_0)^2 / 2, J."""

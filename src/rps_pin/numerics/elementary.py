@@ -1,0 +1,131 @@
+"""Elementary functions of floats, NumPy arrays (real and complex) and CasADi expressions.
+
+Kernels are written with these and with + - * / only, so that one body serves all four. Of complex
+numbers, comparisons read the real part: the imaginary part carries a derivative (complex step).
+"""
+
+from __future__ import annotations
+
+import math
+from importlib import import_module
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from rps_pin.numerics.compiled import kernel, kernel_for_floats
+
+_NUMERIC = (np.ndarray, np.number, complex, int)
+#: A float, an array, a complex number or array, or a CasADi expression.
+Number: TypeAlias = Any
+
+
+def _sqrt(x: float) -> float:
+    return math.sqrt(x)
+
+
+@kernel_for_floats(_sqrt)
+def sqrt(x: Number) -> Number:
+    """Return the square root."""
+    if type(x) is float:
+        return math.sqrt(x)
+    return np.sqrt(x) if isinstance(x, _NUMERIC) else x.sqrt()
+
+
+def _cos(x: float) -> float:
+    return math.cos(x)
+
+
+@kernel_for_floats(_cos)
+def cos(x: Number) -> Number:
+    """Return the cosine."""
+    if type(x) is float:
+        return math.cos(x)
+    return np.cos(x) if isinstance(x, _NUMERIC) else x.cos()
+
+
+def _sin(x: float) -> float:
+    return math.sin(x)
+
+
+@kernel_for_floats(_sin)
+def sin(x: Number) -> Number:
+    """Return the sine."""
+    if type(x) is float:
+        return math.sin(x)
+    return np.sin(x) if isinstance(x, _NUMERIC) else x.sin()
+
+
+def _tanh(x: float) -> float:
+    return math.tanh(x)
+
+
+@kernel_for_floats(_tanh)
+def tanh(x: Number) -> Number:
+    """Return the hyperbolic tangent."""
+    if type(x) is float:
+        return math.tanh(x)
+    return np.tanh(x) if isinstance(x, _NUMERIC) else x.tanh()
+
+
+def _atan2(y: float, x: float) -> float:
+    return math.atan2(y, x)
+
+
+@kernel_for_floats(_atan2)
+def atan2(y: Number, x: Number) -> Number:
+    """Return the angle of (x, y) from the x axis, -pi to pi; of complex numbers to first order."""
+    if type(y) is float and type(x) is float:
+        return math.atan2(y, x)
+    if not (isinstance(y, (float, *_NUMERIC)) and isinstance(x, (float, *_NUMERIC))):
+        return _casadi().atan2(y, x)
+    if not (_is_complex(x) or _is_complex(y)):
+        return np.arctan2(y, x)
+    a, b = np.real(x), np.real(y)
+    return np.arctan2(b, a) + 1j * (a * np.imag(y) - b * np.imag(x)) / (a * a + b * b)
+
+
+@kernel_for_floats(lambda a, b: a < b)
+def less(a: Number, b: Number) -> Number:
+    """Return whether a < b, of the real parts."""
+    if type(a) is float and type(b) is float:
+        return a < b
+    if _is_complex(a) or _is_complex(b):
+        return np.real(a) < np.real(b)
+    return a < b
+
+
+@kernel_for_floats(lambda condition, yes, no: yes if condition else no)
+def select(condition: Number, yes: Number, no: Number) -> Number:
+    """Return one of two numbers; both are evaluated."""
+    if isinstance(condition, (bool, np.bool_)):
+        return yes if condition else no
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, yes, no)
+    return _casadi().if_else(condition, yes, no)
+
+
+@kernel
+def greatest(a: Number, b: Number, c: Number) -> Number:
+    """Return the greatest of three numbers."""
+    most = select(less(a, b), b, a)
+    return select(less(most, c), c, most)
+
+
+@kernel
+def absolute(x: Number) -> Number:
+    """Return x or -x, the one that is not negative."""
+    return select(less(x, 0.0), -x, x)
+
+
+def is_real_array(x: Number) -> bool:
+    """Return whether this is a NumPy array of real numbers."""
+    return isinstance(x, np.ndarray) and x.dtype.kind == "f"
+
+
+def _is_complex(x: Number) -> bool:
+    return isinstance(x, complex) or (isinstance(x, np.ndarray) and x.dtype.kind == "c")
+
+
+def _casadi() -> Any:
+    """Return the library of an expression at hand; it is no requirement."""
+    return import_module("casadi")

@@ -1,0 +1,16 @@
+"""The formulas of the 3-RPS, each once, as functions of numbers.
+
+A kernel takes and returns numbers and tuples of numbers: floats, NumPy arrays (one entry a sample),
+complex numbers (derivatives by complex step) or CasADi expressions. There are no shapes, checks or
+objects; those stand around the kernels, in `rps_pin.rps.kinematics` and `rps_pin.rps.dynamics`.
+Compiled functions call kernels too (see `rps_pin.numerics.compiled`).
+
+- `tilt_functions`: Stumpff functions and the coefficients of the rotation
+- `platform`: rotation, quaternion, angular velocity and acceleration, rigid-body wrench
+- `tips`: the spherical joints, their slopes, rates and accelerations
+- `legs`: length, direction, rates, the cone of the spherical joint
+- `limits`: the tolerance of limits
+- `leg_equations`: Eq. 8, its slopes, Newton's step, the Newton-Kantorovich bound
+- `placement`: centre, axes and tilt from the tips
+- `forces`: virtual work of legs and platform, and its solution
+"""

@@ -1,0 +1,94 @@
+"""Functions of the squared tilt: Stumpff functions, and the coefficients of the rotation.
+
+With s the squared tilt, beta = sqrt(s), the Stumpff functions are c_n(s) = sum_k (-s)^k / (2 k +
+n)!, so that c_0 = cos(beta), c_1 = sin(beta) / beta, and
+
+    c_n = 1/n! - s c_(n+2),     dc_n/ds = (n c_(n+2) - c_(n+1)) / 2.
+
+The coefficients of the rotation and of the angular velocity (see `rps_pin.rps.kinematics.pose`) are
+A = c_1, B = c_2, C = c_0 and D = c_3.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rps_pin.numerics.compiled import kernel, kernel_for_floats
+from rps_pin.numerics.elementary import Number, cos, is_real_array, less, select, sin, sqrt
+
+#: A, B, C, D, dA/ds, dB/ds, dD/ds, d2A/ds2, d2B/ds2.
+TiltFunctions = tuple[Number, Number, Number, Number, Number, Number, Number, Number, Number]
+_Stumpff = tuple[Number, Number, Number, Number, Number, Number, Number]
+
+#: Below this s the series are summed, exact to rounding; above, the recursion from c_0 and c_1 is.
+_SERIES_BELOW = 4.0
+#: Terms of c_5 and c_6, from the last to the second.
+_TERMS = tuple(
+    ((-1.0) ** k / math.factorial(2 * k + 5), (-1.0) ** k / math.factorial(2 * k + 6))
+    for k in range(9, 0, -1)
+)
+
+
+@kernel
+def tilt_functions(s: Number) -> TiltFunctions:
+    """Return A, B, C, D, dA/ds, dB/ds, dD/ds, d2A/ds2, d2B/ds2 of a squared tilt, rad^2."""
+    c0, c1, c2, c3, c4, c5, c6 = stumpff(s)
+    b_s, d_s = c4 - 0.5 * c3, 1.5 * c5 - 0.5 * c4
+    return (
+        *(c1, c2, c0, c3, 0.5 * (c3 - c2), b_s, d_s, 0.5 * (d_s - b_s)),
+        2.0 * c6 - 1.25 * c5 + 0.25 * c4,
+    )
+
+
+@kernel
+def _from_series(s: Number) -> _Stumpff:
+    """Return c_0 to c_6 from the series of c_5 and c_6: of small s."""
+    c5, c6 = 0.0 * s, 0.0 * s
+    for term_5, term_6 in _TERMS:
+        c5 += term_5  # in place, of arrays
+        c5 *= s
+        c6 += term_6
+        c6 *= s
+    c5 += 1.0 / 120.0
+    c6 += 1.0 / 720.0
+    c3, c4 = 1.0 / 6.0 - s * c5, 1.0 / 24.0 - s * c6
+    c1, c2 = 1.0 - s * c3, 0.5 - s * c4
+    return 1.0 - s * c2, c1, c2, c3, c4, c5, c6
+
+
+@kernel
+def _by_recursion(s: Number) -> _Stumpff:
+    """Return c_0 to c_6, upwards: of s that are not small."""
+    beta = sqrt(s)
+    c0, c1 = cos(beta), sin(beta) / beta
+    c2, c3 = (1.0 - c0) / s, (1.0 - c1) / s
+    c4, c5 = (0.5 - c2) / s, (1.0 / 6.0 - c3) / s
+    return c0, c1, c2, c3, c4, c5, (1.0 / 24.0 - c4) / s
+
+
+def _of_float(s: float) -> _Stumpff:
+    if s < _SERIES_BELOW:
+        return _from_series(s)
+    return _by_recursion(s)
+
+
+@kernel_for_floats(_of_float)
+def stumpff(s: Number) -> _Stumpff:
+    """Return the Stumpff functions c_0 to c_6 of s >= 0."""
+    if type(s) is float:
+        return _of_float(s)
+    if is_real_array(s):
+        if s.max(initial=0.0) < _SERIES_BELOW:
+            return _from_series(s)
+        values, far = _from_series(np.minimum(s, _SERIES_BELOW)), s >= _SERIES_BELOW
+        for value, beyond in zip(values, _by_recursion(s[far]), strict=True):
+            value[far] = beyond
+        return values
+    small = less(s, _SERIES_BELOW)
+    near = _from_series(select(small, s, 1.0))
+    far = _by_recursion(select(small, _SERIES_BELOW, s))
+    first, *rest = (select(small, a, b) for a, b in zip(near, far, strict=True))
+    c1, c2, c3, c4, c5, c6 = rest
+    return first, c1, c2, c3, c4, c5, c6
