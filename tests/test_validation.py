@@ -13,6 +13,7 @@ from rps_pin.validation import (
     LARGEST,
     choice,
     finite_number,
+    fixed_array,
     non_negative_number,
     one_shape,
     positive_number,
@@ -46,9 +47,11 @@ def test_wrong_shapes_are_told(shape: tuple[int, ...]) -> None:
 
 @pytest.mark.parametrize("value", ["ab", ["a", "b"], [[1], [1, 2]], [1j, 2], {}, [True, False]])
 def test_values_that_are_not_numbers_are_told(value: object) -> None:
-    with pytest.raises(InputError, match=r"^q must be 2 numbers"):
+    with pytest.raises(InputError, match=r"^q = .*: it must be 2 numbers"):
         real_vector(value, 2, "q")
-    with pytest.raises(InputError, match=r"^q must be numbers of shape \(\.\.\., 2\): x, y"):
+    with pytest.raises(
+        InputError, match=r"^q = .*: it must be numbers of shape \(\.\.\., 2\): x, y"
+    ):
         real_array(value, "q", (2,), "x, y")
 
 
@@ -119,3 +122,36 @@ def test_read_only_copies() -> None:
     assert kept[0] == 0.0
     with pytest.raises(ValueError, match="read-only"):
         kept[0] = 1.0
+
+
+def test_a_fixed_array_is_a_read_only_copy() -> None:
+    given = np.array([0.2, 0.1, -0.1])
+    pose = fixed_array(given, "start", (3,))
+    given[:] = 9
+    np.testing.assert_array_equal(pose, [0.2, 0.1, -0.1])
+    with pytest.raises(ValueError, match="read-only"):
+        pose[0] = 1
+    assert fixed_array([1, 0, 0], "start", (3,)).dtype == np.float64
+    np.testing.assert_array_equal(fixed_array([1e50, -1e50], "x", (None,)), [1e50, -1e50])
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ([0.2, 0.1], r"start has shape \(2,\); it must be \(3,\): z, tilt_x, tilt_y"),
+        ([[0.2, 0.1, 0.0]], r"start has shape \(1, 3\); it must be \(3,\)"),
+        (0.2, r"start has shape \(\); it must be \(3,\)"),
+        ([0.2, np.nan, 0.0], r"start is not finite: entry 1 is nan"),
+        ([0.2, 0.0, -np.inf], r"entry 2 is -inf"),
+        ([0.2, 0.0, 1e60], "no entry may be beyond 1e"),
+        ("abc", "start = 'abc': it must be numbers of shape"),
+        (["0.2", "0", "0"], "start = .*: it must be numbers of shape"),
+        ([0.2, [0.1], 0.0], "start = .*: it must be numbers of shape"),
+        ([True, False, False], "start = .*: it must be numbers of shape"),
+        ([0.2, 1j, 0], "start = .*: it must be numbers of shape"),
+        (None, "start = None: it must be numbers of shape"),
+    ],
+)
+def test_other_shapes_and_values_are_refused(bad: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        fixed_array(bad, "start", (3,), "z, tilt_x, tilt_y")

@@ -17,8 +17,9 @@ from scipy.linalg.blas import dasum
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 
-#: No number given to a trajectory or a law is larger: what is computed from them stays finite.
-LARGEST = 1e50
+#: Positive numbers lie between these, others below the larger: what is computed from them stays
+#: finite.
+SMALLEST, LARGEST = 1e-50, 1e50
 
 
 # Single numbers -----------------------------------------------------------------------------------
@@ -44,11 +45,13 @@ def finite_number(value: object, name: str, unit: str = "") -> float:
 
 
 def positive_number(value: object, name: str, unit: str = "") -> float:
-    """Return a finite number above zero; `unit` is named in the error."""
+    """Return a number from `SMALLEST` to `LARGEST`; `unit` is named in the error."""
     number = real(value)
-    if not 0 < number < math.inf:
+    if not SMALLEST <= number <= LARGEST:
         wanted = f"a positive number{unit and f' of {unit}'}"
-        raise InputError(f"{name} = {shown(value)}: it must be {wanted}, finite")
+        raise InputError(
+            f"{name} = {shown(value)}: it must be {wanted}, finite, from {SMALLEST} to {LARGEST}"
+        )
     return number
 
 
@@ -94,7 +97,7 @@ def real_array(
         The last dimensions.
     """
     wanted = f"(..., {', '.join(map(str, ending))})" if ending else "(...)"
-    array = _numbers(value, name, f"numbers of shape {wanted}{meaning and f': {meaning}'}")
+    array = numbers(value, name, f"numbers of shape {wanted}{meaning and f': {meaning}'}")
     if array.ndim < len(ending) or array.shape[array.ndim - len(ending) :] != ending:
         raise InputError(f"{name} has shape {array.shape}; it must be {wanted}")
     refuse_not_finite(array, name)
@@ -110,22 +113,52 @@ def real_vector(value: ArrayLike, size: int, name: str) -> Array:
         and math.isfinite(dasum(value))
     ):
         return value
-    array = _numbers(value, name, f"{size} numbers")
+    array = numbers(value, name, f"{size} numbers")
     if array.shape != (size,):
         raise InputError(f"{name} has shape {array.shape}; it must be ({size},)")
     refuse_not_finite(array, name)
     return array
 
 
-def _numbers(value: ArrayLike, name: str, wanted: str) -> Array:
-    """Return a value as float64; ragged, complex, truth and text values are refused."""
+def numbers(value: ArrayLike, name: str, wanted: str) -> Array:
+    """Return a value as float64; refuse ragged, complex, truth and text values.
+
+    `wanted` is what it must be, for the error: ``"3 numbers"``.
+    """
     try:
         given = np.asarray(value)
     except ValueError:  # ragged
-        raise InputError(f"{name} must be {wanted}") from None
+        given = np.asarray("ragged")
     if given.dtype.kind not in "iuf":
-        raise InputError(f"{name} must be {wanted}; it is {shown(value)}")
+        raise InputError(f"{name} = {shown(value)}: it must be {wanted}")
     return given.astype(np.float64, copy=False)
+
+
+def fixed_array(
+    value: ArrayLike, name: str, shape: tuple[int | None, ...], meaning: str = ""
+) -> Array:
+    """Return a read-only copy of finite real numbers, none beyond `LARGEST`, of one shape.
+
+    Parameters
+    ----------
+    value
+        Numbers.
+    name, meaning
+        Of the argument, for the error.
+    shape
+        Its dimensions; None where any length will do.
+    """
+    sizes = ", ".join("n" if size is None else str(size) for size in shape)
+    wanted = f"({sizes}{',' if len(shape) == 1 else ''}){meaning and f': {meaning}'}"
+    array = numbers(value, name, f"numbers of shape {wanted}")
+    if array.ndim != len(shape) or any(
+        size not in (None, given) for size, given in zip(shape, array.shape, strict=True)
+    ):
+        raise InputError(f"{name} has shape {array.shape}; it must be {wanted}")
+    refuse_not_finite(array, name)
+    if (np.abs(array) > LARGEST).any():
+        raise InputError(f"{name} = {shown(value)}: no entry may be beyond {LARGEST}")
+    return read_only(array)
 
 
 def refuse_not_finite(array: Array, name: str) -> None:

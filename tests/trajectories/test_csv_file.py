@@ -19,6 +19,7 @@ from rps_pin.rps.dynamics.motion_csv import write_csv
 from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.helix import HelixPath
+from rps_pin.trajectories.spline import spline
 from tests.trajectories.csv_files import SI, good_lines, read, refuse, save, swings
 
 Array = NDArray[np.float64]
@@ -82,8 +83,9 @@ def test_smooth_motions_are_met_at_any_time(
         ",".join(["time_s", *SI[:columns]]),
         np.column_stack([t, at(t)[:, :columns]]),
     )
-    found = read_csv(file)
-    assert (found.rates is None) == (columns < 9)
+    found = read_csv(file, ends=None if columns == 9 else "free")
+    assert (found.rates is None) == (columns == 3)
+    assert (found.accelerations is None) == (columns < 9)
     fine = np.linspace(0, found.duration, 1001)
     expected = at(fine + t[0])
     assert_allclose(found.sample(t - t[0]).pose, at(t)[:, :3], rtol=0, atol=1e-14)
@@ -99,6 +101,31 @@ def test_with_rates_and_accelerations_two_samples_do(tmp_path: Path) -> None:
     found = read(tmp_path, text).sample([0.5, 1.0])
     assert_allclose(found.pose[:, 0], [0.2 + 0.1 * 53 / 512, 0.25], rtol=1e-15)
     assert_allclose(found.rate[1, 0], 0.1 / 2 * 15 / 8, rtol=1e-15)
+
+
+def test_a_file_of_poses_starts_and_ends_at_rest(tmp_path: Path) -> None:
+    """As a spline in a YAML file does: the same motion."""
+    text = "\n".join(good_lines())
+    path = read(tmp_path, text)
+    other = spline(path.poses, path.times)
+    t = np.linspace(0, path.duration, 50)
+    for a, b in zip(path.sample(t), other.sample(t), strict=True):
+        assert_array_equal(a, b)
+    assert_allclose(path.sample([0.0, path.duration]).rate, 0, atol=1e-12)
+    assert (path.starts, path.ends) == ("at rest", "at rest")
+    free = read(tmp_path, text, ends="free")
+    assert np.abs(free.sample(0.0).rate).min() > 1e-2
+    assert free.starts == "with the rate of the fitted spline"
+    with pytest.raises(InputError, match=r"path.csv: ends = 'measured': no rates are given"):
+        read(tmp_path, text, ends="measured")
+
+
+def test_a_file_of_poses_and_rates_has_the_measured_rates_at_its_ends(tmp_path: Path) -> None:
+    t = np.linspace(0, 2, 101)
+    rows = np.column_stack([t, 0.3 * swings(5)(t)[:, :6]])
+    path = read_csv(save(tmp_path / "path.csv", ",".join(["time_s", *SI[:6]]), rows))
+    assert_allclose(path.sample([0.0, 2.0]).rate, rows[[0, -1], 4:7], rtol=0, atol=1e-12)
+    assert (path.starts, path.ends) == ("with the measured rate", "with the measured rate")
 
 
 def test_a_gap_is_told_with_its_times_and_can_be_allowed(tmp_path: Path) -> None:
@@ -186,7 +213,7 @@ def test_what_is_wrong_is_told_in_the_units_of_the_file(tmp_path: Path) -> None:
     names += "z_rate_mm_per_s,tilt_x_rate_rad_per_s,tilt_y_rate_rad_per_s"
     file = save(tmp_path / "path.csv", names, np.column_stack([t, pose, still, rate, still]))
     slopes = [f"{10 * (pose[i + 1] - pose[i]):.6g}" for i in (19, 20)]
-    words = f"line 22: z_rate_mm_per_s = 77, but beside it z_mm changes at {' and '.join(slopes)} "
+    words = f"line 22: z_rate_mm_per_s = 77, but next to it z_mm changes at {' and '.join(slopes)} "
     with pytest.raises(InputError, match=words):
         read_csv(file)
 

@@ -146,10 +146,10 @@ def test_steps_too_unequal_for_rounding_are_refused(step: float) -> None:
         ([0, 1, 1, 2], "times must increase: 1 s, then 1 s"),
         ([0, 2, 1, 3], "times must increase: 2 s, then 1 s"),
         ([-1e30, 0, 1, 2], "times must increase: 0 s, then 1 s"),  # lost in the shift to 0
-        ([0, 1, np.nan, 3], r"times is not finite: entry \(2,\) is nan"),
+        ([0, 1, np.nan, 3], r"times is not finite: entry 2 is nan"),
         ([0, 1, 2, np.inf], "times is not finite"),
-        (2.0, "times = 2.0"),
-        ([[0, 1, 2, 3]], "times = "),
+        (2.0, r"times has shape \(\)"),
+        ([[0, 1, 2, 3]], "times has shape"),
         ("0123", "times = '0123'"),
     ],
 )
@@ -279,7 +279,7 @@ def test_profile_and_tilt_scale_if_left_out_are_those_documented() -> None:
         ({"poses": [[0.2, 0, 0], [0.2, np.nan, 0]]}, "poses is not finite"),
         ({"tilt_scale": 0.0}, "tilt_scale = 0.0"),
         ({"tilt_scale": np.nan}, "tilt_scale = nan"),
-        ({"profile": "cubic"}, "must be one of quintic, trapezoidal, s-curve"),
+        ({"profile": "cubic"}, "must be 'quintic' or 'trapezoidal' or 's-curve'"),
         ({"duration": -1.0}, "duration = -1.0"),
         ({"duration": None}, "give the poses' times, or a duration .*: neither is given"),
         ({"times": [0, 1, 2, 3]}, "give the poses' times, or a duration .*: both are given"),
@@ -321,7 +321,7 @@ def test_times_and_parameters_outside_are_refused(bad: float) -> None:
 
 
 def test_repr_tells_how_many_poses_and_how_long() -> None:
-    assert repr(spline(POSES, [0, 1, 2, 3])) == "TimedSpline(<4 poses>, duration=3)"
+    assert repr(spline(POSES, [0, 1, 2, 3])) == "TimedSpline(<4 samples>, duration=3)"
     text = repr(spline(POSES, duration=3.0))
     assert text.startswith("TimedCurve(ChordSpline(<4 poses>, length=0.0")
     assert "SCurveLaw" in text

@@ -1,14 +1,14 @@
 """Trajectories of poses with exact first and second derivatives.
 
-Each has a ``duration`` and a ``sample(t)``, made by one function (`helix`, `point_to_point`,
-`spline`, `circle`, `lissajous`, `read_csv`) or of a curve and a law of time. Whether a robot can
-follow one, how fast, and with which forces is asked in `rps_pin.rps`.
+Each has a ``duration`` and a ``sample(t)``. They are made by `helix`, `point_to_point`, `spline`,
+`circle`, `lissajous` and `read_csv`, or of a curve and a law of time. Whether a robot can follow
+one, how fast, and with which forces: see `rps_pin.rps`.
 """
 
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.curve import Curve, CurveSample, LawSample, TimedCurve, TimeLaw
 from rps_pin.trajectories.helix import HelixCurve, HelixPath, helix
-from rps_pin.trajectories.path import PathSample, Trajectory
+from rps_pin.trajectories.path import PathSample, Trajectory, end_states
 from rps_pin.trajectories.point_to_point import LineCurve, point_to_point
 from rps_pin.trajectories.sampled_path import SampledPath
 from rps_pin.trajectories.spline import ChordSpline, TimedSpline, spline
@@ -34,6 +34,7 @@ __all__ = [
     "Trajectory",
     "TrapezoidalLaw",
     "circle",
+    "end_states",
     "helix",
     "lissajous",
     "point_to_point",

@@ -6,45 +6,87 @@ The header names quantities with their units, as `rps_pin.rps.dynamics.motion_cs
     0.00,0.223,0.0,5.0
     0.01,0.223,0.1,5.0
 
-Lines that are blank or begin with ``#`` are skipped. Times may begin anywhere (the first counts as
-0) and steps may differ.
+Lines that are blank or begin with ``#`` are skipped. Commas, semicolons or tabs separate cells,
+whichever the header uses; numbers are written with a decimal point. Times may begin anywhere (the
+first counts as 0) and steps may differ.
 """
 
 from __future__ import annotations
 
+import csv
 import math
 import os
-from collections.abc import Mapping, Sequence
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import BinaryIO, NoReturn
 
 import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
-from rps_pin.trajectories.csv_columns import ACCELERATIONS, COORDINATES, RATES, Column, columns_of
-from rps_pin.trajectories.csv_table import Table, read_table
 from rps_pin.trajectories.derivative_check import disagreement
-from rps_pin.trajectories.poses import real
-from rps_pin.trajectories.sampled_path import FEWEST_POSES, SampledPath
+from rps_pin.trajectories.sampled_path import FEWEST_POSES, Ends, SampledPath
+from rps_pin.validation import positive_number
 
 #: A step longer than this many times the median step is a gap.
 GAP = 10.0
-#: No pose is beyond: two turns of tilt are one too many, and no robot of this kind is so high (m).
+#: Most lines of a file, and most bytes of a line, that are read.
+MOST_LINES = 2_000_000
+LONGEST_LINE = 100_000
+
+COORDINATES = ("z", "tilt_x", "tilt_y")
+RATES = tuple(f"{name}_rate" for name in COORDINATES)
+ACCELERATIONS = tuple(f"{name}_acceleration" for name in COORDINATES)
+
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+_ANGLES = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180}
+#: The units of each quantity, and their values in SI.
+UNITS = {"time": {"s": 1.0, "ms": 1e-3, "us": 1e-6}} | {
+    name + suffix: {unit + over: si for unit, si in (_LENGTHS if name == "z" else _ANGLES).items()}
+    for suffix, over in (("", ""), ("_rate", "_per_s"), ("_acceleration", "_per_s2"))
+    for name in COORDINATES
+}
+#: Quantity and unit of every column that is read, by its name.
+READ = {f"{quantity}_{unit}": (quantity, unit) for quantity in UNITS for unit in UNITS[quantity]}
+#: Other columns that `rps_pin.rps.dynamics.motion_csv` writes; they follow from the motion.
+IGNORED = frozenset(
+    ["x_m", "y_m"]
+    + [
+        f"{quantity}_{leg}_{unit}"
+        for quantity, unit in (
+            ("length", "m"),
+            ("speed", "m_per_s"),
+            ("leg_acceleration", "m_per_s2"),
+            ("force", "N"),
+        )
+        for leg in (1, 2, 3)
+    ]
+)
+#: Largest values: two turns of tilt are one too many, and no robot of this kind is so high (m).
 _LARGEST = {"z": 100.0, "tilt_x": 2 * math.pi, "tilt_y": 2 * math.pi}
 _INSTEAD = {"z": "millimetres? Then name the column z_mm", "tilt": "degrees? Then name it {}_deg"}
+_DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+_POINT = "; numbers are written with a point, 0.5 and not 0,5"
 
 
-def read_csv(path: str | os.PathLike[str], *, max_step: float | None = None) -> SampledPath:
+def read_csv(
+    path: str | os.PathLike[str], *, max_step: float | None = None, ends: Ends | None = None
+) -> SampledPath:
     """Read a trajectory from a CSV file.
 
     Columns: ``time_s``, ``z_m``, ``tilt_x_rad``, ``tilt_y_rad``; optional the rates
-    (``z_rate_m_per_s``, ``tilt_x_rate_rad_per_s``, ...), and beside them the accelerations
+    (``z_rate_m_per_s``, ``tilt_x_rate_rad_per_s``, ...), and with them the accelerations
     (``z_acceleration_m_per_s2``, ...). Other units by their names: s, ms, us; m, mm, um; rad, mrad,
-    urad, deg. What else `rps-pin` writes beside a motion (``length_1_m``, ``force_1_N``, ...) is
-    not used; any other column is refused, as it may be one that is misspelt.
+    urad, deg. The other columns that `rps-pin` writes with a motion (``length_1_m``, ``force_1_N``,
+    ...) are not used; any other column is refused, as it may be misspelt.
 
-    With rates and accelerations, the motion in each step is the quintic that has those of both its
-    ends; otherwise it is the quintic spline through the poses, and rates are only compared with
-    them. See `SampledPath`.
+    With poses alone the motion starts and ends at rest, unless `ends` says otherwise. With rates it
+    has the first and the last rate at its ends; the others are only compared with the poses. With
+    rates and accelerations, the motion in each step is the quintic that has those of both its ends.
+    See `SampledPath`.
 
     Parameters
     ----------
@@ -52,59 +94,265 @@ def read_csv(path: str | os.PathLike[str], *, max_step: float | None = None) -> 
         The file: UTF-8, a header, cells separated by commas, semicolons or tabs (whichever the
         header uses), numbers with a decimal point.
     max_step
-        Longest step that is no gap, s; ten times the median step if left out.
+        Longest step that is not a gap, s; ten times the median step if left out.
+    ends
+        ``"at rest"``, ``"measured"`` or ``"free"``, as for `SampledPath`.
 
     Raises
     ------
     InputError
-        With the file and the line: if a cell is empty, missing, too many, or no finite number; if
-        times do not increase or leave a gap; if a value cannot be in its unit (a tilt beyond 2 pi
-        rad, a height beyond 100 m); if rates or accelerations are not, even roughly, the
-        derivatives of the poses; if a column is unknown, without unit, twice there or missing; if
-        rows are too few (6; with accelerations 2); or if it is no such file.
+        With the file and the line: if a cell is empty, missing, too many, or not a finite number;
+        if times do not increase or leave a gap; if a value cannot be in its unit (a tilt beyond
+        2 pi rad, a height beyond 100 m); if rates or accelerations are not, even roughly, the
+        derivatives of the poses; if a column is unknown, without unit, there twice or missing; if
+        there are fewer rows than 2 (with free ends 6); or if it is not such a file.
     """
-    if max_step is not None and not real(max_step) > 0:
-        raise InputError(f"max_step = {shown(max_step)}: it must be a positive number of seconds")
-    columns: dict[str, Column] = {}
-
-    def check(header: Sequence[str]) -> None:
-        columns.update(columns_of(header))
-
-    table = read_table(path, "trajectory file", check)
-    si = {name: table.values[:, c.position] * c.factor for name, c in columns.items()}
-    _refuse_few(table, len(si))
-    _refuse_times(table, columns["time"], si["time"], max_step)
-    _refuse_implausible(table, columns, si)
-    _refuse_wrong_derivatives(table, columns, si)
-    given = [_stack(si, names) for names in (COORDINATES, RATES, ACCELERATIONS) if names[0] in si]
-    poses, *more = given
+    if max_step is not None:
+        positive_number(max_step, "max_step", "seconds")
+    table = _read_table(path)
+    _refuse_few(table, FEWEST_POSES if ends == "free" else 2)
+    _refuse_times(table, max_step)
+    _refuse_implausible(table)
+    _refuse_wrong_derivatives(table)
+    columns = [
+        np.stack([table.si(name) for name in names], axis=-1)
+        for names in (COORDINATES, RATES, ACCELERATIONS)
+        if names[0] in table.columns
+    ]
     try:
-        return SampledPath(si["time"], poses, *(more if len(more) == 2 else ()))
+        return SampledPath(table.si("time"), *columns, ends=ends)
     except InputError as error:
         raise InputError(f"{table.origin}: {error}") from None
 
 
-def _stack(si: Mapping[str, Array], names: Sequence[str]) -> Array:
-    return np.stack([si[name] for name in names], axis=-1)
+# The table ----------------------------------------------------------------------------------------
 
 
-def _refuse_few(table: Table, columns: int) -> None:
-    needed = 2 if columns == 1 + 3 * 3 else FEWEST_POSES
-    rows = len(table.values)
+@dataclass(frozen=True)
+class _Column:
+    name: str
+    """As in the header."""
+    values: Array
+    """Shape (rows,), in the unit of the file; finite."""
+    factor: float
+    """Value of the unit in SI."""
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The numbers of a file, and their lines."""
+
+    columns: Mapping[str, _Column]
+    """By quantity."""
+    lines: Sequence[int]
+    """The line of each row, from 1."""
+    header_line: int
+    origin: str
+    """The file, for messages."""
+
+    def place(self, row: int) -> str:
+        """Return ``"FILE, line N"`` of a row."""
+        return f"{self.origin}, line {self.lines[row]}"
+
+    def si(self, quantity: str) -> Array:
+        """Return the values of a quantity in SI units."""
+        column = self.columns[quantity]
+        return column.values * column.factor
+
+
+def _read_table(path: str | os.PathLike[str]) -> _Table:
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f"a trajectory file is given by its path, not by {shown(path)}")
+    origin = os.fspath(path)
+    try:
+        with Path(path).open("rb") as file:
+            return _table(_lines(file, origin), origin)
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot read the trajectory file {origin}: {reason}") from None
+
+
+def _lines(file: BinaryIO, origin: str) -> Iterator[tuple[int, str]]:
+    """Yield the lines that are neither blank nor comments, with their numbers, from 1."""
+    number = 0
+    while raw := file.readline(LONGEST_LINE + 1):
+        number += 1
+        place = f"{origin}, line {number}"
+        if number > MOST_LINES:
+            raise InputError(f"{origin} has more than {MOST_LINES} lines, the most that is read")
+        if len(raw) > LONGEST_LINE:
+            raise InputError(f"{place}: more than {LONGEST_LINE} bytes, the most that is read")
+        try:
+            line = raw.decode("utf-8-sig" if number == 1 else "utf-8").strip(" \r\n")
+        except UnicodeDecodeError as error:
+            byte = raw[error.start]
+            raise InputError(f"{place}: not a UTF-8 text (byte 0x{byte:02x})") from None
+        if line and not line.startswith("#"):
+            yield number, line
+
+
+def _table(lines: Iterator[tuple[int, str]], origin: str) -> _Table:
+    header_line, header = next(lines, (0, ""))
+    if not header_line:
+        raise InputError(f"{origin} is empty: its first line must name the columns")
+    try:
+        used = [mark for mark in _DELIMITERS if mark in header] or [","]
+        if len(used) > 1:
+            marks = " and ".join(_DELIMITERS[mark] for mark in used)
+            raise InputError(f"{marks} in the header; one of them may separate the cells")
+        names = [cell.strip() for cell in _cells(header, used[0])]
+        positions = _columns(names)
+    except InputError as error:
+        raise InputError(f"{origin}, line {header_line}: {error}") from None
+    values, numbers = array("d"), array("q")
+    for number, line in lines:
+        place = f"{origin}, line {number}"
+        try:
+            cells = _cells(line, used[0])
+        except InputError as error:
+            raise InputError(f"{place}: {error}") from None
+        if len(cells) != len(names):
+            comma = used == [","] and len(cells) > len(names) and all(map(_is_number, cells))
+            raise InputError(
+                f"{place}: {len(cells)} cell{'s' if cells[1:] else ''}, where the header names "
+                f"{len(names)} columns{_POINT if comma else ''}"
+            )
+        try:
+            if "_" in line:  # float("1_0") is 10
+                raise ValueError
+            values.extend(map(float, cells))
+        except ValueError:
+            _refuse_cell(cells, names, place)
+        numbers.append(number)
+    rows = np.array(values).reshape(-1, len(names))
+    finite = np.isfinite(rows)
+    if not finite.all():
+        row, column = (int(i) for i in np.argwhere(~finite)[0])
+        value = rows[row, column]
+        place = f"{origin}, line {numbers[row]}"
+        raise InputError(f"{place}: {names[column]} = {value}: it must be finite")
+    columns = {
+        quantity: _Column(names[i], rows[:, i], UNITS[quantity][READ[names[i]][1]])
+        for quantity, i in positions.items()
+    }
+    return _Table(columns, numbers, header_line, origin)
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    if '"' not in line:
+        return line.split(delimiter)
+    try:
+        return next(csv.reader([line], delimiter=delimiter, strict=True))
+    except csv.Error as error:
+        raise InputError(str(error)) from None
+
+
+def _refuse_cell(cells: Sequence[str], names: Sequence[str], place: str) -> NoReturn:
+    """Refuse the first cell that is not a number."""
+    index = next(i for i, cell in enumerate(cells) if not _is_number(cell))
+    cell, name = cells[index].strip(), names[index]
+    if not cell:
+        raise InputError(f"{place}: {name} is empty: every sample needs all values")
+    point = _POINT if "," in cell else ""
+    raise InputError(f"{place}: {name} = {shown(cell)}: it must be a number{point}")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return "_" not in cell
+
+
+# The header ---------------------------------------------------------------------------------------
+
+
+def _columns(header: Sequence[str]) -> dict[str, int]:
+    """Return the positions of the columns that are read, by quantity."""
+    if all(_is_number(name) for name in header):
+        raise InputError("numbers, where the header must name the columns")
+    found: dict[str, int] = {}
+    for position, name in enumerate(header):
+        if name in header[:position]:
+            raise InputError(f"column {name!r} is there twice")
+        if name in IGNORED:
+            continue
+        if name not in READ:
+            raise InputError(_unknown(name, position))
+        quantity, _ = READ[name]
+        if quantity in found:
+            raise InputError(
+                f"columns {header[found[quantity]]!r} and {name!r} both hold {quantity}; one may"
+            )
+        found[quantity] = position
+    needed = ["time", *COORDINATES]
+    for more in (ACCELERATIONS, RATES):
+        if len(needed) > 4 or any(quantity in found for quantity in more):
+            needed.extend(more)
+    missing = []
+    for quantity in needed:
+        if quantity not in found:
+            first, *others = _names(quantity)
+            missing.append(f"{first} (or {', '.join(others)})")
+    if missing:
+        raise InputError(
+            f"column{'s' if missing[1:] else ''} {', '.join(missing)} missing; the header has "
+            f"{', '.join(header)}. Cells are separated by commas, semicolons or tabs; rates and "
+            "accelerations are optional, accelerations only with rates, and each for z, tilt_x "
+            "and tilt_y"
+        )
+    return found
+
+
+def _unknown(name: str, position: int) -> str:
+    """Return what is wrong with a name, and what it could be."""
+    if not name:
+        return f"column {position + 1} has no name"
+    if name in UNITS:
+        return f"column {name!r} has no unit: it can be {', '.join(_names(name))}"
+    # Of the same unit: z_cm is not a misspelt z_m.
+    like = [known for known, (_, unit) in READ.items() if name.lower().endswith(f"_{unit}")]
+    near = get_close_matches(name.lower(), like, n=1, cutoff=0.85)
+    if near:
+        return f"column {shown(name)} is not known; did you mean {near[0]!r}?"
+    for quantity in sorted(UNITS, key=len, reverse=True):
+        if name.startswith(f"{quantity}_"):
+            unit = name[len(quantity) + 1 :]
+            return (
+                f"column {shown(name)}: {shown(unit)} is not a unit of {quantity}; it can be "
+                f"{', '.join(_names(quantity))}"
+            )
+    return (
+        f"column {shown(name)} is not known. Those that are read are quantity_unit, with the "
+        f"quantities {', '.join(UNITS)}: time_s, z_mm, tilt_x_rate_deg_per_s and the like"
+    )
+
+
+def _names(quantity: str) -> list[str]:
+    return [f"{quantity}_{unit}" for unit in UNITS[quantity]]
+
+
+# The motion ---------------------------------------------------------------------------------------
+
+
+def _refuse_few(table: _Table, needed: int) -> None:
+    rows = len(table.lines)
     if rows < needed:
         where = table.place(rows - 1) if rows else f"{table.origin}, line {table.header_line}"
         raise InputError(
             f"{where}: the file ends after {rows or 'no'} sample{'s' if rows != 1 else ''}; "
-            f"{needed} or more are needed (without rates and accelerations {FEWEST_POSES}, with "
-            "them 2)"
+            f"{needed} or more are needed"
         )
 
 
-def _refuse_times(table: Table, column: Column, times: Array, max_step: float | None) -> None:
+def _refuse_times(table: _Table, max_step: float | None) -> None:
     """Refuse times that do not increase, and gaps."""
     with np.errstate(over="ignore"):
-        steps = np.diff(times)
-    name, written = column.name, table.values[:, column.position]
+        steps = np.diff(table.si("time"))
+    name, written = table.columns["time"].name, table.columns["time"].values
     if not (steps > 0).all():
         i = int(np.argmin(steps > 0))
         raise InputError(
@@ -125,41 +373,37 @@ def _refuse_times(table: Table, column: Column, times: Array, max_step: float | 
         )
 
 
-def _refuse_implausible(
-    table: Table, columns: Mapping[str, Column], si: Mapping[str, Array]
-) -> None:
+def _refuse_implausible(table: _Table) -> None:
     """Refuse values that are so large that their unit must be another."""
     for quantity, largest in _LARGEST.items():
-        beyond = np.abs(si[quantity]) > largest
+        beyond, column = np.abs(table.si(quantity)) > largest, table.columns[quantity]
         if beyond.any():
-            row, column = int(np.argmax(beyond)), columns[quantity]
+            row = int(np.argmax(beyond))
             unit = "m" if quantity == "z" else "rad"
             hint = ""
             if column.factor == 1.0:
                 hint = f"; is it in {_INSTEAD[quantity[:4]].format(quantity)}"
             raise InputError(
-                f"{table.place(row)}: {column.name} = {table.values[row, column.position]:.9g}: it "
-                f"cannot be beyond {largest:.4g} {unit}{hint}"
+                f"{table.place(row)}: {column.name} = {column.values[row]:.9g}: it cannot be "
+                f"beyond {largest:.4g} {unit}{hint}"
             )
 
 
-def _refuse_wrong_derivatives(
-    table: Table, columns: Mapping[str, Column], si: Mapping[str, Array]
-) -> None:
+def _refuse_wrong_derivatives(table: _Table) -> None:
     """Refuse rates that are not the poses' derivatives, and accelerations not the rates'."""
-    for quantities, derivatives in ((COORDINATES, RATES), (RATES, ACCELERATIONS)):
-        for quantity, derivative in zip(quantities, derivatives, strict=True):
-            if derivative not in columns:
-                continue
-            found = disagreement(si["time"], si[quantity], si[derivative])
-            if found is None:
-                continue
-            column = columns[derivative]
-            slopes = " and ".join(f"{slope / column.factor:.6g}" for slope in found.slopes)
-            like = f" (over the whole file: {found.looks_like})" if found.looks_like else ""
-            raise InputError(
-                f"{table.place(found.row)}: {column.name} = {found.given / column.factor:.6g}, but "
-                f"beside it {columns[quantity].name} changes at {slopes} in the same unit{like}. "
-                "Correct it, sample more densely, write more digits, or leave out rates and "
-                "accelerations"
-            )
+    pairs = zip(COORDINATES + RATES, RATES + ACCELERATIONS, strict=True)
+    for quantity, derivative in pairs:
+        if derivative not in table.columns:
+            continue
+        found = disagreement(table.si("time"), table.si(quantity), table.si(derivative))
+        if found is None:
+            continue
+        column = table.columns[derivative]
+        slopes = " and ".join(f"{slope / column.factor:.6g}" for slope in found.slopes)
+        like = f" (over the whole file: {found.looks_like})" if found.looks_like else ""
+        raise InputError(
+            f"{table.place(found.row)}: {column.name} = {found.given / column.factor:.6g}, but "
+            f"next to it {table.columns[quantity].name} changes at {slopes} in the same "
+            f"unit{like}. Correct it, sample more densely, write more digits, or leave out rates "
+            "and accelerations"
+        )

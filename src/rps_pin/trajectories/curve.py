@@ -1,6 +1,6 @@
-"""Curves of poses, and laws of time that run along them: a trajectory is one in the other.
+"""Curves of poses x(u), laws of time u(t), and the trajectories x(u(t)).
 
-A curve x(u) says where the robot goes, a law u(t) says when. The chain rule gives the rest:
+By the chain rule:
 
     x' = x_u u',    x'' = x_u u'' + x_uu u'^2.
 """
@@ -27,11 +27,11 @@ class CurveSample(NamedTuple):
 
 
 class Curve(Protocol):
-    """Poses along a parameter u that runs from 0 to `length`, without a time."""
+    """Poses over a parameter u from 0 to `length`, without times."""
 
     @property
     def length(self) -> float:
-        """Where u ends; positive. Its unit is the curve's own: a fraction, an angle, a chord."""
+        """Largest u; positive. Its unit is the curve's own: a fraction, an angle, a length."""
         ...
 
     def at(self, u: ArrayLike) -> CurveSample:
@@ -40,7 +40,7 @@ class Curve(Protocol):
 
 
 class LawSample(NamedTuple):
-    """A law of time at given times; u in the unit of the curve that it runs along."""
+    """A law of time at given times; u in the unit of its curve."""
 
     u: Array
     """Shape (...)."""
@@ -51,7 +51,7 @@ class LawSample(NamedTuple):
 
 
 class TimeLaw(Protocol):
-    """How a parameter u grows over time, from 0 at time 0."""
+    """A parameter u over time, from 0 at time 0."""
 
     @property
     def duration(self) -> float:
@@ -64,14 +64,14 @@ class TimeLaw(Protocol):
 
 
 class TimedCurve:
-    """A trajectory: a curve, and the law of time that runs along it.
+    """A trajectory made of a curve and a law of time.
 
     Attributes
     ----------
     curve : Curve
-        Where the robot goes.
+        x(u).
     law : TimeLaw
-        When.
+        u(t).
     """
 
     def __init__(self, curve: Curve, law: TimeLaw) -> None:

@@ -1,15 +1,15 @@
-"""Whether samples of a rate can be the derivative of samples of a quantity.
+"""Consistency of a sampled rate with the sampled quantity: units and wrong entries.
 
-Between two samples the quantity has a mean slope. Where the derivative does not turn more than once
-in a step,
+Between two samples the quantity has a mean slope. Where the derivative has at most one extremum in
+a step,
 
 - a step's slope lies between the derivatives at its two ends,
-- a derivative lies between the slopes of the two steps beside it,
+- a derivative lies between the slopes of the two steps next to it,
 
-but for what it turns by within the step. Both may be missed by half of the column's largest value,
-and by what rounding of the written numbers can explain. That passes a sine of four samples a period
-and an acceleration that jumps, and finds wrong units and wrong entries. The first and the last
-derivative have one step beside them; they are wrong if far larger than everything else.
+except for its change within the step. Both may be missed by half of the column's largest value, and
+by the rounding of the written numbers. This accepts a sine of four samples a period and an
+acceleration that jumps, and finds wrong units and wrong entries. The first and the last derivative
+have one step next to them; they are wrong if far larger than everything else.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from rps_pin.arrays import Array
 _GROSS = 0.5
 #: How far the first or last derivative may exceed all else.
 _AT_END = 10.0
-#: From so many samples on, every step's slope is judged, and both ends are. Fewer may be meant as
-#: far apart.
+#: From so many samples on, every step's slope and both ends are judged; fewer may be far apart on
+#: purpose.
 _JUDGED = 6
 #: Written numbers are taken to have four digits or more: this part of a column's largest value is
 #: the largest last place that is allowed for.
@@ -34,8 +34,8 @@ _LAST_PLACE = 1e-4
 #: No derivative as small is wrong (m/s, rad/s and the like): what should be zero may be rounding.
 _NEGLIGIBLE = 1e-12
 
-#: What a ratio of given to found derivatives looks like.
-_LOOKS = {
+#: Likely mistakes, by the ratio of given to found derivatives.
+_MISTAKES = {
     1e3: "thousandths (mm, ms) and whole units",
     1e6: "millionths (um, us) and whole units",
     180 / math.pi: "degrees and radians",
@@ -50,9 +50,9 @@ class Disagreement(NamedTuple):
     given: float
     """The derivative there."""
     slopes: tuple[float, ...]
-    """Mean slopes of the quantity in the steps beside it."""
+    """Mean slopes of the quantity in the steps next to it."""
     looks_like: str
-    """What the ratio of all derivatives to the slopes looks like; empty if like nothing known."""
+    """The likely mistake, from the ratio of derivatives to slopes; empty if none is known."""
 
 
 def disagreement(times: Array, values: Array, derivative: Array) -> Disagreement | None:
@@ -76,7 +76,8 @@ def disagreement(times: Array, values: Array, derivative: Array) -> Disagreement
         before, after = derivative[:-1], derivative[1:]
         inner = derivative[1:-1]
         wrong = np.zeros(len(times), dtype=bool)
-        wrong[1:-1] = ~(_outside(inner, slope[:-1], slope[1:]) <= np.maximum(*_pairs(allowed)))
+        either = np.maximum(allowed[:-1], allowed[1:])
+        wrong[1:-1] = ~(_outside(inner, slope[:-1], slope[1:]) <= either)
         if len(times) >= _JUDGED:
             wrong[1:] |= ~(_outside(slope, before, after) <= allowed)
             for end, others in ((0, after), (-1, before)):
@@ -98,10 +99,6 @@ def _outside(value: Array, one: Array, other: Array) -> Array:
     return beyond
 
 
-def _pairs(values: Array) -> tuple[Array, Array]:
-    return values[:-1], values[1:]
-
-
 def _last_place(values: Array) -> float:
     """Return the unit of the last decimal written: the least difference of unequal values."""
     largest = np.abs(values).max()
@@ -112,7 +109,7 @@ def _last_place(values: Array) -> float:
 def _looks_like(ratio: float) -> str:
     if abs(ratio + 1) < 0.1:
         return "the opposite sign"
-    for factor, confused in _LOOKS.items():
+    for factor, confused in _MISTAKES.items():
         for power in (factor, 1 / factor):
             if abs(ratio / power - 1) < 0.1:
                 return f"{ratio:.3g} times the slope, as if {confused} were confused"

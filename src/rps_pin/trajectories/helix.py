@@ -1,4 +1,4 @@
-"""The paper's helix (Eq. 26 to 29): the platform's centre climbs on a cylinder.
+"""Helix of the paper (Eq. 26 to 29): the platform's centre climbs on a cylinder.
 
 The centre of a 3-RPS moves sideways only by tilting (Eq. 4). On the circle p_x = r cos(phi),
 p_y = r sin(phi), Eq. 5 gives a constant tilt beta and an axis that turns at half the speed:
@@ -9,8 +9,8 @@ The two signs are the paper's (alpha, beta) and (alpha, -beta): two branches wit
 and opposite tilts. One turn of the helix leads from each to the other.
 
 phi(t) is Eq. 29 with its last branch corrected (4 (1 + sqrt(1 + 9 pi^2)) t - 4 t^2 instead of
-... t^2 - 4 t^2): it rises with a constant acceleration for half a second, at a constant speed, and
-is braked likewise. With r_h : p_h = 3 : 2 in one unit, the speed along the helix is one unit a
+... t^2 - 4 t^2): constant acceleration for half a second, constant speed, and the same
+deceleration. With r_h : p_h = 3 : 2 in one unit, the speed along the helix is one unit a
 second at its highest. Other proportions keep the same phi(t).
 """
 
@@ -26,8 +26,7 @@ from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample
 from rps_pin.trajectories.path import PathSample, checked_parameters, checked_times
-from rps_pin.trajectories.poses import finite_number
-from rps_pin.trajectories.time_laws import positive
+from rps_pin.validation import choice, finite_number, positive_number
 
 #: Eq. 29: t_a and t_t of Table 1, the latter unrounded (5.2388 s).
 PAPER_RAMP = 0.5
@@ -89,7 +88,7 @@ class HelixCurve:
 class HelixPath:
     """A helix of the platform's centre, as a trajectory of poses.
 
-    Made by `helix`; see there for the parameters.
+    See `helix` for the parameters.
     """
 
     def __init__(
@@ -128,17 +127,16 @@ class HelixPath:
         """
         times = checked_times(t, self.duration)
         speed = 2 * math.pi / (self.duration - self.ramp)  # of the middle piece
-        push = speed / self.ramp
+        acceleration = speed / self.ramp
         left = self.duration - times
         rising, falling = times < self.ramp, left <= self.ramp
         phi = np.select(
             [rising, falling],
-            [push * times**2 / 2, 2 * math.pi - push * left**2 / 2],
+            [acceleration * times**2 / 2, 2 * math.pi - acceleration * left**2 / 2],
             speed * (times - self.ramp / 2),
         )
-        rate = np.select([rising, falling], [push * times, push * left], speed)
-        acceleration = np.select([rising, falling], [push, -push], 0.0)
-        return phi, rate, acceleration
+        rate = np.select([rising, falling], [acceleration * times, acceleration * left], speed)
+        return phi, rate, np.select([rising, falling], [acceleration, -acceleration], 0.0)
 
     def sample(self, t: ArrayLike) -> PathSample:
         """Return pose, rate and acceleration at times t of shape (...), s; exact.
@@ -179,7 +177,7 @@ def helix(
         ``"+"`` for the paper's (alpha, beta), which starts at alpha = pi/2; ``"-"`` for
         (alpha, -beta), the opposite tilt with the same centre.
     duration
-        In s; Eq. 29's 5.2388 s if left out. The shape of phi(t) stays.
+        In s; Eq. 29's 5.2388 s if left out. phi(t) is scaled in time.
 
     Raises
     ------
@@ -203,16 +201,12 @@ def _check(
     branch: str,
     duration: float,
 ) -> None:
-    lengths = {"radius": radius, "pitch": pitch, "height": height}
-    for name, value in (lengths | {"duration": duration}).items():
-        finite_number(value, name, "metres" if name in lengths else "seconds")
+    for name, value in {"radius": radius, "pitch": pitch, "height": height}.items():
+        finite_number(value, name, "metres")
     if not 0 <= radius <= platform_radius:
         raise InputError(
             f"radius = {radius} m: the centre of a platform of radius h = {platform_radius} m "
             f"reaches 0 to {platform_radius} m sideways"
         )
-    if not duration > 0:
-        raise InputError(f"duration = {duration}: it must be a positive number of seconds")
-    positive(duration, "duration")
-    if branch not in ("+", "-"):
-        raise InputError(f"branch = {branch!r}; it must be '+' or '-'")
+    positive_number(duration, "duration", "seconds")
+    choice(branch, "branch", ("+", "-"))

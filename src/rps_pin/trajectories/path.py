@@ -1,4 +1,4 @@
-"""What every trajectory offers."""
+"""Trajectories: the protocol, samples of one, and the checks of times, parameters and poses."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.validation import fixed_array, numbers
+
+POSE = "z, tilt_x, tilt_y"
 
 
 class PathSample(NamedTuple):
@@ -35,21 +38,41 @@ class Trajectory(Protocol):
         ...
 
 
+#: A rate below this share of the trajectory's largest one is zero.
+_AT_REST = 1e-9
+
+
+def end_states(trajectory: Trajectory) -> tuple[str, str]:
+    """Return how a trajectory starts and how it ends, for reports.
+
+    ``"at rest"``, or ``"moving"``. A `SampledPath` also says where its rates come from: it has the
+    two as its attributes `starts` and `ends`.
+    """
+    known = getattr(trajectory, "starts", None), getattr(trajectory, "ends", None)
+    times = np.linspace(0.0, trajectory.duration, 65)
+    speeds = np.linalg.norm(trajectory.sample(times).rate, axis=-1)
+    resting = speeds <= _AT_REST * speeds.max()
+    starts, ends = (
+        str(given) if given else "at rest" if still else "moving"
+        for given, still in zip(known, resting[[0, -1]], strict=True)
+    )
+    return starts, ends
+
+
 def checked_times(t: ArrayLike, duration: float) -> Array:
     """Return times as a float array.
 
     Raises
     ------
     InputError
-        If a time is no finite number, or outside [0, duration] by more than rounding.
+        If a time is not a finite number, or outside [0, duration] by more than rounding.
     """
-    times = _numbers(t, "times must be numbers, in seconds")
-    outside = _outside(times, duration)
-    if outside is not None:
-        raise InputError(
-            f"time {outside:.9g} s is outside the trajectory, which runs from 0 to {duration:.9g} s"
-        )
-    return times.clip(0.0, duration)
+    times = numbers(t, "times", "numbers, in seconds")
+    return _within(
+        times,
+        duration,
+        "time {:.9g} s is outside the trajectory, which runs from 0 to {:.9g} s",
+    )
 
 
 def checked_parameters(u: ArrayLike, length: float) -> Array:
@@ -58,29 +81,39 @@ def checked_parameters(u: ArrayLike, length: float) -> Array:
     Raises
     ------
     InputError
-        If one is no finite number, or outside [0, length] by more than rounding.
+        If one is not a finite number, or outside [0, length] by more than rounding.
     """
-    parameters = _numbers(u, "parameters of a curve must be numbers")
-    outside = _outside(parameters, length)
-    if outside is not None:
-        raise InputError(
-            f"u = {outside:.9g} is outside the curve, which runs from 0 to {length:.9g}"
-        )
-    return parameters.clip(0.0, length)
+    parameters = numbers(u, "parameters of a curve", "numbers")
+    return _within(
+        parameters, length, "u = {:.9g} is outside the curve, which runs from 0 to {:.9g}"
+    )
 
 
-def _numbers(values: ArrayLike, wanted: str) -> Array:
-    try:
-        given = np.asarray(values)
-    except ValueError:  # ragged
-        raise InputError(wanted) from None
-    if given.dtype.kind not in "iuf":
-        raise InputError(wanted)
-    return given.astype(np.float64)
-
-
-def _outside(values: Array, end: float) -> float | None:
-    """Return the first value outside [0, end] by more than rounding, if there is one."""
+def _within(values: Array, end: float, message: str) -> Array:
     slack = 1e-12 * end
     outside = ~((values >= -slack) & (values <= end + slack))
-    return float(values[outside].flat[0]) if outside.any() else None
+    if outside.any():
+        raise InputError(message.format(values[outside].flat[0], end))
+    return values.clip(0.0, end)
+
+
+def checked_poses(value: ArrayLike, name: str) -> Array:
+    """Return two or more poses, shape (n, 3), m and rad, read-only."""
+    poses = fixed_array(value, name, (None, 3), POSE)
+    if len(poses) < 2:
+        raise InputError(f"{name} has shape {poses.shape}; two poses or more are needed")
+    return poses
+
+
+def times_from_zero(value: ArrayLike, count: int) -> Array:
+    """Return increasing times of `count` poses, shifted to begin at 0, shape (count,), s."""
+    given = fixed_array(value, "times", (None,))
+    if given.shape != (count,):
+        raise InputError(f"{len(given)} times for {count} poses: one each is needed")
+    times: Array = given - given[0]
+    rising = np.diff(times) > 0
+    if not rising.all():
+        i = int(np.argmin(rising))
+        raise InputError(f"times must increase: {given[i]:.9g} s, then {given[i + 1]:.9g} s")
+    times.setflags(write=False)
+    return times

@@ -1,17 +1,17 @@
-"""A law of time in pieces, each a polynomial of third degree: the jerk is steady in it."""
+"""Piecewise laws of time: polynomials of third degree, of constant jerk."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import PPoly
 
-from rps_pin.arrays import Array, Indices
 from rps_pin.trajectories.curve import LawSample
 from rps_pin.trajectories.path import checked_times
 
 
 class PiecewiseLaw:
-    """A law of pieces of steady jerk (or, without any jerk, of steady acceleration).
+    """A law of time in pieces of constant jerk (or, without jerk, of constant acceleration).
 
     Parameters
     ----------
@@ -32,20 +32,20 @@ class PiecewiseLaw:
 
     def __init__(self, durations: ArrayLike, jerks: ArrayLike, accelerations: ArrayLike) -> None:
         steps = np.asarray(durations, dtype=np.float64)
-        kept = steps > 0
-        self._steps = steps[kept]
-        self._jerk = np.asarray(jerks, dtype=np.float64)[kept]
-        self._acceleration = np.asarray(accelerations, dtype=np.float64)[kept]
-        self.knots = np.concatenate([[0.0], np.cumsum(self._steps)])
+        h, j, a = (np.asarray(x, np.float64)[steps > 0] for x in (steps, jerks, accelerations))
+        self.knots = np.concatenate([[0.0], np.cumsum(h)])
         self.knots.setflags(write=False)
-        #: Time left at the end of each piece: exact near the end, where the knots are rounded.
-        self._left = np.concatenate([np.cumsum(self._steps[:0:-1])[::-1], [0.0]])
         self.duration = float(self.knots[-1])
-        h, a, j = self._steps, self._acceleration, self._jerk
-        self._speed = np.concatenate([[0.0], np.cumsum(a * h + j * h**2 / 2)])
-        moved = self._speed[:-1] * h + a * h**2 / 2 + j * h**3 / 6
-        self._u = np.concatenate([[0.0], np.cumsum(moved)])
-        self.distance = float(self._u[-1])
+        speed = np.concatenate([[0.0], np.cumsum(a * h + j * h**2 / 2)])
+        u = np.concatenate([[0.0], np.cumsum(speed[:-1] * h + a * h**2 / 2 + j * h**3 / 6)])
+        self.distance = float(u[-1])
+        v, o = speed[:-1], np.zeros_like(h)
+        # u, u' and u'' of each piece, evaluated together.
+        c = np.stack([[j / 6, o, o], [a / 2, j / 2, o], [v, a, j], [u[:-1], v, a]]).swapaxes(1, 2)
+        # Times are counted from the nearer end: a short last piece would vanish in the rounding of
+        # the time from the start.
+        before_end = np.concatenate([-np.cumsum(h[::-1])[::-1], [0.0]])
+        self._from_start, self._from_end = PPoly(c, self.knots), PPoly(c, before_end)
 
     def __repr__(self) -> str:
         name = type(self).__name__
@@ -53,19 +53,8 @@ class PiecewiseLaw:
 
     def at(self, t: ArrayLike) -> LawSample:
         """Return u, u' and u'' at times of shape (...), s; where u'' jumps, the later piece's."""
-        i, h = self._piece(checked_times(t, self.duration))
-        v, a, j = self._speed[i], self._acceleration[i], self._jerk[i]
-        return LawSample(
-            self._u[i] + h * (v + h * (a / 2 + h * j / 6)), v + h * (a + h * j / 2), a + h * j
-        )
-
-    def _piece(self, times: Array) -> tuple[Indices, Array]:
-        """Return in which piece times are, and for how long, reckoned from the nearer end."""
-        left = self.duration - times
-        early = times < left
-        i = np.where(
-            early,
-            np.searchsorted(self.knots[1:-1], times, side="right"),
-            len(self._steps) - 1 - np.searchsorted(self._left[-2::-1], left, side="left"),
-        )
-        return i, np.where(early, times - self.knots[i], self._steps[i] - (left - self._left[i]))
+        times = checked_times(t, self.duration)
+        before_end = times - self.duration
+        early = (times < -before_end)[..., None]
+        values = np.where(early, self._from_start(times), self._from_end(before_end))
+        return LawSample(*np.moveaxis(values, -1, 0))

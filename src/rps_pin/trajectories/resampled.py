@@ -1,13 +1,12 @@
-"""The way of a trajectory without its times: a curve that another law of time can run along.
+"""Arc-length curves of trajectories: the path without its times, for another law of time.
 
-A trajectory that rests at its ends has no tangent there in its own time. Over the length of its
-way,
+A trajectory that is at rest at its ends has no tangent there over time. Over the length of its
+path,
 
     sqrt(dz^2 + L^2 (dtilt_x^2 + dtilt_y^2)),    L = `tilt_scale`, m/rad,
 
-it has one. The curve is the quintic spline through close points of the way, evenly spaced: pieces
-of fifth degree with four continuous derivatives, the ends *not-a-knot*. They are as many as it
-takes to stay on the way.
+it has one. The curve is the quintic spline (not-a-knot) through points of the path at equal
+distances. Their number is doubled until the curve is within `ON_PATH` of the path.
 """
 
 from __future__ import annotations
@@ -21,23 +20,23 @@ from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample
 from rps_pin.trajectories.path import Trajectory, checked_parameters
 
-#: Pieces that the way is divided into: at first, and at most (or four to a step between times).
+#: Number of pieces: at first, and at most (or four to a step between times).
 PIECES, MOST_PIECES = 400, 25_600
-#: How far the curve may be from the way, over its length.
-ON_THE_WAY = 1e-7
+#: Largest distance of the curve from the path, over the path's length.
+ON_PATH = 1e-7
 #: Metres that a radian of tilt counts for.
 TILT_SCALE = 0.1
-#: Looks between two times for where the way is divided: its length is known to their square.
-_LOOKS = 64
+#: Least number of samples between two times, from which the path is divided.
+_SAMPLES = 64
 
 
 class ResampledCurve:
-    """The way of a trajectory, u from 0 to its length.
+    """The path of a trajectory over its length.
 
     Parameters
     ----------
     trajectory
-        What is followed.
+        The motion.
     times
         Increasing, from 0 to its duration, shape (n,), s: between two of them it is smooth.
     tilt_scale
@@ -46,12 +45,12 @@ class ResampledCurve:
     Attributes
     ----------
     length : float
-        Of the way, m.
+        Of the path, m.
 
     Raises
     ------
     InputError
-        If the trajectory stays where it is, or has a corner: stops, and goes on another way.
+        If the trajectory does not move, or has a corner (stops, and goes on in another direction).
     """
 
     def __init__(
@@ -59,18 +58,18 @@ class ResampledCurve:
     ) -> None:
         self._trajectory = trajectory
         self._scale = np.array([1.0, tilt_scale, tilt_scale])
-        looks = max(_LOOKS, 16 * PIECES // (len(times) - 1))
-        fine = np.linspace(times[:-1], times[1:], looks, endpoint=False, axis=-1)
+        samples = max(_SAMPLES, 16 * PIECES // (len(times) - 1))
+        fine = np.linspace(times[:-1], times[1:], samples, endpoint=False, axis=-1)
         t = np.append(fine.ravel(), times[-1])
-        gone = self._lengths(trajectory.sample(t).pose)
-        if not gone[-1] > 0:
-            raise InputError("the trajectory stays in one pose: there is no way to run along")
-        moving = np.append(True, np.diff(gone) > 0)
+        covered = self._lengths(trajectory.sample(t).pose)
+        if not covered[-1] > 0:
+            raise InputError("the trajectory stays in one pose: its path has no length")
+        moving = np.append(True, np.diff(covered) > 0)
         pieces = PIECES
         while True:
-            when = np.interp(np.linspace(0.0, gone[-1], pieces + 1), gone[moving], t[moving])
-            off, where = self._follow(when)
-            if off <= ON_THE_WAY * self.length:
+            when = np.interp(np.linspace(0.0, covered[-1], pieces + 1), covered[moving], t[moving])
+            off, where = self._fit(when)
+            if off <= ON_PATH * self.length:
                 return
             pieces *= 2
             if pieces > max(MOST_PIECES, 4 * len(times)):
@@ -80,8 +79,8 @@ class ResampledCurve:
                     "make it two trajectories"
                 )
 
-    def _follow(self, when: Array) -> tuple[float, float]:
-        """Lay the spline through the poses at some times; return how far it is off, and when."""
+    def _fit(self, when: Array) -> tuple[float, float]:
+        """Fit the spline to the poses at some times; return its largest distance, and when."""
         poses = self._trajectory.sample(when).pose
         knots = self._lengths(poses)
         self.length = float(knots[-1])
@@ -98,7 +97,7 @@ class ResampledCurve:
         return float(off[worst]), float(between[worst])
 
     def _lengths(self, poses: Array) -> Array:
-        """Return how much of the way is gone at each pose, by chords, m."""
+        """Return the length of the path up to each pose, by chords, m."""
         chords = np.linalg.norm(np.diff(poses, axis=0) * self._scale, axis=-1)
         return np.concatenate([[0.0], np.cumsum(chords)])
 

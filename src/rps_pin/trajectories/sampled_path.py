@@ -1,19 +1,27 @@
-"""A motion known at samples, and what it is between them.
+"""Trajectories through samples: quintic splines, or quintic polynomials of measured derivatives.
 
-With poses alone it is the quintic spline through them: pieces of fifth degree that join with four
-continuous derivatives. Nothing is assumed about its ends, neither rest nor anything else: the first
-three pieces are one polynomial, and so are the last three (*not-a-knot*). A polynomial of fifth
-degree is met exactly. Noise in the poses is met too, and its derivatives with it.
+With poses alone, or poses and rates, x(t) is the quintic spline through the poses: polynomials of
+fifth degree that join with four continuous derivatives. Two conditions at each end complete it:
 
-With rates and accelerations it is the quintic Hermite interpolant: in each step the one polynomial
-of fifth degree that has pose, rate and acceleration of both its ends. These are met exactly and
-continuous; nothing in a step depends on samples elsewhere.
+==============  ==========================================================================
+``"at rest"``   x' = 0 and x'' = 0
+``"measured"``  x' is the measured rate, and x''' = 0
+``"free"``      not-a-knot: the first three polynomials are one, and so are the last three
+==============  ==========================================================================
+
+Of all curves through the poses with these values of x' and x'', the first two are those with the
+smallest integral of x'''^2. The third reproduces a polynomial of fifth degree; between coarse
+samples of a motion from rest it can start backwards. Noise in the poses is followed.
+
+With rates and accelerations x(t) is the quintic Hermite interpolant: in each step the polynomial of
+fifth degree that has pose, rate and acceleration of both its ends. Nothing in a step depends on
+samples elsewhere.
 """
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,14 +29,22 @@ from scipy.interpolate import BPoly, BSpline, make_interp_spline
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.trajectories.path import PathSample, checked_times
-from rps_pin.trajectories.poses import checked_poses, finite_array, times_from_zero
+from rps_pin.trajectories.path import (
+    POSE,
+    PathSample,
+    checked_poses,
+    checked_times,
+    times_from_zero,
+)
 from rps_pin.trajectories.resampled import ResampledCurve
+from rps_pin.validation import choice, fixed_array
 
-#: Samples that a quintic spline needs.
+Ends = Literal["at rest", "measured", "free"]
+
+#: Samples that a spline with free ends needs.
 FEWEST_POSES = 6
-#: How well a spline must meet its poses, over the largest of them: beyond, its equations are too
-#: ill-conditioned (steps of very unequal length).
+#: How well a spline must meet its poses, over the largest distance from the first: beyond, its
+#: equations are too ill-conditioned (steps of very unequal length).
 _MET = 1e-9
 
 
@@ -40,9 +56,13 @@ class SampledPath:
     times
         Increasing, shape (n,), s; the first counts as 0.
     poses
-        (z, tilt_x, tilt_y), shape (n, 3), m and rad; 6 or more, or 2 with rates and accelerations.
+        (z, tilt_x, tilt_y), shape (n, 3), m and rad; 2 or more, 6 with free ends.
     rates, accelerations
-        Their time derivatives, shape (n, 3); both or neither.
+        Their time derivatives, shape (n, 3). Rates alone are used at the two ends only.
+    ends
+        What is assumed at both ends of the spline: ``"at rest"``, ``"measured"`` (the rates given)
+        or ``"free"``. If left out, ``"measured"`` with rates and ``"at rest"`` without. Samples
+        with accelerations take none.
 
     Attributes
     ----------
@@ -50,6 +70,9 @@ class SampledPath:
         From 0, s. All arrays are read-only.
     poses : (n, 3) array
     rates, accelerations : (n, 3) arrays or None
+    starts, ends : str
+        How the motion starts and ends, for reports: ``"at rest"``, ``"with the measured rate"``,
+        ``"with the rate of the fitted spline"``.
 
     Raises
     ------
@@ -64,25 +87,36 @@ class SampledPath:
         poses: ArrayLike,
         rates: ArrayLike | None = None,
         accelerations: ArrayLike | None = None,
+        *,
+        ends: Ends | None = None,
     ) -> None:
         self.poses = checked_poses(poses, "poses")
         self.times = times_from_zero(times, len(self.poses))
-        if (rates is None) != (accelerations is None):
-            raise InputError("rates and accelerations are given together, or neither is")
-        self.rates = self.accelerations = None
+        shape = self.poses.shape
+        self.rates = None if rates is None else fixed_array(rates, "rates", shape, POSE)
+        self.accelerations = None
         moved: Any  # BSpline or BPoly, which are used alike
         with np.errstate(all="ignore"):  # what overflows is refused
-            if rates is None or accelerations is None:
-                self._from, moved = _spline(self.times, self.poses)
+            if accelerations is None:
+                assumed = _assumed(ends, self.rates)
+                self._from, moved = _spline(self.times, self.poses, assumed, self.rates)
             else:
-                self.rates = self._like_poses(rates, "rates")
-                self.accelerations = self._like_poses(accelerations, "accelerations")
-                self._from, moved = _hermite(self.times, self.poses, self.rates, self.accelerations)
+                if self.rates is None:
+                    raise InputError("accelerations are given without rates")
+                if ends is not None:
+                    raise InputError(
+                        f"ends = {ends!r}: samples with accelerations have measured ends"
+                    )
+                assumed = "measured"
+                a = fixed_array(accelerations, "accelerations", shape, POSE)
+                self._from, moved = _hermite(self.times, self.poses, self.rates, a)
+                self.accelerations = a
             self._moved = [moved, moved.derivative(1), moved.derivative(2)]
             finite = all(np.isfinite(piece.c).all() for piece in self._moved)
         if not finite:
             step = np.diff(self.times).min()
             raise InputError(f"no finite motion joins the samples: the shortest step is {step} s")
+        self.starts, self.ends = (_said(assumed, self.rates, sample) for sample in (0, -1))
 
     @property
     def duration(self) -> float:
@@ -91,11 +125,12 @@ class SampledPath:
 
     @cached_property
     def curve(self) -> ResampledCurve:
-        """The way without its times, to run along by another law."""
+        """The path without its times, for another law of time."""
         return ResampledCurve(self, self.times)
 
     def __repr__(self) -> str:
-        return f"SampledPath(<{len(self.times)} samples>, duration={self.duration:.6g})"
+        name = type(self).__name__
+        return f"{name}(<{len(self.times)} samples>, duration={self.duration:.6g})"
 
     def sample(self, t: ArrayLike) -> PathSample:
         """Return pose, rate and acceleration at times t of shape (...), s; exact.
@@ -110,43 +145,71 @@ class SampledPath:
         moved, rate, acceleration = (np.asarray(piece(times)) for piece in self._moved)
         return PathSample(self._from[i] + moved, rate, acceleration)
 
-    def _like_poses(self, value: ArrayLike, name: str) -> Array:
-        array = finite_array(value, 2, name)
-        if array.shape != self.poses.shape:
-            raise InputError(f"{name} has shape {array.shape}; the poses have {self.poses.shape}")
-        return array
+
+def _assumed(ends: Ends | None, rates: Array | None) -> str:
+    if ends is None:
+        return "at rest" if rates is None else "measured"
+    if ends == "measured" and rates is None:
+        raise InputError("ends = 'measured': no rates are given")
+    return choice(ends, "ends", get_args(Ends))
 
 
-def _spline(times: Array, poses: Array) -> tuple[Array, BSpline]:
-    """Return where each step counts from (n - 1, 3), and the spline of the way from there."""
-    if len(times) < FEWEST_POSES:
-        raise InputError(
-            f"{len(times)} samples; {FEWEST_POSES} or more are needed where rates and "
-            "accelerations are not given"
+def _said(assumed: str, rates: Array | None, sample: int) -> str:
+    """Return how the motion is at its first or last sample."""
+    if assumed == "measured" and rates is not None:
+        return "with the measured rate" if rates[sample].any() else "at rest, as measured"
+    return "at rest" if assumed == "at rest" else "with the rate of the fitted spline"
+
+
+def _spline(times: Array, poses: Array, assumed: str, rates: Array | None) -> tuple[Array, BSpline]:
+    """Return where each step counts from (n - 1, 3), and the spline of the motion from there."""
+    conditions: Any = None
+    if assumed == "free":
+        if len(times) < FEWEST_POSES:
+            raise InputError(
+                f"{len(times)} samples; {FEWEST_POSES} or more are needed for a spline with free "
+                "ends"
+            )
+    else:
+        rest = np.zeros(3)
+        conditions = tuple(
+            [(1, rest), (2, rest)]
+            if rates is None or assumed == "at rest"
+            else [(1, rates[i]), (3, rest)]
+            for i in (0, -1)
         )
-    way = poses - poses[0]
+    motion = poses - poses[0]
     try:
-        spline: BSpline = make_interp_spline(times, way, k=5)
-        missed = np.abs(spline(times) - way).max()
-    except (ValueError, np.linalg.LinAlgError):
+        spline: BSpline = make_interp_spline(times, motion, k=5, bc_type=conditions)
+        missed = np.abs(spline(times) - motion).max()
+    except (ValueError, np.linalg.LinAlgError):  # infinite, or singular
         missed = np.inf
-    if not missed <= _MET * np.abs(way).max():
+    if not missed <= _MET * np.abs(motion).max():
         steps = np.diff(times)
         raise InputError(
-            f"steps of {steps.min():.3g} s to {steps.max():.3g} s are too unequal for a spline"
+            f"times: steps of {steps.min():.3g} s to {steps.max():.3g} s are too unequal for a "
+            "spline"
         )
-    return np.broadcast_to(poses[0], way[1:].shape), spline
+    return np.broadcast_to(poses[0], motion[1:].shape), spline
 
 
 def _hermite(times: Array, x: Array, v: Array, a: Array) -> tuple[Array, BPoly]:
-    """Return where each step counts from (n - 1, 3), and the polynomials of the way from there.
+    """Return where each step counts from (n - 1, 3), and the polynomials of the motion from there.
 
     With c_k the Bernstein coefficients of a step of length h, the derivatives at its beginning are
     5 (c_1 - c_0) / h and 20 (c_2 - 2 c_1 + c_0) / h^2, and at its end likewise.
+    (`BPoly.from_derivatives` builds them one by one: 100 us a step.)
     """
     h = np.diff(times)[:, None]
-    way = np.diff(x, axis=0)
-    push, brake = v[:-1] * h / 5, v[1:] * h / 5
-    bend, bend_end = a[:-1] * h**2 / 20, a[1:] * h**2 / 20
-    c = [0 * way, push, 2 * push + bend, way - 2 * brake + bend_end, way - brake, way]
+    motion = np.diff(x, axis=0)
+    first, last = v[:-1] * h / 5, v[1:] * h / 5
+    curvature, last_curvature = a[:-1] * h**2 / 20, a[1:] * h**2 / 20
+    c = [
+        0 * motion,
+        first,
+        2 * first + curvature,
+        motion - 2 * last + last_curvature,
+        motion - last,
+        motion,
+    ]
     return x[:-1], BPoly(np.stack(c), times)

@@ -1,7 +1,6 @@
-"""Smooth motions through given poses.
+"""Smooth motions through given poses, from rest to rest.
 
-With times, x(t) is the quintic spline through the poses: of all curves with these values, pieces of
-fifth degree that join with four continuous derivatives, at rest at both ends.
+With times, x(t) is the quintic spline of `sampled_path`.
 
 Without times, x(u) is the natural cubic spline over the chord length u, two continuous derivatives,
 and a law of time runs along it. Heights and tilts have different units: a chord's length is
@@ -11,25 +10,17 @@ and a law of time runs along it. Heights and tilts have different units: a chord
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
+from scipy.interpolate import CubicSpline
 
-from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
-from rps_pin.trajectories.path import PathSample, Trajectory, checked_parameters, checked_times
-from rps_pin.trajectories.poses import checked_poses, times_from_zero
-from rps_pin.trajectories.resampled import ResampledCurve
-from rps_pin.trajectories.time_laws import Profile, positive, time_law
-
-#: Metres that a radian of tilt counts for in a chord's length: the size of a small platform.
-TILT_SCALE = 0.1
-#: How well a spline must meet its poses, over the largest of them.
-_MET = 1e-9
+from rps_pin.trajectories.path import Trajectory, checked_parameters, checked_poses
+from rps_pin.trajectories.resampled import TILT_SCALE
+from rps_pin.trajectories.sampled_path import SampledPath
+from rps_pin.trajectories.time_laws import Profile, time_law
+from rps_pin.validation import positive_number
 
 
 class ChordSpline:
@@ -40,7 +31,7 @@ class ChordSpline:
     poses
         Shape (n, 3), m and rad; no two neighbours alike.
     tilt_scale
-        L, m/rad: how tilts and heights make up a length; positive.
+        L, m/rad; positive.
 
     Attributes
     ----------
@@ -59,7 +50,7 @@ class ChordSpline:
 
     def __init__(self, poses: ArrayLike, *, tilt_scale: float = TILT_SCALE) -> None:
         self.poses = checked_poses(poses, "poses")
-        scale = np.array([1.0, *2 * [positive(tilt_scale, "tilt_scale")]])
+        scale = np.array([1.0, *2 * [positive_number(tilt_scale, "tilt_scale")]])
         chords = np.linalg.norm(np.diff(self.poses, axis=0) * scale, axis=-1)
         self.knots = np.concatenate([[0.0], np.cumsum(chords)])
         self.knots.setflags(write=False)
@@ -79,78 +70,11 @@ class ChordSpline:
         return CurveSample(*(np.asarray(self._spline(along, order)) for order in range(3)))
 
 
-class TimedSpline:
-    """The quintic spline through poses at given times, at rest at both ends.
-
-    Parameters
-    ----------
-    times
-        Increasing, shape (n,), s; the first counts as 0.
-    poses
-        Shape (n, 3), m and rad.
-
-    Attributes
-    ----------
-    times : (n,) array
-        From 0, read-only, s.
-    poses : (n, 3) array
-        As given, read-only.
-
-    Raises
-    ------
-    InputError
-        If poses or times are not finite, of other shapes, or do not increase; or if steps are so
-        unequal that rounding keeps the spline from meeting its poses.
-    """
+class TimedSpline(SampledPath):
+    """The quintic spline through poses at given times, at rest at both ends: see `SampledPath`."""
 
     def __init__(self, times: ArrayLike, poses: ArrayLike) -> None:
-        self.poses = checked_poses(poses, "poses")
-        self.times = times_from_zero(times, len(self.poses))
-        spline = _at_rest(self.times, self.poses)
-        self._derivatives = [spline, spline.derivative(1), spline.derivative(2)]
-
-    @property
-    def duration(self) -> float:
-        """Length in time, s."""
-        return float(self.times[-1])
-
-    @cached_property
-    def curve(self) -> ResampledCurve:
-        """The way without its times, to run along by another law."""
-        return ResampledCurve(self, self.times)
-
-    def __repr__(self) -> str:
-        return f"TimedSpline(<{len(self.poses)} poses>, duration={self.duration:.6g})"
-
-    def sample(self, t: ArrayLike) -> PathSample:
-        """Return pose, rate and acceleration at times t of shape (...), s; exact.
-
-        Raises
-        ------
-        InputError
-            If a time lies outside the trajectory.
-        """
-        times = checked_times(t, self.duration)
-        values: list[Array] = [np.asarray(spline(times)) for spline in self._derivatives]
-        return PathSample(*values)
-
-
-def _at_rest(times: Array, poses: Array) -> BSpline:
-    """Return the quintic spline, or refuse steps for which its equations are ill-conditioned."""
-    rest: Any = [(1, np.zeros(3)), (2, np.zeros(3))]  # scipy-stubs know names only
-    try:
-        with np.errstate(all="ignore"):  # what overflows is not met
-            spline: BSpline = make_interp_spline(times, poses, k=5, bc_type=(rest, rest))
-            missed = np.abs(spline(times) - poses).max()
-    except (ValueError, np.linalg.LinAlgError):  # infinite, or singular
-        missed = np.inf
-    if not missed <= _MET * np.abs(poses).max():
-        steps = np.diff(times)
-        raise InputError(
-            f"times: steps of {steps.min():.3g} s to {steps.max():.3g} s are too unequal for a "
-            "spline"
-        )
-    return spline
+        super().__init__(times, poses, ends="at rest")
 
 
 def spline(
@@ -171,9 +95,8 @@ def spline(
         When each is met, increasing, shape (n,), s; the motion begins at the first. The result is
         then a `TimedSpline`.
     duration, profile, tilt_scale
-        Without times: how long the motion takes (s), by which law of time, and what a radian counts
-        for beside a metre (m/rad). The result is a `TimedCurve` of a `ChordSpline`, which can be
-        scaled in time.
+        Without times: the duration (s), the law of time, and the L above (m/rad). The result is a
+        `TimedCurve` of a `ChordSpline`, which can be scaled in time.
 
     Raises
     ------

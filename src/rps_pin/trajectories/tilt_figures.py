@@ -1,4 +1,4 @@
-"""Circles and Lissajous figures that the platform's tilt describes, the angle u growing by a law.
+"""Circles and Lissajous figures of the platform's tilt, over an angle u that follows a law of time.
 
 circle:     tilt = beta (cos(start + u), sin(start + u)),  z = height
 Lissajous:  tilt = (a_x sin(m u + p_x), a_y sin(n u + p_y)),  z = height + a_z sin(k u)
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,20 +15,20 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
-from rps_pin.trajectories.path import checked_parameters
-from rps_pin.trajectories.poses import finite_array, finite_number
-from rps_pin.trajectories.time_laws import Profile, positive, time_law
+from rps_pin.trajectories.path import POSE, checked_parameters
+from rps_pin.trajectories.time_laws import Profile, time_law
+from rps_pin.validation import finite_number, fixed_array, positive_number, whole_number
 
 
 class HarmonicCurve:
-    """Each coordinate of the pose swings: x_i(u) = middle_i + size_i sin(frequency_i u + phase_i).
+    """Harmonic coordinates: x_i(u) = middle_i + size_i sin(frequency_i u + phase_i).
 
     Parameters
     ----------
     middle, size
         Of (z, tilt_x, tilt_y), shape (3,), m and rad.
     frequency, phase
-        Swings per turn of u, and where they begin (rad), shape (3,).
+        Periods in a turn of u, and angles at u = 0 (rad), shape (3,).
     length
         Where u ends, rad; positive.
 
@@ -43,11 +42,11 @@ class HarmonicCurve:
         self, middle: ArrayLike, size: ArrayLike, frequency: ArrayLike, phase: ArrayLike,
         length: float,
     ) -> None:  # fmt: skip
-        self._middle = _three(middle, "middle")
-        self._size = _three(size, "size")
-        self._frequency = _three(frequency, "frequency")
-        self._phase = _three(phase, "phase")
-        self.length = positive(length, "length")
+        self._middle = fixed_array(middle, "middle", (3,), POSE)
+        self._size = fixed_array(size, "size", (3,), POSE)
+        self._frequency = fixed_array(frequency, "frequency", (3,), POSE)
+        self._phase = fixed_array(phase, "phase", (3,), POSE)
+        self.length = positive_number(length, "length")
 
     def __repr__(self) -> str:
         return (
@@ -60,11 +59,11 @@ class HarmonicCurve:
         """Return pose and derivatives at u of shape (...), rad."""
         along = checked_parameters(u, self.length)
         angle = self._frequency * along[..., None] + self._phase
-        swing: Array = self._size * np.sin(angle)
+        sines: Array = self._size * np.sin(angle)
         return CurveSample(
-            self._middle + swing,
+            self._middle + sines,
             self._size * self._frequency * np.cos(angle),
-            -swing * self._frequency**2,
+            -sines * self._frequency**2,
         )
 
 
@@ -77,7 +76,7 @@ def circle(
     duration: float,
     profile: Profile = "s-curve",
 ) -> TimedCurve:
-    """Return a motion in which a tilt of constant size turns about, from rest to rest.
+    """Return a motion whose tilt has a constant size and turns, from rest to rest.
 
     Parameters
     ----------
@@ -86,9 +85,9 @@ def circle(
     tilt
         Size of the tilt, rad; positive.
     turns
-        How often it turns about; positive.
+        Number of turns; positive.
     start
-        Where its rotation vector points at first, rad from the x axis.
+        Direction of the rotation vector at first, rad from the x axis.
     duration
         In s.
     profile
@@ -101,13 +100,13 @@ def circle(
     """
     quarter = math.pi / 2  # cos(start + u) = sin(u + start + pi/2)
     first = finite_number(start, "start")
-    size = positive(tilt, "tilt")
+    size = positive_number(tilt, "tilt")
     curve = HarmonicCurve(
         [finite_number(height, "height"), 0.0, 0.0],
         [0.0, size, size],
         [0.0, 1.0, 1.0],
         [0.0, first + quarter, first],
-        2 * math.pi * positive(turns, "turns"),
+        2 * math.pi * positive_number(turns, "turns"),
     )
     return TimedCurve(curve, time_law(curve.length, profile, duration=duration))
 
@@ -123,22 +122,22 @@ def lissajous(
     duration: float,
     profile: Profile = "s-curve",
 ) -> TimedCurve:
-    """Return a motion in which the tilts swing at whole multiples of one angle, from rest to rest.
+    """Return a motion whose tilts are sines of multiples of one angle, from rest to rest.
 
     Parameters
     ----------
     height
         Middle height, m.
     amplitude
-        Of tilt_x and tilt_y, rad; at least one is not zero, unless the platform is lifted.
+        Of tilt_x and tilt_y, rad; both may be zero only with a lift.
     frequency
-        Swings of tilt_x and of tilt_y in a turn; whole numbers of 1 or more.
+        Periods of tilt_x and of tilt_y in a turn; whole numbers of 1 or more.
     phase
-        Where they begin, rad.
+        At the start, rad.
     lift
         Amplitude (m) and frequency of the height.
     turns
-        How often the figure is drawn; positive.
+        Number of turns; positive.
     duration, profile
         As for `circle`.
 
@@ -156,15 +155,15 @@ def lissajous(
         finite_number(lifted, "lift's amplitude"),
         *(finite_number(one, "amplitude") for one in sizes),
     ]
-    swings = [_whole(one, "frequency") for one in frequencies]
+    swings = [whole_number(one, "frequency") for one in frequencies]
     if not any(size):
         raise InputError("amplitude and lift are zero: nothing moves")
     curve = HarmonicCurve(
         [finite_number(height, "height"), 0.0, 0.0],
         size,
-        [_whole(lift_frequency, "lift's frequency"), *swings],
+        [whole_number(lift_frequency, "lift's frequency"), *swings],
         [0.0, *(finite_number(one, "phase") for one in phases)],
-        2 * math.pi * positive(turns, "turns"),
+        2 * math.pi * positive_number(turns, "turns"),
     )
     return TimedCurve(curve, time_law(curve.length, profile, duration=duration))
 
@@ -174,16 +173,3 @@ def _pair(value: Sequence[float], name: str) -> tuple[float, float]:
     if not isinstance(numbers, Sequence) or isinstance(numbers, str) or len(numbers) != 2:
         raise InputError(f"{name} = {shown(value)}: it must be two numbers")
     return numbers[0], numbers[1]
-
-
-def _three(value: ArrayLike, name: str) -> Array:
-    array = finite_array(value, 1, name)
-    if array.shape != (3,):
-        raise InputError(f"{name} has shape {array.shape}; it must be (3,): of z, tilt_x, tilt_y")
-    return array
-
-
-def _whole(value: float, name: str) -> int:
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < 1:
-        raise InputError(f"{name} = {shown(value)}: it must be a whole number of 1 or more")
-    return int(value)

@@ -4,9 +4,9 @@ All are symmetric in time. A law is made for a duration, or, by `within`, as the
 kind that keeps limits of speed u', acceleration u'' and jerk u'''.
 
 - quintic: u = D (10 s^3 - 15 s^4 + 6 s^5), s = t / T. Smooth; jerk jumps at the ends.
-- trapezoidal speed: a steady push, a steady speed, a steady brake. The shortest with limits of
-  speed and acceleration; acceleration jumps.
-- S-curve: the same with jerk limited, seven pieces of steady jerk. The shortest with limits of
+- trapezoidal speed: constant acceleration, constant speed, constant deceleration. The
+  shortest with limits of speed and acceleration; acceleration jumps.
+- S-curve: the same with limited jerk, seven pieces of constant jerk. The shortest with limits of
   speed, acceleration and jerk.
 """
 
@@ -22,15 +22,12 @@ from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.curve import LawSample, TimeLaw
 from rps_pin.trajectories.path import checked_times
 from rps_pin.trajectories.piecewise_law import PiecewiseLaw
-from rps_pin.trajectories.poses import real
+from rps_pin.validation import choice, positive_number, real
 
 Profile = Literal["quintic", "trapezoidal", "s-curve"]
 
 #: Of the quintic: largest speed, acceleration and jerk of D = T = 1.
 _QUINTIC_PEAKS = (15 / 8, 10 / math.sqrt(3), 60.0)
-
-#: Numbers that a law is made of lie between these: its speed and jerk are then finite, too.
-_SMALLEST, _LARGEST = 1e-50, 1e50
 
 #: Without limits, the share of the duration in which the speed rises, and in which it falls.
 RAMP = 0.25
@@ -53,8 +50,8 @@ class QuinticLaw:
     """
 
     def __init__(self, distance: float, duration: float) -> None:
-        self.distance = positive(distance, "distance")
-        self.duration = positive(duration, "duration")
+        self.distance = positive_number(distance, "distance")
+        self.duration = positive_number(duration, "duration")
 
     @classmethod
     def within(
@@ -65,9 +62,9 @@ class QuinticLaw:
         acceleration: float = math.inf,
         jerk: float = math.inf,
     ) -> QuinticLaw:
-        """Return the shortest that keeps limits; at least one must be finite."""
+        """Return the shortest law within limits, of which one at least must be finite."""
         limits = _limits(speed, acceleration, jerk)
-        D = positive(distance, "distance")
+        D = positive_number(distance, "distance")
         shortest = max(
             (peak * D / limit) ** (1 / order)
             for order, (peak, limit) in enumerate(zip(_QUINTIC_PEAKS, limits, strict=True), 1)
@@ -92,7 +89,7 @@ class QuinticLaw:
 
 
 class TrapezoidalLaw(PiecewiseLaw):
-    """Trapezoidal speed: a push, a steady speed, a brake as long as the push.
+    """Trapezoidal speed: acceleration, constant speed, and a deceleration as long.
 
     Parameters
     ----------
@@ -101,8 +98,7 @@ class TrapezoidalLaw(PiecewiseLaw):
     duration
         In s; positive.
     ramp
-        Share of the duration that the push takes, above 0 and at most 1/2: then the speed is a
-        triangle.
+        Share of the duration in which the speed rises, above 0 and at most 1/2 (a triangle).
 
     Raises
     ------
@@ -111,8 +107,8 @@ class TrapezoidalLaw(PiecewiseLaw):
     """
 
     def __init__(self, distance: float, duration: float, *, ramp: float = RAMP) -> None:
-        D, T = positive(distance, "distance"), positive(duration, "duration")
-        up = T * checked_ramp(ramp)
+        D, T = positive_number(distance, "distance"), positive_number(duration, "duration")
+        up = T * _ramp(ramp)
         push = D / (up * (T - up))
         super().__init__([up, T - 2 * up, up], [0.0] * 3, [push, 0.0, -push])
 
@@ -125,19 +121,19 @@ class TrapezoidalLaw(PiecewiseLaw):
         acceleration: float = math.inf,
         jerk: float = math.inf,
     ) -> TrapezoidalLaw:
-        """Return the shortest that keeps limits; that of the acceleration must be finite.
+        """Return the shortest law within limits; the acceleration's must be finite.
 
         Raises
         ------
         InputError
-            Also if a finite jerk is asked for, which trapezoidal speed cannot keep.
+            Also if a limit of jerk is given: the jerk of this law has none.
         """
         v, a, j = _limits(speed, acceleration, jerk)
         if math.isfinite(j):
-            raise InputError("trapezoidal speed has no limit of jerk; the profile 's-curve' has")
+            raise InputError("trapezoidal speed cannot limit the jerk; the profile 's-curve' does")
         if not math.isfinite(a):
             raise InputError("trapezoidal speed needs a limit of acceleration")
-        D = positive(distance, "distance")
+        D = positive_number(distance, "distance")
         if v * v >= D * a:  # a triangle: its top is sqrt(D a)
             return cls(D, 2 * math.sqrt(D / a), ramp=0.5)
         duration = D / v + v / a
@@ -145,9 +141,9 @@ class TrapezoidalLaw(PiecewiseLaw):
 
 
 class SCurveLaw(PiecewiseLaw):
-    """An S-curve: seven pieces of steady jerk, some of which may be missing.
+    """An S-curve: up to seven pieces of constant jerk.
 
-    In the push, the acceleration rises for `rise`, stays, and falls for `rise`.
+    While the speed rises, the acceleration rises, is constant, and falls as long as it rose.
 
     Parameters
     ----------
@@ -156,8 +152,8 @@ class SCurveLaw(PiecewiseLaw):
     duration
         In s; positive.
     ramp
-        Share of the duration that the push takes, above 0 and at most 1/2. The acceleration rises
-        for half of the push and then falls.
+        Share of the duration in which the speed rises, above 0 and at most 1/2. The acceleration
+        rises for half of it and then falls.
 
     Raises
     ------
@@ -166,9 +162,9 @@ class SCurveLaw(PiecewiseLaw):
     """
 
     def __init__(self, distance: float, duration: float, *, ramp: float = RAMP) -> None:
-        D, T = positive(distance, "distance"), positive(duration, "duration")
-        push = T * checked_ramp(ramp)
-        # A push of 2 r with jerk j ends at the speed j r^2; the distance is that times T - 2 r.
+        D, T = positive_number(distance, "distance"), positive_number(duration, "duration")
+        push = T * _ramp(ramp)
+        # After 2 r with jerk j and -j the speed is j r^2; the distance is that times T - 2 r.
         rise = push / 2
         self._build(D / (rise**2 * (T - push)), rise, 0.0, T - 2 * push)
 
@@ -181,20 +177,20 @@ class SCurveLaw(PiecewiseLaw):
         acceleration: float = math.inf,
         jerk: float = math.inf,
     ) -> SCurveLaw:
-        """Return the shortest that keeps limits; that of the jerk must be finite.
+        """Return the shortest law within limits; the jerk's must be finite.
 
-        With rises of r and a steady acceleration for s, the push ends at the speed
-        j r (r + s), and push and brake alone cover j r (r + s) (2 r + s).
+        With rises of r and a constant acceleration for s, the speed reaches j r (r + s), and the
+        distance without a piece of constant speed is j r (r + s) (2 r + s).
         """
         v, a, j = _limits(speed, acceleration, jerk)
         if not math.isfinite(j):
             raise InputError("an S-curve needs a limit of jerk")
-        D = positive(distance, "distance")
+        D = positive_number(distance, "distance")
         whole = (D / (2 * j)) ** (1 / 3)  # four rises cover the distance
         rise = min(a / j, math.sqrt(v / j), whole)
         steady, no_cruise = 0.0, rise == whole
         if rise == a / j:
-            # The longest steady push that the speed, and the distance without a cruise, allow.
+            # The longest s that the speed, and the distance without constant speed, allow.
             by_speed = v / a - rise
             # a (r + s) (2 r + s) = D, a quadratic in s
             by_distance = (-3 * rise + math.sqrt(rise**2 + 4 * D / a)) / 2
@@ -203,7 +199,7 @@ class SCurveLaw(PiecewiseLaw):
         top = j * rise * (rise + steady)
         cruise = 0.0 if no_cruise else max(0.0, D / top - (2 * rise + steady))
         law = cls.__new__(cls)
-        # The jerk is reckoned back from the pieces: the distance is met to rounding.
+        # The jerk follows from the pieces: the distance is met to rounding.
         covered = rise * (rise + steady) * (2 * rise + steady + cruise)
         law._build(D / covered, rise, steady, cruise)
         return law
@@ -239,9 +235,7 @@ def time_law(
         "trapezoidal": (TrapezoidalLaw, TrapezoidalLaw.within),
         "s-curve": (SCurveLaw, SCurveLaw.within),
     }
-    if not isinstance(profile, str) or profile not in made:
-        raise InputError(f"profile = {shown(profile)}; it must be one of {', '.join(made)}")
-    for_duration, within = made[profile]
+    for_duration, within = made[choice(profile, "profile", list(made))]
     limited = any(limit != math.inf for limit in (speed, acceleration, jerk))
     if (duration is not None) == limited:
         given = "both are given" if limited else "neither is given"
@@ -251,27 +245,17 @@ def time_law(
     return within(distance, speed=speed, acceleration=acceleration, jerk=jerk)
 
 
-def positive(value: float, name: str) -> float:
-    """Return a number that is finite and above zero, and within what can be reckoned with."""
-    number = real(value)
-    if not 0 < number < math.inf:
-        raise InputError(f"{name} = {shown(value)}: it must be a positive number")
-    if not _SMALLEST <= number <= _LARGEST:
-        raise InputError(f"{name} = {shown(value)}: it must be from {_SMALLEST} to {_LARGEST}")
-    return number
-
-
-def checked_ramp(ramp: float) -> float:
+def _ramp(ramp: float) -> float:
     """Return a share of the duration above 0 and at most 1/2."""
     if not 0 < real(ramp) <= 0.5:
         raise InputError(f"ramp = {shown(ramp)}: it must be above 0 and at most 0.5")
-    return positive(ramp, "ramp")
+    return positive_number(ramp, "ramp")
 
 
 def _limits(speed: float, acceleration: float, jerk: float) -> tuple[float, float, float]:
     """Return limits that are positive; infinity is none."""
     v, a, j = (
-        math.inf if real(value) == math.inf else positive(value, f"limit of {name}")
+        math.inf if real(value) == math.inf else positive_number(value, f"limit of {name}")
         for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
     )
     return v, a, j

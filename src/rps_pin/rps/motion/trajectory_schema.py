@@ -18,6 +18,7 @@ from pydantic import (
 
 from rps_pin.config import YamlFile, path_text
 from rps_pin.errors import InputError, shown
+from rps_pin.trajectories.sampled_path import Ends
 from rps_pin.trajectories.time_laws import Profile
 
 
@@ -135,6 +136,7 @@ class Csv(_Described):
     kind: Literal["csv"]
     file: Annotated[str, Field(min_length=1)]
     max_step: Positive | None = None
+    ends: Ends | None = None
 
 
 Described = Helix | PointToPoint | Spline | Circle | Lissajous | Csv

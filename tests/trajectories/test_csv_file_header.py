@@ -12,8 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rps_pin import InputError, RPSRobot, helix
 from rps_pin.rps.dynamics.motion_csv import motion_columns
 from rps_pin.rps.dynamics.motion_run import run_motion
-from rps_pin.trajectories.csv_columns import IGNORED, READ
-from rps_pin.trajectories.csv_file import read_csv
+from rps_pin.trajectories.csv_file import IGNORED, READ, read_csv
 from tests.trajectories.csv_files import QUANTITIES, SI, good_lines, refuse, save, swings
 
 
@@ -66,15 +65,15 @@ def test_columns_may_stand_in_any_order(tmp_path: Path) -> None:
         ("time_s,z,tilt_x_rad,tilt_y_rad", "'z' has no unit: it can be z_m, z_mm, z_um$"),
         (
             "time_s,z_inch,tilt_x_rad,tilt_y_rad",
-            "'z_inch': 'inch' is no unit of z.*z_m, z_mm, z_um",
+            "'z_inch': 'inch' is not a unit of z.*z_m, z_mm, z_um",
         ),
         ("time_s,z_m,tilt_x,tilt_y_rad", "'tilt_x' has no unit: .*tilt_x_rad.*tilt_x_deg"),
         ("time,z_m,tilt_x_rad,tilt_y_rad", "'time' has no unit: it can be time_s, time_ms"),
         ("time_s,z_m,tilt_X_rad,tilt_y_rad", "'tilt_X_rad' is not known; .* 'tilt_x_rad'"),
         ("time_s,z_m,titl_x_rad,tilt_y_rad", "'titl_x_rad' is not known; .* 'tilt_x_rad'"),
         ("time_s,z_m,tilt_x_rad_per_s,tilt_y_rad", "not known; .* 'tilt_x_rate_rad_per_s'"),
-        ("time_s,z_m,tilt_x_rad,tilt_y_grad", "'grad' is no unit of tilt_y; .*tilt_y_deg"),
-        ("time_s,z_cm,tilt_x_rad,tilt_y_rad", "'cm' is no unit of z; .* z_m, z_mm, z_um"),
+        ("time_s,z_m,tilt_x_rad,tilt_y_grad", "'grad' is not a unit of tilt_y; .*tilt_y_deg"),
+        ("time_s,z_cm,tilt_x_rad,tilt_y_rad", "'cm' is not a unit of z; .* z_m, z_mm, z_um"),
         ("time_s,z_m,tilt_x_rad,note", "'note' is not known. .*time_s"),
         ("time_s,z_m,tilt_x_rad,", "column 4 has no name"),
         ("time_s,z_m,tilt_x_rad,z_m", "'z_m' is there twice"),

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from rps_pin import InputError
-from rps_pin.trajectories import csv_table
+from rps_pin.trajectories import csv_file
 from rps_pin.trajectories.csv_file import read_csv
 from tests.trajectories.csv_files import HEADER, SI, good_lines, read, refuse
 
@@ -84,10 +84,9 @@ def test_a_bad_row_is_told_with_its_line(
     [
         ("", None, "is empty"),
         ("# nothing\n\n", None, "is empty"),
-        (HEADER + "\n", 1, "ends after no samples; 6 or more"),
-        ("\n" + HEADER + "\n\n# none\n", 2, "ends after no samples; 6 or more"),
-        ("\n".join(good_lines(1)), 2, "ends after 1 sample; 6 or more"),
-        ("\n".join(good_lines(5)), 6, "ends after 5 samples; 6 or more"),
+        (HEADER + "\n", 1, "ends after no samples; 2 or more"),
+        ("\n" + HEADER + "\n\n# none\n", 2, "ends after no samples; 2 or more"),
+        ("\n".join(good_lines(1)), 2, "ends after 1 sample; 2 or more"),
         (",".join(["time_s", *SI]) + "\n0" + 9 * ",0", 2, "ends after 1 sample; 2 or more"),
         ("\n".join(good_lines()).encode("utf-16"), 1, "not a UTF-8 text .byte 0xff"),
         (
@@ -104,6 +103,12 @@ def test_a_file_that_is_no_table_is_refused(
     refuse(tmp_path, content, line, words)
 
 
+def test_free_ends_need_six_samples(tmp_path: Path) -> None:
+    text = "\n".join(good_lines(5))
+    refuse(tmp_path, text, 6, "ends after 5 samples; 6 or more", ends="free")
+    assert len(read(tmp_path, text).times) == 5
+
+
 def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"cannot read the .*none.csv: No such file"):
         read_csv(tmp_path / "none.csv")
@@ -118,7 +123,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
 def test_huge_files_are_refused_before_they_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(csv_table, "MOST_LINES", 10)
+    monkeypatch.setattr(csv_file, "MOST_LINES", 10)
     refuse(tmp_path, "\n".join(good_lines()), None, "has more than 10 lines")
     refuse(tmp_path, 11 * "#\n", None, "has more than 10 lines")
     assert len(read(tmp_path, "\n".join(good_lines(9))).times) == 9
