@@ -33,8 +33,9 @@ from rps_pin.viewer import (
     fitting_layers,
     save_html,
 )
-from rps_pin.viewer.layers.shapes import between, pointing, round_number, tube
-from rps_pin.viewer.motion import State
+from rps_pin.viewer.layers.parts import between, pointing, tube
+from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.scene.stage import round_number
 
 URDF = Path(__file__).parents[2] / "urdf"
 POSE = [0.4, 0.1, -0.05]
@@ -218,7 +219,7 @@ def test_ghosts_are_all_the_other_modes(robot):
     balls = {  # of the platforms, told by their link's name and the shape's radius
         int(part.node): part.placement[:3, 3]
         for part in ghosts
-        if part.name.startswith("platform_") and type(part.geometry).__name__ == "Sphere"
+        if part.name.startswith("platform_") and type(part.shape).__name__ == "Sphere"
     }
     position, _ = robot.platform_placement(POSE)
     others = [p for p in modes.position if np.linalg.norm(p - position) > 1e-6]
@@ -231,13 +232,13 @@ def test_limits_turn_to_vermillion_at_the_limit():
     micro = RPSRobot.from_preset("micro")
     context_free = Limits()
     view, _ = shown(micro, [0.225, 0.0, 0.0], layers=[context_free])
-    follow = view.drawings["limits"].follow
-    assert follow is not None
+    update = view.drawings["limits"].update
+    assert update is not None
     still = np.zeros(12)
 
     def colour(z: float) -> tuple[float, float, float]:
         q = micro.state([z, 0.0, 0.0], np.zeros(3), np.zeros(3))[0]
-        return follow(State(q, still, still))["leg_2_prismatic"].colour
+        return update(MotionState(q, still, still))["leg_2_prismatic"].colour
 
     vermillion, blue = (0xD5 / 255, 0x5E / 255, 0.0), (0.0, 0x72 / 255, 0xB2 / 255)
     np.testing.assert_allclose(colour(0.25 - 1e-9), vermillion, atol=0.01)
@@ -246,19 +247,19 @@ def test_limits_turn_to_vermillion_at_the_limit():
 
 def test_the_singularity_ring_is_the_condition_number(robot):
     view, _ = shown(robot, POSE, layers=[Singularity(worst=1e-2)])
-    follow = view.drawings["singularity"].follow
-    assert follow is not None
+    update = view.drawings["singularity"].update
+    assert update is not None
     still = np.zeros(12)
     near = robot.state([0.004, 0.0, 0.0], np.zeros(3), np.zeros(3))[0]
     assert 1 / robot.mechanism.condition(near) < 1e-2
-    red, _, blue = follow(State(near, still, still))["ring"].colour
+    red, _, blue = update(MotionState(near, still, still))["ring"].colour
     assert red > 0.8 and blue < 0.05
 
 
 def test_the_workspace_surface_spans_the_workspace():
     micro = RPSRobot.from_preset("micro")
     view, recorder = shown(micro, [0.225, 0.0, 0.0], layers=[WorkspaceSurface(factor=10)])
-    points = view.drawings["workspace"].parts[0].geometry.vertices
+    points = view.drawings["workspace"].parts[0].shape.vertices
     assert points[:, 2].min() == pytest.approx(0.200, abs=2e-3)
     assert points[:, 2].max() == pytest.approx(0.250, abs=1e-6)
     bar = legend(recorder)[0]
@@ -334,7 +335,7 @@ def test_layers_are_switched_by_name(robot):
     ("layers", "complaint"),
     [
         (["tail"], "no layer 'tail'; there are: frames, trail"),
-        ([Trail], "is no layer"),
+        ([Trail], "is not a layer"),
         ([Trail(factor=0.5)], "factor = 0.5"),
         ([Trail(frame="nose")], "no frame 'nose'; there are: universe"),
         ([Forces(newtons_per_metre=-1.0)], "must be positive"),
@@ -352,7 +353,7 @@ def test_layers_of_the_3_rps_say_so_of_others(layer):
         shown(four_bar, layers=[layer])
     if layer == "ghosts":
         view, _ = shown(four_bar, layers=[Ghosts(at=four_bar.home)])
-        assert "1 other poses" in view.drawings["ghosts"].key.text
+        assert "1 other poses" in view.drawings["ghosts"].legend.text
 
 
 @pytest.mark.parametrize(
@@ -360,7 +361,7 @@ def test_layers_of_the_3_rps_say_so_of_others(layer):
     [
         ("robot", None, "at a pose"),
         ("robot", [1.0, 2.0], r"shape \(13,\)"),
-        ("robot", "nonsense", "no motion"),
+        ("robot", "nonsense", "not a motion"),
         ("nothing", None, "cannot be shown"),
     ],
 )

@@ -6,7 +6,7 @@ import pytest
 
 from rps_pin.errors import InputError
 from rps_pin.viewer import Motion
-from rps_pin.viewer.scene.animation import continuous_quaternions
+from rps_pin.viewer.scene.keyframes import continuous_quaternions
 from tests.viewer.robots import joint
 
 

@@ -1,7 +1,8 @@
-"""Robots in the browser, with Meshcat: a page on disk, or a server on this machine only.
+"""Viewer: robots and their motions in 3D, as pages, pictures, films, or live on this machine only.
 
-`show`, `save_html`, `save_png` and `save_video` take a robot, what it does, and the layers to show
-with it; `Scene` and what is below it know Pinocchio models only.
+`show`, `save_html`, `save_png` and `save_video` take a robot or mechanism, its motion, and layers;
+`Scene`, `play` and `write_html` take Pinocchio models. Meshcat draws all of these. The panel of
+`rps_pin.panel` draws the same scenes with viser.
 """
 
 from rps_pin.viewer.files.html import write_html
@@ -20,14 +21,15 @@ from rps_pin.viewer.layers import (
     fitting_layers,
 )
 from rps_pin.viewer.motion import FRAME_RATE, Motion
-from rps_pin.viewer.save import LocalView, save_html, save_png, save_video, show
+from rps_pin.viewer.playback import play
+from rps_pin.viewer.save import save_html, save_png, save_video
 from rps_pin.viewer.scene.scene import Scene
 from rps_pin.viewer.server.live_view import LiveView
 from rps_pin.viewer.server.local_viewer import LocalViewer
-from rps_pin.viewer.server.playback import play
-from rps_pin.viewer.server.recorder import Recorder
-from rps_pin.viewer.server.window import Command, RawCommand, Window
+from rps_pin.viewer.show import LocalView, show
 from rps_pin.viewer.view import View
+from rps_pin.viewer.writers.recorder import Recorder
+from rps_pin.viewer.writers.window import Command, RawCommand, Window
 
 __all__ = [
     "FRAME_RATE",

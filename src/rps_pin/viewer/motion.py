@@ -1,4 +1,4 @@
-"""A motion as the viewer needs it: the configuration at any time, and at an even frame rate."""
+"""Motion of a robot: its state at any time, and at an even frame rate."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rps_pin.errors import InputError
 FRAME_RATE = 30.0
 """Pictures per second, unless told otherwise."""
 _UNIT_TOLERANCE = 1e-3
-"""How far a quaternion's length may be from one; a picture shows nothing finer."""
+"""Deviation of a quaternion's length from one that is accepted; it cannot be seen."""
 
 
-class State(NamedTuple):
-    """One moment of a motion, as Pinocchio has it."""
+class MotionState(NamedTuple):
+    """State of a motion at one time."""
 
     q: Array
     """Configuration, shape (nq,)."""
@@ -34,7 +34,7 @@ class State(NamedTuple):
 
 
 class Motion:
-    """Configurations at increasing times, joined on the robot's configuration manifold.
+    """Configurations at increasing times, interpolated on the robot's configuration manifold.
 
     Parameters
     ----------
@@ -45,15 +45,15 @@ class Motion:
     configurations : array_like, shape (n, nq)
         The configuration at each time.
     velocities, accelerations : array_like, shape (n, nv)
-        As Pinocchio has them; for the layers that show forces. Left out: at rest.
+        Velocities and accelerations, for the layers that show forces. Default: zero.
     forces : array_like, shape (n, na)
         Actuator forces. Default: those of inverse dynamics.
     constraint_forces : array_like, shape (n, nc)
         Forces of the closures, as `InverseDynamics` has them. Default: those that follow from the
         motion, its actuator forces and wrenches.
     wrenches
-        What something outside exerts all the time, by frame name: force (N) and moment (N m) in
-        world axes at the frame's origin, shape (6,); for these layers too.
+        Constant external wrenches by frame name, for these layers too: force (N) and moment (N m)
+        at the frame's origin in world axes, shape (6,).
 
     Raises
     ------
@@ -128,7 +128,7 @@ class Motion:
         )
         return between
 
-    def state_at(self, elapsed: float) -> State:
+    def state_at(self, elapsed: float) -> MotionState:
         """Return configuration, velocity and acceleration `elapsed` seconds after the first."""
         before, fraction = self._place(elapsed)
         after = before + (fraction > 0.0)
@@ -140,7 +140,7 @@ class Motion:
         known = (self.forces, self.constraint_forces)
         tau, constraint = (None if rows is None else between(rows) for rows in known)
         rates = between(self.velocities), between(self.accelerations)
-        return State(self.at(elapsed), *rates, tau, constraint)
+        return MotionState(self.at(elapsed), *rates, tau, constraint)
 
     def _place(self, elapsed: float) -> tuple[int, float]:
         """Return the sample at or before a time, and the share of the way to the next one."""
@@ -151,7 +151,7 @@ class Motion:
         start, end = self.times[after - 1], self.times[after]
         return after - 1, float((time - start) / (end - start))
 
-    def states(self, frame_rate: float = FRAME_RATE) -> Iterator[State]:
+    def states(self, frame_rate: float = FRAME_RATE) -> Iterator[MotionState]:
         """Give the states at the times of `sampled`."""
         for elapsed in self.sample_times(frame_rate):
             yield self.state_at(float(elapsed))

@@ -1,11 +1,10 @@
-"""A robot with its layers in a file: a page, a picture, a film; or in the browser, live."""
+"""Files of a robot with its layers: a page, a picture, a film."""
 
 from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +17,15 @@ from rps_pin.files import whole_file
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.viewer.files.browser import in_own_thread
 from rps_pin.viewer.files.film import check_film, write_film
-from rps_pin.viewer.files.html import checked_target, note_of, recorded_page
+from rps_pin.viewer.files.html import checked_target, recorded_page
 from rps_pin.viewer.files.pictures import Progress, checked_size, take_pictures
 from rps_pin.viewer.layers import Layer
 from rps_pin.viewer.motion import FRAME_RATE, check_frame_rate
-from rps_pin.viewer.server.local_viewer import LocalViewer
-from rps_pin.viewer.server.recorder import Recorder
 from rps_pin.viewer.view import View
+from rps_pin.viewer.writers.recorder import Recorder
 
 SIZE = (1000, 620)
-"""Width and height of a picture in pixels, unless told otherwise."""
+"""Default width and height of a picture in pixels."""
 
 
 def save_html(
@@ -41,7 +39,7 @@ def save_html(
     title: str | None = None,
     frame_rate: float = FRAME_RATE,
 ) -> None:
-    """Write a page that shows a robot with its layers, from disk, with nothing beside it.
+    """Write a page that shows a robot with its layers; it opens from disk and needs no other file.
 
     The file is written whole or not at all.
 
@@ -50,16 +48,16 @@ def save_html(
     path
         The page to write, for instance ``viewer.html``.
     what, motion, visual, layers, hidden
-        As for `View`. The page has a tick for each layer.
+        As for `View`. The page has a switch for each layer.
     title
-        Plain text for the browser's tab and the caption; the robot's name if left out.
+        Plain text for the browser's tab and the caption. Default: the robot's name.
     frame_rate
         Keyframes per second that are stored; the browser interpolates between them.
 
     Raises
     ------
     InputError
-        If something cannot be shown, or the file cannot stand there.
+        If something cannot be shown, or the file cannot be written there.
     """
     target = checked_target(path)
     text, _ = _page(what, motion, visual, layers, hidden, title, frame_rate)
@@ -98,14 +96,14 @@ def save_png(
     scale
         Pixels of the picture to one of the page: 2 or 3 for print.
     background
-        A colour, for instance ``"white"``, or ``"transparent"``; the viewer's sky if left out.
+        A colour, for instance ``"white"``, or ``"transparent"``. Default: the viewer's sky.
     captions
         Whether the title and the key of the layers are in the picture.
 
     Raises
     ------
     InputError
-        If something cannot be shown, or the file cannot stand there.
+        If something cannot be shown, or the file cannot be written there.
     RPSPinError
         If Playwright or Chromium is missing; says how to install them.
     """
@@ -153,11 +151,11 @@ def save_video(
     Parameters
     ----------
     path
-        The film to write; its suffix says which kind.
+        The film to write; its suffix is its format.
     what, motion, visual, layers, title, size, scale, background, captions
         As for `save_png`; a film is never transparent.
     frame_rate
-        Pictures per second. GIF knows hundredths of a second only, and most players are slow below
+        Pictures per second. GIF stores hundredths of a second, and most players are slow below
         two of them.
     progress
         Wraps the loop over the times of the pictures.
@@ -165,7 +163,8 @@ def save_video(
     Raises
     ------
     InputError
-        If something cannot be shown, the motion stands still, or the file cannot stand there.
+        If something cannot be shown, the motion has no duration, or the file cannot be written
+        there.
     RPSPinError
         If Playwright, Chromium or (for MP4) ffmpeg is missing; says how to install them.
     """
@@ -198,59 +197,6 @@ def save_video(
         in_own_thread(lambda stop: film(scratch, stop))
 
 
-@contextmanager
-def show(
-    what: RPSRobot | ClosedLoopModel,
-    motion: Any = None,
-    *,
-    visual: pin.GeometryModel | None = None,
-    layers: Sequence[str | Layer] = (),
-    hidden: Sequence[str | Layer] = (),
-    title: str | None = None,
-    port: int | None = None,
-) -> Iterator[LocalView]:
-    """Serve a view to browsers on this machine while a ``with`` block lasts.
-
-    Parameters
-    ----------
-    what, motion, visual, layers, hidden
-        As for `View`.
-    title
-        As for `save_html`.
-    port
-        As for `LocalViewer`.
-
-    Yields
-    ------
-    LocalView
-        A `View` with an address, `url`.
-
-    Examples
-    --------
-    >>> with show(robot, path, layers=["trail", "forces"]) as view:  # doctest: +SKIP
-    ...     print(view.url)
-    ...     view.play()
-    """
-    with LocalViewer(port, title=title or _title(what)) as viewer:
-        yield LocalView(viewer, what, motion, visual=visual, layers=layers, hidden=hidden)
-
-
-class LocalView(View):
-    """A `View` in a `LocalViewer`.
-
-    Attributes
-    ----------
-    url : str
-        Address to open in a browser on this machine.
-    """
-
-    def __init__(
-        self, viewer: LocalViewer, what: RPSRobot | ClosedLoopModel, motion: Any, **options: Any
-    ) -> None:
-        super().__init__(viewer.window, what, motion, **options)
-        self.url = viewer.url
-
-
 def _page(
     what: RPSRobot | ClosedLoopModel,
     motion: Any,
@@ -263,15 +209,7 @@ def _page(
     """Return a page and the view that it was recorded from."""
     recorder = Recorder()
     view = View(recorder, what, motion, visual=visual, layers=layers, hidden=hidden)
-    moves = view.motion.duration > 0.0
-    if moves:
+    if view.motion.duration > 0.0:
         view.animate(frame_rate=frame_rate)
-    note = note_of(view.motion, view.scene.grid_spacing)
-    text = recorded_page(recorder, title=title or _title(what), note=note, moves=moves)
+    text = recorded_page(recorder, view.scene, view.motion, title or view.subject.title)
     return text, view
-
-
-def _title(what: RPSRobot | ClosedLoopModel) -> str:
-    if isinstance(what, RPSRobot):
-        return f"3-RPS {what.parameters.name}"
-    return str(getattr(what, "name", "Robot"))

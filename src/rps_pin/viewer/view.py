@@ -1,14 +1,12 @@
-"""A robot with its layers, in any Meshcat window."""
+"""View of a robot with layers, in any front end."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import meshcat
-import meshcat.geometry as mg
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
@@ -17,50 +15,52 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.viewer.layers import Context, Drawing, Layer, Look, layers_of
-from rps_pin.viewer.motion import FRAME_RATE, State
-from rps_pin.viewer.scene.animation import Clip
-from rps_pin.viewer.scene.legend import legend_command
+from rps_pin.validation import real_vector
+from rps_pin.viewer.displayed_mechanism import configuration_of, displayed, motion_of
+from rps_pin.viewer.layers import DrawnLayer, Layer, LayerContext, layers_of
+from rps_pin.viewer.motion import FRAME_RATE, MotionState
+from rps_pin.viewer.playback import follow_clock
+from rps_pin.viewer.scene.keyframes import NodeKeyframes
 from rps_pin.viewer.scene.links import node_name
-from rps_pin.viewer.scene.objects import put_object
 from rps_pin.viewer.scene.scene import Scene
+from rps_pin.viewer.scene.shapes import Part
 from rps_pin.viewer.scene.stage import WORLD
-from rps_pin.viewer.server.playback import follow_clock
-from rps_pin.viewer.server.window import RawCommand, Window
-from rps_pin.viewer.subject import configuration_of, motion_of, subject_of
+from rps_pin.viewer.writers.scene_writer import SceneWriter
+from rps_pin.viewer.writers.window import Window
 
 LAYERS_NODE = f"{WORLD}/layers"
 """Path of the node that holds the layers: one child each, by the layer's name."""
 
 
 class View:
-    """Load a robot and layers into a window, and show the motion's beginning.
+    """A robot with layers in a window, shown at the motion's beginning.
 
     Parameters
     ----------
     window
-        Where the commands go: a `Recorder`, a `LocalViewer.window`, or Meshcat's own.
+        Meshcat's window: a `Recorder`, a `LocalViewer.window`, or Meshcat's own; or another front
+        end, a `SceneWriter`.
     what
         A 3-RPS, or any mechanism.
     motion
-        What it does, or where it stands: a pose (3,) of a 3-RPS, a configuration (nq,), a
-        trajectory, a `MotionRun`, a `Simulation` or a `Motion`. The picture and the layers' scales
-        are set for it. Left out, a mechanism's home.
+        Its motion or pose: a pose (3,) of a 3-RPS, a configuration (nq,), a trajectory, a
+        `MotionRun`, a `Simulation` or a `Motion`. Picture and scales of the layers are set for it.
+        Default: a mechanism's home.
     visual
-        What to draw of the mechanism. Left out: a 3-RPS's own shapes, of others a skeleton.
+        Geometry of the mechanism. Default: a 3-RPS's own; for others, bars between the joints.
     layers, hidden
         Names (see `rps_pin.viewer.LAYERS`) or objects such as ``Trail(factor=100)``; those in
         `hidden` are there, but switched off.
 
     Attributes
     ----------
-    subject : Subject
-        What is shown.
+    subject : DisplayedMechanism
+        The mechanism.
     motion : Motion
-        What it does.
+        Its motion.
     scene : Scene
         The robot on its stage.
-    drawings : dict of str to Drawing
+    drawings : dict of str to DrawnLayer
         The layers, by the name of their node below ``/world/layers``.
 
     Raises
@@ -71,7 +71,7 @@ class View:
 
     def __init__(
         self,
-        window: Window,
+        window: Window | SceneWriter,
         what: RPSRobot | ClosedLoopModel,
         motion: Any = None,
         *,
@@ -80,7 +80,7 @@ class View:
         hidden: Sequence[str | Layer] = (),
     ) -> None:
         self.window = window
-        self.subject = subject_of(what, visual)
+        self.subject = displayed(what, visual)
         self.motion = motion_of(self.subject, motion)
         on, off = layers_of(layers), layers_of(hidden)
         framed = [
@@ -88,17 +88,17 @@ class View:
             *(layer.configurations(self.subject, self.motion) for layer in on),
         ]
         self.scene = Scene(self.subject.model, self.subject.visual, window, np.concatenate(framed))
-        context = Context(self.subject, self.motion, self.scene.box)
-        self.drawings: dict[str, Drawing] = {}
+        self._writer = self.scene.writer
+        context = LayerContext(self.subject, self.motion, self.scene.box)
+        self.drawings: dict[str, DrawnLayer] = {}
         self._visible: dict[str, bool] = {}
         for layer in [*on, *off]:
-            drawing = layer.draw(context)
-            name = node_name(drawing.key.name, set(self.drawings))
-            self.drawings[name] = drawing._replace(key=replace(drawing.key, name=name))
+            drawn = layer.draw(context)
+            name = node_name(drawn.legend.name, self.drawings)
+            self.drawings[name] = drawn._replace(legend=replace(drawn.legend, name=name))
             self._visible[name] = len(self._visible) < len(on)
-        self._view = meshcat.Visualizer(window=window)
-        self._put()
-        self._show(self.motion.state_at(0.0))
+        self._add_layers()
+        self._update_layers(self.motion.state_at(0.0))
 
     def display(self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None) -> None:
         """Show the robot and its layers in a state.
@@ -108,7 +108,7 @@ class View:
         q
             A configuration (nq,), or a pose (3,) of a 3-RPS.
         v, a
-            Velocity and acceleration (nv,), for the layers that show forces; at rest if left out.
+            Velocity and acceleration (nv,), for the layers that show forces. Default: zero.
 
         Raises
         ------
@@ -117,10 +117,16 @@ class View:
         UnreachableError
             If a pose is out of reach.
         """
-        configuration = configuration_of(self.subject, q)
-        rates = [self._rate(v, "v"), self._rate(a, "a")]
-        self.scene.display(configuration)
-        self._show(State(configuration, *rates))
+        nv = self.subject.model.nv
+        rates = [
+            np.zeros(nv) if given is None else real_vector(given, nv, name)
+            for given, name in ((v, "v"), (a, "a"))
+        ]
+        self._show(MotionState(configuration_of(self.subject, q), *rates))
+
+    def show_moment(self, elapsed: float) -> None:
+        """Show the motion's state `elapsed` seconds after its beginning."""
+        self._show(self.motion.state_at(elapsed))
 
     def set_visible(self, name: str, visible: bool) -> None:
         """Switch a layer on or off.
@@ -134,7 +140,7 @@ class View:
             there = ", ".join(self._visible) or "none"
             raise InputError(f"no layer {name!r} in this view; there are: {there}")
         self._visible[name] = bool(visible)
-        self._set(f"{LAYERS_NODE}/{name}", "visible", bool(visible))
+        self._writer.set_visible(f"{LAYERS_NODE}/{name}", bool(visible))
         self._send_legend()
 
     def play(self, stop: threading.Event | None = None, *, frame_rate: float = FRAME_RATE) -> None:
@@ -146,81 +152,69 @@ class View:
         follow_clock(self.motion.duration, self.show_moment, stop, frame_rate)
 
     def animate(self, *, frame_rate: float = FRAME_RATE) -> None:
-        """Let the window play the motion by itself, in a loop, layers included.
+        """Let the window play the motion in a loop, layers included.
 
         Raises
         ------
         InputError
-            If nothing moves, or the frame rate is not positive.
+            If the motion has no duration, or the frame rate is not positive.
         """
         states = list(self.motion.states(frame_rate))
-        clips = [
-            clip
-            for name, drawing in self.drawings.items()
-            if drawing.follow is not None
-            for clip in _clips(f"{LAYERS_NODE}/{name}", drawing, states)
+        keyframes = [
+            node
+            for name, drawn in self.drawings.items()
+            for node in _keyframes(f"{LAYERS_NODE}/{name}", drawn, states)
         ]
-        self.scene.animate(self.motion, frame_rate=frame_rate, more=clips)
+        self.scene.animate(self.motion, frame_rate=frame_rate, more=keyframes)
 
-    def show_moment(self, elapsed: float) -> None:
-        """Show the motion's state `elapsed` seconds after its beginning."""
-        state = self.motion.state_at(elapsed)
+    def _show(self, state: MotionState) -> None:
         self.scene.display(state.q)
-        self._show(state)
+        self._update_layers(state)
 
-    def _rate(self, given: ArrayLike | None, name: str) -> Array:
-        nv = self.subject.model.nv
-        if given is None:
-            return np.zeros(nv)
-        rate = np.asarray(given, dtype=np.float64)
-        if rate.shape != (nv,) or not np.isfinite(rate).all():
-            raise InputError(f"{name} has shape {rate.shape}; it must be ({nv},), all finite")
-        return rate
-
-    def _put(self) -> None:
-        for name, drawing in self.drawings.items():
-            for part in drawing.parts:
-                path = f"{LAYERS_NODE}/{name}/{part.node}/{part.name}"
-                put_object(self.window, path, mg.Mesh(part.geometry, part.material))
-                self._view[path].set_transform(part.placement)
-                self._set(f"{path}/<object>", "castShadow", False)
+    def _add_layers(self) -> None:
+        for name, drawn in self.drawings.items():
+            path = f"{LAYERS_NODE}/{name}"
+            for part in drawn.parts:
+                self._writer.add_part(_part_path(path, part), part, casts_shadow=False)
             if not self._visible[name]:
-                self._set(f"{LAYERS_NODE}/{name}", "visible", False)
+                self._writer.set_visible(path, False)
         if self.drawings:
             self._send_legend()
 
     def _send_legend(self) -> None:
-        keys = [drawing.key for drawing in self.drawings.values()]
-        self.window.send(legend_command(keys, list(self._visible.values())))
+        entries = [drawn.legend for drawn in self.drawings.values()]
+        self._writer.set_legend(entries, list(self._visible.values()))
 
-    def _show(self, state: State) -> None:
-        for name, drawing in self.drawings.items():
-            for node, look in (drawing.follow(state) if drawing.follow else {}).items():
-                self._look(f"{LAYERS_NODE}/{name}/{node}", drawing, node, look)
-
-    def _look(self, path: str, drawing: Drawing, node: str, look: Look) -> None:
-        self._view[path].set_transform(look.placement)
-        if look.colour is not None:
-            for part in drawing.parts:
-                if part.node == node:
-                    colour = [*look.colour, float(part.material.opacity)]
-                    self._set(f"{path}/{part.name}/<object>", "color", colour)
-
-    def _set(self, path: str, name: str, value: object) -> None:
-        message = {"type": "set_property", "path": path, "property": name, "value": value}
-        self.window.send(RawCommand(message))
+    def _update_layers(self, state: MotionState) -> None:
+        for name, drawn in self.drawings.items():
+            path = f"{LAYERS_NODE}/{name}"
+            for node, now in (drawn.update(state) if drawn.update else {}).items():
+                self._writer.place(f"{path}/{node}", now.placement)
+                if now.colour is not None:
+                    for part in _parts_of(drawn, node):
+                        opacity = part.material.opacity
+                        self._writer.set_colour(_part_path(path, part), now.colour, opacity)
 
 
-def _clips(path: str, drawing: Drawing, states: Sequence[State]) -> list[Clip]:
-    """Return how a layer's nodes move through states."""
-    assert drawing.follow is not None
-    looks: list[Mapping[str, Look]] = [drawing.follow(state) for state in states]
-    clips = []
-    for node, first in looks[0].items():
-        poses = np.array([look[node].placement for look in looks])
-        colours = None if first.colour is None else np.array([look[node].colour for look in looks])
-        parts = [
-            f"{path}/{node}/{part.name}/<object>" for part in drawing.parts if part.node == node
-        ]
-        clips.append(Clip(f"{path}/{node}", poses, parts, colours))
-    return clips
+def _keyframes(path: str, drawn: DrawnLayer, states: Sequence[MotionState]) -> list[NodeKeyframes]:
+    """Return the keyframes of a layer's nodes at states of the motion."""
+    if drawn.update is None:
+        return []
+    updates = [drawn.update(state) for state in states]
+    keyframes = []
+    for node, first in updates[0].items():
+        poses = np.array([nodes[node].placement for nodes in updates])
+        colours: Array | None = None
+        if first.colour is not None:
+            colours = np.array([nodes[node].colour for nodes in updates])
+        parts = [_part_path(path, part) for part in _parts_of(drawn, node)]
+        keyframes.append(NodeKeyframes(f"{path}/{node}", poses, parts, colours))
+    return keyframes
+
+
+def _parts_of(drawn: DrawnLayer, node: str) -> list[Part]:
+    return [part for part in drawn.parts if part.node == node]
+
+
+def _part_path(layer: str, part: Part) -> str:
+    return f"{layer}/{part.node}/{part.name}"

@@ -1,4 +1,4 @@
-"""One file that shows a whole motion: no server, no network, nothing beside it."""
+"""Pages that show a motion from disk, without a server, the network or any other file."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from rps_pin.files import whole_file
 from rps_pin.viewer.files.page import WATCH_LAYERS, inline_script, licences, page, viewer_library
 from rps_pin.viewer.motion import FRAME_RATE, Motion
 from rps_pin.viewer.scene.scene import Scene
-from rps_pin.viewer.server.recorder import Recorder
+from rps_pin.viewer.writers.recorder import Recorder
 
-# The page may run what it holds and show pictures made of data. It may fetch nothing: the browser
-# itself would stop it.
+# The page may run its own scripts and show pictures made of data. The browser lets it fetch
+# nothing.
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 )
@@ -99,12 +99,9 @@ def motion_page(
     motion = Motion(model, times, configurations)
     recorder = Recorder()
     scene = Scene(model, visual, recorder, motion.configurations)
-    moves = motion.duration > 0.0
-    if moves:
+    if motion.duration > 0.0:
         scene.animate(motion, frame_rate=frame_rate)
-    return recorded_page(
-        recorder, title=title, note=note_of(motion, scene.grid_spacing), moves=moves
-    )
+    return recorded_page(recorder, scene, motion, title)
 
 
 def checked_target(path: str | os.PathLike[str]) -> Path:
@@ -115,14 +112,11 @@ def checked_target(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def note_of(motion: Motion, spacing: float) -> str:
-    """Return the caption's second line: how long the motion lasts, and the grid."""
-    note = f"grid {1e3 * spacing:g} mm"
-    return f"{motion.duration:.3g} s, in a loop · {note}" if motion.duration > 0.0 else note
-
-
-def recorded_page(recorder: Recorder, *, title: str, note: str, moves: bool) -> str:
+def recorded_page(recorder: Recorder, scene: Scene, motion: Motion, title: str) -> str:
     """Return a page that carries out recorded commands when it is opened."""
+    moves = motion.duration > 0.0
+    grid = f"grid {1e3 * scene.grid_spacing:g} mm"
+    note = f"{motion.duration:.3g} s, in a loop · {grid}" if moves else grid
     return page(
         title=title,
         note=note,

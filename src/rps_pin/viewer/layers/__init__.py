@@ -1,6 +1,6 @@
-"""What can be shown besides the robot: each layer a node below ``/world/layers``.
+"""Layers: what is drawn besides the robot, each in a node below ``/world/layers``.
 
-A layer is named, or given as an object where it has options::
+A layer is given by its name, or as an object with its options::
 
     save_html("a.html", robot, path, layers=["forces", Trail(factor=200)])
 """
@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
 from rps_pin.errors import InputError, shown
-from rps_pin.viewer.layers.base import Context, Drawing, Layer, Look, Part
+from rps_pin.viewer.layers.base import DrawnLayer, Layer, LayerContext, NodeState
 from rps_pin.viewer.layers.closures import Closures
 from rps_pin.viewer.layers.forces import Forces
 from rps_pin.viewer.layers.frames import Frames
@@ -33,11 +33,11 @@ LAYERS: dict[str, Callable[[], Layer]] = {
     "ghosts": Ghosts,
     "closures": Closures,
 }
-"""Every layer by name, with its ordinary options."""
+"""Every layer by name, with its default options."""
 
 
 def layers_of(given: Sequence[str | Layer]) -> list[Layer]:
-    """Return layers that are named, or given, as objects.
+    """Return layers that are given by name, or as objects, as objects.
 
     Raises
     ------
@@ -53,12 +53,14 @@ def layers_of(given: Sequence[str | Layer]) -> list[Layer]:
         elif hasattr(one, "draw") and not isinstance(one, type):
             found.append(one)
         else:
-            raise InputError(f"{shown(one)} is no layer: a name, or an object such as Trail()")
+            raise InputError(
+                f"{shown(one)} is not a layer: give a name, or an object such as Trail()"
+            )
     return found
 
 
 def fitting_layers(mechanism: ClosedLoopModel) -> list[str]:
-    """Return the names of the layers that any motion of a mechanism can have, at little cost."""
+    """Return the layers that fit any motion of a mechanism and are cheap to draw, by name."""
     closed = any(isinstance(one, LoopClosure) for one in mechanism.closures)
     of_closures = ["trail", "reactions"] if closed else []
     held = ["closures"] if mechanism.closures else []
@@ -69,15 +71,14 @@ def fitting_layers(mechanism: ClosedLoopModel) -> list[str]:
 __all__ = [
     "LAYERS",
     "Closures",
-    "Context",
-    "Drawing",
+    "DrawnLayer",
     "Forces",
     "Frames",
     "Ghosts",
     "Layer",
+    "LayerContext",
     "Limits",
-    "Look",
-    "Part",
+    "NodeState",
     "Reactions",
     "Singularity",
     "Trail",

@@ -1,4 +1,4 @@
-"""Arrows in a scale of their own: what forces and reactions share."""
+"""Arrows of forces and moments, in one scale for each unit."""
 
 from __future__ import annotations
 
@@ -9,84 +9,92 @@ import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.viewer.layers.base import UNSEEN, Context, Drawing, Look, Part
-from rps_pin.viewer.layers.shapes import at, css, length_text, pointing, round_number
-from rps_pin.viewer.motion import State
-from rps_pin.viewer.scene.legend import Key
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState
+from rps_pin.viewer.layers.colours import css
+from rps_pin.viewer.layers.parts import SMALLEST, pointing
+from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.scene.legend import LegendEntry
+from rps_pin.viewer.scene.shapes import Part, translated
+from rps_pin.viewer.scene.stage import length_text, round_number
 
 Vectors = Mapping[str, tuple[Array, Array]]
-"""By node: where an arrow begins, m, and the force or moment that it shows."""
+"""Origin of each arrow, m, and the force or moment that it shows, by node."""
 
 _LONGEST = 0.7
 """Length of the longest arrow, at most, in radii of the picture."""
 _MOST_STATES = 50
 
 
-class Sized(NamedTuple):
-    """What an arrow looks like, and its unit."""
+class ArrowKind(NamedTuple):
+    """Shape of an arrow, and the unit of the vector that it shows."""
 
-    shape: Callable[[str, int], list[Part]]
-    """Makes the parts of a node in a colour."""
+    parts: Callable[[str, int], list[Part]]
+    """Returns the parts of a node, in a colour."""
     unit: str
     """``N`` or ``N m``."""
 
 
-def arrows_drawing(
+def draw_arrows(
     name: str,
     title: str,
     colour: int,
-    context: Context,
-    sized: Mapping[str, Sized],
-    vectors: Callable[[State], Vectors],
-    given: Mapping[str, float | None],
-) -> Drawing:
-    """Return a layer of arrows, as long as forces and moments in one scale for each unit.
+    context: LayerContext,
+    kinds: Mapping[str, ArrowKind],
+    vectors: Callable[[MotionState], Vectors],
+    scales: Mapping[str, float | None],
+) -> DrawnLayer:
+    """Return a layer of arrows.
 
     Parameters
     ----------
     name, title, colour
-        Of the layer; the title begins its key.
+        Of the layer; its entry in the legend begins with the title.
     context
-        What it is drawn for.
-    sized
+        The mechanism and motion.
+    kinds
         The arrows, by node.
     vectors
-        Where they begin and what they show in a state; those left out are not seen.
-    given
-        By unit, what an arrow of 1 m stands for; None for the best round number.
+        Returns the vectors in a state. Arrows without one are not seen.
+    scales
+        By unit, the force or moment of an arrow of 1 m; None for a round number.
     """
     motion = context.motion
     times = np.linspace(0.0, motion.duration, min(_MOST_STATES, len(motion.times)))
-    greatest = dict.fromkeys(given, 0.0)
+    greatest = dict.fromkeys(scales, 0.0)
     for elapsed in times:
         for node, (_, vector) in vectors(motion.state_at(float(elapsed))).items():
-            unit = sized[node].unit
+            unit = kinds[node].unit
             greatest[unit] = max(greatest[unit], float(np.linalg.norm(vector)))
-    units = [unit for unit in given if any(one.unit == unit for one in sized.values())]
-    scales = {unit: _scale(name, given[unit], greatest[unit], context.radius) for unit in units}
-    hidden = at(context.box.centre)
-    hidden[:3, :3] *= UNSEEN
+    used = {kind.unit for kind in kinds.values()}
+    per_metre = {
+        unit: _scale(name, given, greatest[unit], context.radius)
+        for unit, given in scales.items()
+        if unit in used
+    }
+    hidden = translated(context.box.centre)
+    hidden[:3, :3] *= SMALLEST
 
-    def follow(state: State) -> dict[str, Look]:
+    def update(state: MotionState) -> dict[str, NodeState]:
         found = vectors(state)
         return {
-            node: Look(
-                pointing(found[node][0], found[node][1] / scales[one.unit])
+            node: NodeState(
+                pointing(found[node][0], found[node][1] / per_metre[kind.unit])
                 if node in found
                 else hidden
             )
-            for node, one in sized.items()
+            for node, kind in kinds.items()
         }
 
-    parts = [part for node, one in sized.items() for part in one.shape(node, colour)]
-    lengths = ", ".join(_said(unit, scales[unit], context.radius) for unit in units)
-    still = ", at rest" if motion.at_rest else ""
-    most = ", ".join(f"at most {greatest[unit]:.3g} {unit}" for unit in units)
-    return Drawing(Key(name, f"{title}{still}: {lengths}; {most}", css(colour)), parts, follow)
+    parts = [part for node, kind in kinds.items() for part in kind.parts(node, colour)]
+    lengths = ", ".join(_scale_text(unit, one, context.radius) for unit, one in per_metre.items())
+    at_rest = ", at rest" if motion.at_rest else ""
+    most = ", ".join(f"at most {greatest[unit]:.3g} {unit}" for unit in per_metre)
+    entry = LegendEntry(name, f"{title}{at_rest}: {lengths}; {most}", css(colour))
+    return DrawnLayer(entry, parts, update)
 
 
 def _scale(layer: str, given: float | None, greatest: float, radius: float) -> float:
-    """Return what an arrow of one metre stands for."""
+    """Return the force or moment of an arrow of one metre."""
     if given is not None:
         if not 0.0 < given < np.inf:
             raise InputError(f"layer {layer!r}: a scale of {given}; it must be positive")
@@ -96,7 +104,7 @@ def _scale(layer: str, given: float | None, greatest: float, radius: float) -> f
     return 1.0 / round_number(_LONGEST * radius / greatest)
 
 
-def _said(unit: str, scale: float, radius: float) -> str:
-    """Return a scale in words: how long a round force is drawn."""
+def _scale_text(unit: str, scale: float, radius: float) -> str:
+    """Return a scale in words: the length of the arrow of a round force."""
     force = round_number(0.5 * radius * scale)
     return f"{length_text(force / scale)} for {force:g} {unit}"

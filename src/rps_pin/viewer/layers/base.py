@@ -1,99 +1,100 @@
-"""What every layer is: parts below one node, some of which follow the robot, and a key."""
+"""Interface of the layers: options, the context that they are drawn for, and the drawn layer."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
+import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.viewer.motion import Motion, State
-from rps_pin.viewer.scene.bounds import Box
-from rps_pin.viewer.scene.legend import Key
-from rps_pin.viewer.subject import Subject
+from rps_pin.errors import InputError
+from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
+from rps_pin.viewer.motion import Motion, MotionState
+from rps_pin.viewer.scene.bounds import BoundingBox
+from rps_pin.viewer.scene.legend import LegendEntry
+from rps_pin.viewer.scene.shapes import Part
 
 Colour = tuple[float, float, float]
-
-UNSEEN = 1e-6
-"""Scale of what has no size just now: zero would leave it without a direction."""
+"""Red, green and blue, 0 to 1."""
 
 
 @dataclass(frozen=True)
-class Context:
-    """What a layer is drawn for."""
+class LayerContext:
+    """The mechanism and the motion that a layer is drawn for."""
 
-    subject: Subject
+    subject: DisplayedMechanism
     """The mechanism."""
     motion: Motion
-    """What it does."""
-    box: Box
-    """What the robot fills, over the whole motion."""
+    """Its motion."""
+    box: BoundingBox
+    """The box that the robot fills over the whole motion."""
 
     @property
     def radius(self) -> float:
-        """Radius of the sphere that the picture is set for, m."""
+        """Radius of the sphere that the picture is framed for, m."""
         return self.box.radius
 
 
-class Part(NamedTuple):
-    """One Meshcat object of a layer."""
-
-    node: str
-    """The node below the layer's that carries it, and that may follow the robot."""
-    name: str
-    """Its own name below that."""
-    geometry: Any
-    """A ``meshcat.geometry.Geometry``."""
-    material: Any
-    """A ``meshcat.geometry.Material``."""
-    placement: Array
-    """Homogeneous (4, 4), in the node."""
-
-
-class Look(NamedTuple):
-    """How a node looks in one state."""
+class NodeState(NamedTuple):
+    """Placement and colour of a layer's node in one state."""
 
     placement: Array
     """Homogeneous (4, 4) in the world; its columns' lengths are scales."""
     colour: Colour | None = None
-    """Red, green, blue from 0 to 1 of all its parts, where colours mean something."""
+    """Of all parts of the node; None if it does not change."""
 
 
-Follow = Callable[[State], Mapping[str, Look]]
+NodeStates = Mapping[str, NodeState]
+"""States of a layer's nodes, by name."""
 
 
-class Drawing(NamedTuple):
+class DrawnLayer(NamedTuple):
     """A layer, drawn for one context."""
 
-    key: Key
-    """Its line on the page."""
+    legend: LegendEntry
+    """Its line in the legend."""
     parts: Sequence[Part]
-    """What it is made of."""
-    follow: Follow | None = None
-    """How its nodes look in a state, by name; None where nothing changes."""
+    """Its shapes."""
+    update: Callable[[MotionState], NodeStates] | None = None
+    """Returns where its nodes are in a state; None where nothing moves."""
 
 
 class Layer(Protocol):
-    """Options of a layer; drawing it makes them into parts."""
+    """Options of a layer."""
 
-    def configurations(self, subject: Subject, motion: Motion) -> Array:
-        """Return configurations (k, nq) besides the motion's that the picture shall hold."""
+    def configurations(self, subject: DisplayedMechanism, motion: Motion) -> Array:
+        """Return configurations (k, nq) besides the motion's that the picture is framed for."""
 
-    def draw(self, context: Context) -> Drawing:
+    def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the layer, drawn.
 
         Raises
         ------
         InputError
-            If the context does not have what the layer shows.
+            If the mechanism or motion does not have what the layer shows.
         """
 
 
-class Framed:
-    """A layer that needs no more room than the robot."""
+class RobotSizedLayer:
+    """A layer within the robot's bounding box."""
 
-    def configurations(self, subject: Subject, motion: Motion) -> Array:
+    def configurations(self, subject: DisplayedMechanism, motion: Motion) -> Array:
         """Return none."""
         return np.empty((0, subject.model.nq))
+
+
+def frame_id(model: pin.Model, name: str, layer: str) -> int:
+    """Return a frame's index, or raise `InputError` with the frames that there are."""
+    if not model.existFrame(name):
+        known = ", ".join(frame.name for frame in model.frames)
+        raise InputError(f"layer {layer!r}: no frame {name!r}; there are: {known}")
+    return int(model.getFrameId(name))
+
+
+def check_magnification(factor: float | None, layer: str) -> None:
+    """Raise `InputError` unless a factor is None, or finite and at least 1."""
+    if factor is not None and not 1.0 <= factor < np.inf:
+        raise InputError(f"layer {layer!r}: factor = {factor}; it must be at least 1")

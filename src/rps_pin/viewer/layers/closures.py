@@ -1,24 +1,31 @@
-"""Layer ``closures``: what is held together, and how far it is apart."""
+"""Layer ``closures``: the frames that each closure ties together, and the gap between them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-import meshcat.geometry as mg
 import numpy as np
 import pinocchio as pin
 
 from rps_pin.closed_loop import JointCoupling, LoopClosure
 from rps_pin.errors import InputError
-from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
-from rps_pin.viewer.layers.shapes import BLUE, YELLOW, along_z, at, between, css, paint
-from rps_pin.viewer.motion import State
-from rps_pin.viewer.scene.legend import Key
+from rps_pin.viewer.layers.base import (
+    DrawnLayer,
+    LayerContext,
+    NodeState,
+    RobotSizedLayer,
+)
+from rps_pin.viewer.layers.colours import BLUE, YELLOW, css
+from rps_pin.viewer.layers.parts import ball, between
+from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.scene.legend import LegendEntry
+from rps_pin.viewer.scene.links import node_name
+from rps_pin.viewer.scene.shapes import Cylinder, Material, Part, translated
 
 
 @dataclass(frozen=True)
-class Closures(Framed):
+class Closures(RobotSizedLayer):
     """A yellow mark at each closure's frame a, a blue one at its frame b, a line between them.
 
     The line of a ``distance`` closure is its rod; of others, the gap. A coupling is drawn in the
@@ -27,50 +34,49 @@ class Closures(Framed):
     Parameters
     ----------
     size
-        Radius of a mark, m; left out, a sixtieth of the picture's.
+        Radius of a mark, m. Default: a sixtieth of the picture's.
     """
 
     size: float | None = None
 
-    def draw(self, context: Context) -> Drawing:
+    def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the marks and lines; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
         data = model.createData()
         ends = {
-            closure.name.replace("/", "."): _ends(closure, model, data)
-            for closure in mechanism.closures
+            node_name(closure.name): _ends(closure, model, data) for closure in mechanism.closures
         }
         if not ends:
-            raise InputError("layer 'closures': the mechanism has none")
+            raise InputError("layer 'closures': the mechanism has no closures")
         size = context.radius / 60.0 if self.size is None else self.size
+        yellow, blue = (Material(colour, on_top=True) for colour in (YELLOW, BLUE))
+        line = Cylinder(1.0, 0.3 * size, 0.3 * size)
         parts: list[Part] = []
         for name in ends:
-            first = paint(YELLOW, on_top=True)
-            second = paint(BLUE, on_top=True)
-            line = mg.Cylinder(1.0, 0.3 * size)
             parts += [
-                Part(f"{name}_line", "bar", line, paint(YELLOW, on_top=True), along_z(0.5)),
-                Part(f"{name}_a", "ball", mg.Sphere(size), first, np.eye(4)),
-                Part(f"{name}_b", "ball", mg.Sphere(0.55 * size), second, np.eye(4)),
+                Part(f"{name}_line", "bar", line, yellow, translated([0.0, 0.0, 0.5])),
+                ball(f"{name}_a", size, yellow),
+                ball(f"{name}_b", 0.55 * size, blue),
             ]
 
-        def follow(state: State) -> dict[str, Look]:
+        def update(state: MotionState) -> dict[str, NodeState]:
             pin.framesForwardKinematics(model, data, state.q)
-            looks = {}
+            states = {}
             for name, (placements, a, b) in ends.items():
                 start, end = (np.array(placements[one].translation) for one in (a, b))
-                looks[f"{name}_a"], looks[f"{name}_b"] = Look(at(start)), Look(at(end))
-                looks[f"{name}_line"] = Look(between(start, end))
-            return looks
+                states[f"{name}_a"] = NodeState(translated(start))
+                states[f"{name}_b"] = NodeState(translated(end))
+                states[f"{name}_line"] = NodeState(between(start, end))
+            return states
 
         text = "closures: frame a yellow, frame b blue, the gap (or rod) between them"
         if any(isinstance(closure, JointCoupling) for closure in mechanism.closures):
             text += "; couplings: joint yellow, the other blue"
-        return Drawing(Key("closures", text, css(YELLOW)), parts, follow)
+        return DrawnLayer(LegendEntry("closures", text, css(YELLOW)), parts, update)
 
 
 def _ends(closure: LoopClosure | JointCoupling, model: pin.Model, data: pin.Data) -> Any:
-    """Return the placements, and the indices in them, of what a closure ties together."""
+    """Return the placements, and the two indices in them, that a closure ties together."""
     if isinstance(closure, JointCoupling):
         return data.oMi, model.getJointId(closure.joint), model.getJointId(closure.other)
     return data.oMf, *closure.frame_ids(model)

@@ -1,4 +1,4 @@
-"""Colours that mean something: scales told apart by colour-blind readers too."""
+"""Colours of the layers: one for each, and scales; colour-blind readers can tell them apart."""
 
 from __future__ import annotations
 
@@ -11,11 +11,24 @@ from rps_pin.arrays import Array
 from rps_pin.viewer.layers.base import Colour
 from rps_pin.viewer.scene.legend import ColourBar
 
-#: From safe to refused: blue, yellow, vermillion (Okabe and Ito's).
-WARNING = LinearSegmentedColormap.from_list("warning", ["#0072B2", "#F0E442", "#D55E00"], N=4096)
+# The palette of Okabe and Ito.
+ORANGE, SKY, GREEN, YELLOW = 0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442
+BLUE, VERMILLION, PURPLE = 0x0072B2, 0xD55E00, 0xCC79A7
+
+_STOPS = 7
+
+
+def css(colour: int) -> str:
+    """Return a colour as ``#rrggbb``."""
+    return f"#{colour:06x}"
+
+
+#: From safe to refused.
+WARNING = LinearSegmentedColormap.from_list(
+    "warning", [css(BLUE), css(YELLOW), css(VERMILLION)], N=4096
+)
 #: For fields over a surface.
 FIELD = colormaps["viridis"]
-_STOPS = 7
 
 
 def warning(share: float) -> Colour:
@@ -24,21 +37,12 @@ def warning(share: float) -> Colour:
     return float(red), float(green), float(blue)
 
 
-def warning_bar(low: str, high: str) -> ColourBar:
-    """Return the key to `warning`."""
-    return _bar(WARNING, low, high)
-
-
 def field_colours(share: ArrayLike) -> Array:
     """Return colours (n, 3) of a field's values, 0 lowest and 1 highest."""
     return np.asarray(FIELD(np.asarray(share)))[:, :3]
 
 
-def field_bar(low: str, high: str) -> ColourBar:
-    """Return the key to `field_colours`."""
-    return _bar(FIELD, low, high)
-
-
-def _bar(colours: Colormap, low: str, high: str) -> ColourBar:
+def colour_bar(colours: Colormap, low: str, high: str) -> ColourBar:
+    """Return a bar of colours for the legend, with the texts at its ends."""
     stops = tuple(to_hex(colours(share)) for share in np.linspace(0.0, 1.0, _STOPS))
     return ColourBar(stops, low, high)

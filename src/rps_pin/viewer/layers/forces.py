@@ -1,7 +1,7 @@
-"""Layer ``forces``: what the actuators exert, as arrows along their joints' axes.
+"""Layer ``forces``: actuator forces, as arrows along their joints' axes.
 
-An arrow begins where its joint is and points where the joint's coordinate grows, if the force is
-positive. A turning joint's torque has two heads, and a scale of its own.
+An arrow begins at its joint and points, for a positive force, where the joint's coordinate grows. A
+torque has two heads, and its own scale.
 """
 
 from __future__ import annotations
@@ -15,20 +15,22 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import SingularityError
-from rps_pin.viewer.layers.arrows import Sized, Vectors, arrows_drawing
-from rps_pin.viewer.layers.base import Context, Drawing, Framed
-from rps_pin.viewer.layers.shapes import ORANGE, arrow, double_arrow
-from rps_pin.viewer.motion import State
+from rps_pin.viewer.layers.arrows import ArrowKind, Vectors, draw_arrows
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, RobotSizedLayer
+from rps_pin.viewer.layers.colours import ORANGE
+from rps_pin.viewer.layers.parts import arrow, double_arrow
+from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.scene.links import node_name
 
 
 @dataclass(frozen=True)
-class Forces(Framed):
+class Forces(RobotSizedLayer):
     """Actuator forces.
 
     Parameters
     ----------
     newtons_per_metre
-        What an arrow of 1 m stands for, N. Left out: a round number.
+        Force of an arrow of 1 m, N. Default: a round number.
     newton_metres_per_metre
         The same for torques, N m.
     """
@@ -36,13 +38,13 @@ class Forces(Framed):
     newtons_per_metre: float | None = None
     newton_metres_per_metre: float | None = None
 
-    def draw(self, context: Context) -> Drawing:
+    def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the arrows; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
         data, outside = model.createData(), context.motion.wrenches
         actuators = _actuators(mechanism)
 
-        def vectors(state: State) -> Vectors:
+        def vectors(state: MotionState) -> Vectors:
             try:
                 tau = state.tau
                 if tau is None:
@@ -55,12 +57,12 @@ class Forces(Framed):
                 for one, force in zip(actuators, tau, strict=True)
             }
 
-        sized = {
-            one.node: Sized(double_arrow, "N m") if one.turns else Sized(arrow, "N")
+        kinds = {
+            one.node: ArrowKind(double_arrow, "N m") if one.turns else ArrowKind(arrow, "N")
             for one in actuators
         }
-        given = {"N": self.newtons_per_metre, "N m": self.newton_metres_per_metre}
-        return arrows_drawing("forces", "actuators' forces", ORANGE, context, sized, vectors, given)
+        scales = {"N": self.newtons_per_metre, "N m": self.newton_metres_per_metre}
+        return draw_arrows("forces", "actuators' forces", ORANGE, context, kinds, vectors, scales)
 
 
 class _Actuator(NamedTuple):
@@ -69,14 +71,14 @@ class _Actuator(NamedTuple):
     node: str
     """The arrow's node."""
     joint: int
-    """Index of its joint."""
+    """Index of the joint."""
     column: int
-    """Of the velocity."""
+    """Its index in the velocity."""
     turns: bool
     """Whether its force is a torque."""
 
     def axis(self, model: pin.Model, data: pin.Data) -> Array:
-        """Return its direction in world axes, after `computeJointJacobians`."""
+        """Return its unit direction in world axes, after `computeJointJacobians`."""
         column = _column(model, data, self.joint, self.column)
         return column[3:] if self.turns else column[:3]
 
@@ -88,7 +90,7 @@ def _actuators(mechanism: ClosedLoopModel) -> list[_Actuator]:
     found: list[_Actuator] = []
     for column in (int(index) for index in mechanism.actuated_indices):
         joint = max(j for j in range(1, model.njoints) if model.joints[j].idx_v <= column)
-        own, name = model.joints[joint], model.names[joint].replace("/", ".")
+        own, name = model.joints[joint], node_name(model.names[joint])
         node = name if own.nv == 1 else f"{name}_{column - own.idx_v + 1}"
         turns = not _column(model, data, joint, column)[:3].any()
         found.append(_Actuator(node, joint, column, turns))
@@ -96,6 +98,6 @@ def _actuators(mechanism: ClosedLoopModel) -> list[_Actuator]:
 
 
 def _column(model: pin.Model, data: pin.Data, joint: int, column: int) -> Array:
-    """Return the twist of a joint's own origin at unit speed, world axes, shape (6,)."""
+    """Return the twist of a joint's origin at unit speed, world axes, shape (6,)."""
     frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     return np.array(pin.getJointJacobian(model, data, joint, frame)).reshape(6, -1)[:, column]

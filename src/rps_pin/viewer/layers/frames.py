@@ -1,4 +1,4 @@
-"""Layer ``frames``: the axes of the world, of every joint, and of the closed frames."""
+"""Layer ``frames``: axes of the world, of every joint, and of the closures' frames."""
 
 from __future__ import annotations
 
@@ -7,53 +7,56 @@ from dataclasses import dataclass
 import pinocchio as pin
 
 from rps_pin.closed_loop import LoopClosure
-from rps_pin.errors import InputError
-from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
-from rps_pin.viewer.layers.shapes import cross, length_text
-from rps_pin.viewer.motion import State
-from rps_pin.viewer.scene.legend import Key
+from rps_pin.viewer.layers.base import (
+    DrawnLayer,
+    LayerContext,
+    NodeState,
+    RobotSizedLayer,
+    frame_id,
+)
+from rps_pin.viewer.layers.parts import axes
+from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.links import node_name
+from rps_pin.viewer.scene.shapes import Part
+from rps_pin.viewer.scene.stage import length_text
 
 
 @dataclass(frozen=True)
-class Frames(Framed):
+class Frames(RobotSizedLayer):
     """Axes x red, y green, z blue.
 
     Parameters
     ----------
     names
-        Frames of the model; left out, every joint's and the second of each closure.
+        Frames of the model. Default: every joint's, and frame b of each closure.
     size
-        Length of an axis, m; left out, an eighth of the picture's radius.
+        Length of an axis, m. Default: an eighth of the picture's radius.
     """
 
     names: tuple[str, ...] | None = None
     size: float | None = None
 
-    def draw(self, context: Context) -> Drawing:
+    def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the axes; see `Layer`."""
         model, data = context.subject.model, context.subject.model.createData()
         names = self._names(context) if self.names is None else list(self.names)
-        unknown = [name for name in names if not model.existFrame(name)]
-        if unknown:
-            known = ", ".join(frame.name for frame in model.frames)
-            raise InputError(f"layer 'frames': no frame {unknown[0]!r}; there are: {known}")
         size = context.radius / 8.0 if self.size is None else self.size
         nodes: dict[str, int] = {}
         parts: list[Part] = []
         for name in names:
             node = node_name(name, set(nodes))
-            nodes[node] = int(model.getFrameId(name))
-            parts += cross(node, size)
+            nodes[node] = frame_id(model, name, "frames")
+            parts += axes(node, size)
 
-        def follow(state: State) -> dict[str, Look]:
+        def update(state: MotionState) -> dict[str, NodeState]:
             pin.framesForwardKinematics(model, data, state.q)
-            return {node: Look(data.oMf[frame].homogeneous) for node, frame in nodes.items()}
+            return {node: NodeState(data.oMf[frame].homogeneous) for node, frame in nodes.items()}
 
         text = f"frames: x red, y green, z blue, {length_text(size)} long"
-        return Drawing(Key("frames", text, "#2ca02c"), parts, follow)
+        return DrawnLayer(LegendEntry("frames", text, "#2ca02c"), parts, update)
 
-    def _names(self, context: Context) -> list[str]:
+    def _names(self, context: LayerContext) -> list[str]:
         closures = context.subject.mechanism.closures
         closed = [one.frame_b for one in closures if isinstance(one, LoopClosure)]
         return list(dict.fromkeys([*context.subject.model.names, *closed]))

@@ -1,11 +1,10 @@
-"""Layer ``ghosts``: the robot at other configurations, seen through; of a 3-RPS, its modes."""
+"""Layer ``ghosts``: transparent copies of the robot at other configurations or assembly modes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-import meshcat.geometry as mg
 import numpy as np
 import pinocchio as pin
 
@@ -13,43 +12,43 @@ from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.urdf import LEGS
-from rps_pin.viewer.layers.base import Context, Drawing, Part
-from rps_pin.viewer.layers.shapes import css, paint
+from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext
+from rps_pin.viewer.layers.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, css
 from rps_pin.viewer.motion import Motion, checked_configurations
-from rps_pin.viewer.scene.legend import Key
+from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.links import link_poses, links_of
-from rps_pin.viewer.scene.shapes import parts_of
-from rps_pin.viewer.subject import Subject
+from rps_pin.viewer.scene.shapes import Material, Part
 
 _OPACITY = 0.28
-_COLOURS = (0x0072B2, 0xD55E00, 0x009E73, 0xCC79A7, 0xE69F00, 0x56B4E9)
+_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 
 
 @dataclass(frozen=True)
 class Ghosts:
-    """See-through copies of the robot; what moves of it, in a colour for each.
+    """Transparent copies of the robot's moving links, each in its own colour.
 
     Parameters
     ----------
     at
-        Configurations, shape (k, nq). Left out, of a 3-RPS: every other assembly mode with the leg
+        Configurations, shape (k, nq). Default, for a 3-RPS: every other assembly mode with the leg
         lengths that the motion begins with.
     above
-        Of the modes, only those above the base.
+        Whether only the modes above the base are shown.
     """
 
     at: Any = None
     above: bool = False
 
-    def configurations(self, subject: Subject, motion: Motion) -> Array:
+    def configurations(self, subject: DisplayedMechanism, motion: Motion) -> Array:
         """Return the copies' configurations; see `Layer`."""
         if self.at is not None:
             return checked_configurations(subject.model, self.at)
         if subject.robot is None:
-            raise InputError("layer 'ghosts': say where, Ghosts(at=configurations)")
+            raise InputError("layer 'ghosts': give the configurations, Ghosts(at=configurations)")
         return mode_configurations(subject.robot, motion.configurations[0], above=self.above)
 
-    def draw(self, context: Context) -> Drawing:
+    def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the copies; see `Layer`."""
         subject = context.subject
         model = subject.model
@@ -60,20 +59,16 @@ class Ghosts:
         for copy in range(len(copies)):
             colour = _COLOURS[copy % len(_COLOURS)]
             for index, link in enumerate(links):
-                for item in link.geometries:
-                    in_link = link.placement.actInv(item.placement).homogeneous
-                    for part in parts_of(item):
-                        place = poses[copy, index] @ in_link @ part.placement
-                        name = f"{link.name}_{len(parts)}"
-                        parts.append(
-                            Part(f"{copy + 1}", name, part.geometry, _ghostly(colour), place)
-                        )
+                parts += [
+                    part._replace(
+                        node=f"{copy + 1}",
+                        name=f"{link.name}_{part.name}",
+                        placement=poses[copy, index] @ part.placement,
+                    )
+                    for part in link.parts(Material(colour, _OPACITY))
+                ]
         other = "other assembly modes of these leg lengths" if self.at is None else "other poses"
-        return Drawing(Key("ghosts", f"{len(copies)} {other}", css(_COLOURS[0])), parts)
-
-
-def _ghostly(colour: int) -> mg.MeshPhongMaterial:
-    return paint(colour, _OPACITY)
+        return DrawnLayer(LegendEntry("ghosts", f"{len(copies)} {other}", css(_COLOURS[0])), parts)
 
 
 def mode_configurations(robot: RPSRobot, q: Array, *, above: bool = False) -> Array:

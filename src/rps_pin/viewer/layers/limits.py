@@ -1,4 +1,4 @@
-"""Layer ``limits``: how much of its range each limited joint uses, as the colour of a shell."""
+"""Layer ``limits``: the share of its range that each limited joint uses, as a colour."""
 
 from __future__ import annotations
 
@@ -12,56 +12,61 @@ from rps_pin.arrays import Array
 from rps_pin.rps.kinematics.legs import cone_angles
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.urdf import LEGS
-from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
-from rps_pin.viewer.layers.colours import warning, warning_bar
-from rps_pin.viewer.layers.shapes import at, ball, css
-from rps_pin.viewer.motion import State
-from rps_pin.viewer.scene.legend import Key
+from rps_pin.viewer.layers.base import (
+    DrawnLayer,
+    LayerContext,
+    NodeState,
+    RobotSizedLayer,
+)
+from rps_pin.viewer.layers.colours import BLUE, WARNING, colour_bar, css, warning
+from rps_pin.viewer.layers.parts import ball
+from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.scene.legend import LegendEntry
+from rps_pin.viewer.scene.links import node_name
+from rps_pin.viewer.scene.shapes import Material, translated
 
 _WIDEST, _TURN = 1e3, 2.0 * np.pi
-"""Ranges above this (m, rad), and whole turns, are none."""
-Share = Callable[[State, pin.Data], tuple[Array, float]]
-"""Where a mark stands, and the share of the range that is used: 0 in its middle, 1 at an end."""
+"""Ranges above this (m, rad), and whole turns, do not count as limits."""
+Share = Callable[[MotionState, pin.Data], tuple[Array, float]]
+"""Returns a mark's position and the share of the range in use: 0 in its middle, 1 at an end."""
 
 
 @dataclass(frozen=True)
-class Limits(Framed):
-    """A shell at every joint with limits; of a 3-RPS, at the balls too.
+class Limits(RobotSizedLayer):
+    """A ball at every joint with limits; of a 3-RPS, at the spherical joints too.
 
     Parameters
     ----------
     size
-        Radius of a shell, m; left out, a sixteenth of the picture's.
+        Radius of a ball, m. Default: a sixteenth of the picture's.
     """
 
     size: float | None = None
 
-    def draw(self, context: Context) -> Drawing:
-        """Return the shells; see `Layer`."""
+    def draw(self, context: LayerContext) -> DrawnLayer:
+        """Return the balls; see `Layer`."""
         model, data = context.subject.model, context.subject.model.createData()
         shares: dict[str, Share] = dict(_of_joints(model, context.subject.robot))
         if context.subject.robot is not None:
-            shares |= _of_balls(context.subject.robot)
+            shares |= _of_spherical_joints(context.subject.robot)
         size = context.radius / 16.0 if self.size is None else self.size
-        parts: list[Part] = []
-        for node in shares:
-            parts += ball(node, size, 0xFFFFFF, 0.6)
+        parts = [ball(node, size, Material(0xFFFFFF, 0.6)) for node in shares]
 
-        def follow(state: State) -> dict[str, Look]:
+        def update(state: MotionState) -> dict[str, NodeState]:
             pin.framesForwardKinematics(model, data, state.q)
-            looks = {}
+            states = {}
             for node, share in shares.items():
                 point, used = share(state, data)
-                looks[node] = Look(at(point), warning(used))
-            return looks
+                states[node] = NodeState(translated(point), warning(used))
+            return states
 
         text = "range of the joints in use" if shares else "no joint has limits"
-        bar = warning_bar("middle", "at a limit") if shares else None
-        return Drawing(Key("limits", text, css(0x0072B2), bar), parts, follow)
+        bar = colour_bar(WARNING, "middle", "at a limit") if shares else None
+        return DrawnLayer(LegendEntry("limits", text, css(BLUE), bar), parts, update)
 
 
 def _of_joints(model: pin.Model, robot: RPSRobot | None) -> Mapping[str, Share]:
-    """Return the joints of one coordinate with two limits."""
+    """Return the shares of the joints of one coordinate with two limits."""
     unlimited = set()
     if robot is not None and not np.isfinite(robot.parameters.leg_length_limits[1]):
         unlimited = {f"leg_{leg}_prismatic" for leg in LEGS}  # the URDF has a stand-in
@@ -74,7 +79,7 @@ def _of_joints(model: pin.Model, robot: RPSRobot | None) -> Mapping[str, Share]:
         turns = model.joints[joint].shortname().startswith("JointModelR")
         widest = _TURN - 1e-9 if turns else _WIDEST
         if 0.0 < upper - lower < widest and name not in unlimited:
-            found[name.replace("/", ".")] = _of_joint(model, joint, index, (lower, upper))
+            found[node_name(name)] = _of_joint(model, joint, index, (lower, upper))
     return found
 
 
@@ -82,7 +87,7 @@ def _of_joint(model: pin.Model, joint: int, index: int, limits: tuple[float, flo
     parent, before = model.parents[joint], model.jointPlacements[joint]
     lower, upper = limits
 
-    def share(state: State, data: pin.Data) -> tuple[Array, float]:
+    def share(state: MotionState, data: pin.Data) -> tuple[Array, float]:
         used = abs(2.0 * (state.q[index] - lower) / (upper - lower) - 1.0)
         # Half way along a sliding joint; where a turning one is.
         rest = (data.oMi[parent] * before).translation
@@ -91,8 +96,8 @@ def _of_joint(model: pin.Model, joint: int, index: int, limits: tuple[float, flo
     return share
 
 
-def _of_balls(robot: RPSRobot) -> Mapping[str, Share]:
-    """Return the spherical joints of a 3-RPS, if their cones have a limit."""
+def _of_spherical_joints(robot: RPSRobot) -> Mapping[str, Share]:
+    """Return the shares of a 3-RPS's spherical joints, if their cones have a limit."""
     p, model = robot.parameters, robot.mechanism.model
     if p.spherical_cone_limit >= np.pi:
         return {}
@@ -102,7 +107,7 @@ def _of_balls(robot: RPSRobot) -> Mapping[str, Share]:
     def of_leg(leg: int) -> Share:
         frame = model.getFrameId(f"platform_ball_{leg}")
 
-        def share(state: State, data: pin.Data) -> tuple[Array, float]:
+        def share(state: MotionState, data: pin.Data) -> tuple[Array, float]:
             turn = np.array(data.oMi[platform].rotation)
             cone = cone_angles(state.q[angles], turn, p.spherical_rest_angle)
             used = float(cone[leg - 1] / p.spherical_cone_limit)

@@ -1,6 +1,6 @@
 """Layer ``reactions``: the forces in the closed joints, on the first frame's side.
 
-Where rows are redundant the reactions are not unique; those shown are of least norm.
+Where constraint rows are redundant the reactions are not unique; those of least norm are shown.
 """
 
 from __future__ import annotations
@@ -15,25 +15,27 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
 from rps_pin.errors import InputError, SingularityError
-from rps_pin.viewer.layers.arrows import Sized, Vectors, arrows_drawing
-from rps_pin.viewer.layers.base import Context, Drawing, Framed
-from rps_pin.viewer.layers.shapes import SKY, arrow
-from rps_pin.viewer.motion import State
+from rps_pin.viewer.layers.arrows import ArrowKind, Vectors, draw_arrows
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, RobotSizedLayer
+from rps_pin.viewer.layers.colours import SKY
+from rps_pin.viewer.layers.parts import arrow
+from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.scene.links import node_name
 
 
 @dataclass(frozen=True)
-class Reactions(Framed):
+class Reactions(RobotSizedLayer):
     """Forces (not moments) in the closures; of a 3-RPS, of each leg on the platform.
 
     Parameters
     ----------
     newtons_per_metre
-        What an arrow of 1 m stands for, N. Left out: a round number.
+        Force of an arrow of 1 m, N. Default: a round number.
     """
 
     newtons_per_metre: float | None = None
 
-    def draw(self, context: Context) -> Drawing:
+    def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the arrows; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
         data, outside = model.createData(), context.motion.wrenches
@@ -43,9 +45,9 @@ class Reactions(Framed):
             if isinstance(closure, LoopClosure)
         }
         if not frames:
-            raise InputError("layer 'reactions': the mechanism closes no frames")
+            raise InputError("layer 'reactions': the mechanism has no loop closures")
 
-        def vectors(state: State) -> Vectors:
+        def vectors(state: MotionState) -> Vectors:
             try:
                 forces = _constraint_forces(mechanism, state, outside)
             except SingularityError:
@@ -53,19 +55,19 @@ class Reactions(Framed):
             wrenches = mechanism.closure_wrenches(state.q, forces)
             pin.framesForwardKinematics(model, data, state.q)
             return {
-                _node(name): (np.array(data.oMf[frame].translation), wrenches[name][:3])
+                node_name(name): (np.array(data.oMf[frame].translation), wrenches[name][:3])
                 for name, frame in frames.items()
             }
 
-        sized = {_node(name): Sized(arrow, "N") for name in frames}
-        given = {"N": self.newtons_per_metre}
-        return arrows_drawing(
-            "reactions", "forces in the closed joints", SKY, context, sized, vectors, given
+        kinds = {node_name(name): ArrowKind(arrow, "N") for name in frames}
+        scales = {"N": self.newtons_per_metre}
+        return draw_arrows(
+            "reactions", "forces in the closed joints", SKY, context, kinds, vectors, scales
         )
 
 
 def _constraint_forces(
-    mechanism: ClosedLoopModel, state: State, wrenches: Mapping[str, ArrayLike]
+    mechanism: ClosedLoopModel, state: MotionState, wrenches: Mapping[str, ArrayLike]
 ) -> Array:
     q, v, a, tau, known = state
     if known is not None:
@@ -73,7 +75,3 @@ def _constraint_forces(
     if tau is not None:
         return mechanism.constraint_forces(q, v, a, tau, wrenches=wrenches)
     return mechanism.inverse_dynamics(q, v, a, wrenches=wrenches).constraint_forces
-
-
-def _node(closure: str) -> str:
-    return closure.replace("/", ".")

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import meshcat.geometry as mg
 import numpy as np
 import trimesh
 
-from rps_pin.viewer.layers.base import Context, Drawing, Framed, Look, Part
-from rps_pin.viewer.layers.colours import warning, warning_bar
-from rps_pin.viewer.layers.shapes import at, css, paint
-from rps_pin.viewer.motion import State
-from rps_pin.viewer.scene.legend import Key
+from rps_pin.viewer.layers.base import (
+    DrawnLayer,
+    LayerContext,
+    NodeState,
+    RobotSizedLayer,
+)
+from rps_pin.viewer.layers.colours import BLUE, WARNING, colour_bar, css, warning
+from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.scene.legend import LegendEntry
+from rps_pin.viewer.scene.shapes import Material, Part, TriangleMesh, translated
 
 
 @dataclass(frozen=True)
-class Singularity(Framed):
-    """A ring around the robot: blue where all is well, vermillion at a parallel singularity.
+class Singularity(RobotSizedLayer):
+    """A ring around the robot: blue when well conditioned, vermillion at a type II singularity.
 
     The measure is 1 / `ClosedLoopModel.condition`, 1 at best, 0 at a singularity, on a scale of
     logarithms.
@@ -30,20 +34,20 @@ class Singularity(Framed):
 
     worst: float = 1e-3
 
-    def draw(self, context: Context) -> Drawing:
+    def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the ring; see `Layer`."""
         mechanism, box = context.subject.mechanism, context.box
         reach = 1.25 * float((box.upper - box.lower)[:2].max()) / 2.0
         ring = trimesh.creation.annulus(0.94 * reach, reach, 0.004 * box.radius, sections=72)
-        geometry = mg.TriangularMeshGeometry(ring.vertices, ring.faces)
-        place = at(np.array([*box.centre[:2], box.lower[2]]))
-        parts = [Part("ring", "annulus", geometry, paint(0xFFFFFF), np.eye(4))]
+        surface = TriangleMesh(np.array(ring.vertices), np.array(ring.faces))
+        place = translated([*box.centre[:2], box.lower[2]])
+        parts = [Part("ring", "annulus", surface, Material(0xFFFFFF), np.eye(4))]
 
-        def follow(state: State) -> dict[str, Look]:
+        def update(state: MotionState) -> dict[str, NodeState]:
             measure = 1.0 / max(mechanism.condition(state.q), 1.0)
             share = np.log(max(measure, self.worst)) / np.log(self.worst)
-            return {"ring": Look(place, warning(float(share)))}
+            return {"ring": NodeState(place, warning(float(share)))}
 
         text = "distance to a singularity, 1 / condition number"
-        bar = warning_bar("1: best", f"{self.worst:g}: singular")
-        return Drawing(Key("singularity", text, css(0x0072B2), bar), parts, follow)
+        bar = colour_bar(WARNING, "1: best", f"{self.worst:g}: singular")
+        return DrawnLayer(LegendEntry("singularity", text, css(BLUE), bar), parts, update)

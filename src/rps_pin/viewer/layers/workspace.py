@@ -1,27 +1,32 @@
-"""Layer ``workspace``: where the platform's centre can go, as a surface with a colour map."""
+"""Layer ``workspace``: the positions that the platform's centre can reach, as a surface."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import meshcat.geometry as mg
 import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.rps.workspace import Workspace, boundary, leg_grid, workspace
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
-from rps_pin.viewer.layers.base import Context, Drawing, Framed, Part
-from rps_pin.viewer.layers.colours import field_bar, field_colours
-from rps_pin.viewer.layers.shapes import round_number
-from rps_pin.viewer.scene.legend import Key
+from rps_pin.viewer.layers.base import (
+    DrawnLayer,
+    LayerContext,
+    RobotSizedLayer,
+    check_magnification,
+)
+from rps_pin.viewer.layers.colours import FIELD, colour_bar, field_colours
+from rps_pin.viewer.scene.legend import LegendEntry
+from rps_pin.viewer.scene.shapes import Material, Part, TriangleMesh
+from rps_pin.viewer.scene.stage import round_number
 
 _WIDTH = 0.7
 """Width that the surface is magnified to, at most, in radii of the picture."""
 
 
 @dataclass(frozen=True)
-class WorkspaceSurface(Framed):
+class WorkspaceSurface(RobotSizedLayer):
     """The boundary of a 3-RPS's workspace in positions, coloured by conditioning.
 
     x and y are magnified about the robot's axis; z is not. The surface passes through itself where
@@ -30,21 +35,20 @@ class WorkspaceSurface(Framed):
     Parameters
     ----------
     workspace
-        One that was computed. Left out: on a grid of 25 leg lengths each over the stroke.
+        A computed workspace. Default: one on a grid of 25 leg lengths each over the stroke.
     factor
-        Magnification of x and y, at least 1. Left out: a round number.
+        Magnification of x and y, at least 1. Default: a round number.
     """
 
     workspace: Workspace | None = None
     factor: float | None = None
 
-    def draw(self, context: Context) -> Drawing:
+    def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the surface; see `Layer`."""
         robot = context.subject.robot
         if robot is None:
             raise InputError("layer 'workspace': only a 3-RPS has one")
-        if self.factor is not None and not 1.0 <= self.factor < np.inf:
-            raise InputError(f"layer 'workspace': factor = {self.factor}; it must be at least 1")
+        check_magnification(self.factor, "workspace")
         found = self.workspace
         if found is None:
             found = workspace(robot, leg_grid(robot.parameters, 25))
@@ -53,21 +57,13 @@ class WorkspaceSurface(Framed):
         points = np.array(surface.vertices)
         width = float(np.linalg.norm(np.ptp(points[:, :2], axis=0)))
         factor = self.factor or max(1.0, round_number(_WIDTH * context.radius / width))
-        geometry = mg.TriangularMeshGeometry(
-            points * [factor, factor, 1.0], np.array(surface.faces), colour
-        )
-        material = mg.MeshPhongMaterial(
-            color=0xFFFFFF,
-            vertexColors=True,
-            opacity=0.55,
-            depthWrite=False,
-            depthTest=False,  # it lies about the platform, which would hide it
-            specular=0x101010,
-        )
+        mesh = TriangleMesh(points * [factor, factor, 1.0], np.array(surface.faces), colour)
+        # On top: it lies about the platform, which would hide it.
+        material = Material(0xFFFFFF, opacity=0.55, on_top=True)
         text = f"workspace of the centre, x and y magnified {factor:g} times: 1 / condition"
-        bar = field_bar(f"{low:.2g}", f"{high:.2g}")
-        part = Part("surface", "boundary", geometry, material, np.eye(4))
-        return Drawing(Key("workspace", text, bar.colours[3], bar), [part])
+        bar = colour_bar(FIELD, f"{low:.2g}", f"{high:.2g}")
+        part = Part("surface", "boundary", mesh, material, np.eye(4))
+        return DrawnLayer(LegendEntry("workspace", text, bar.colours[3], bar), [part])
 
 
 def _colours(found: Workspace, poses: Array) -> tuple[Array, float, float]:

@@ -1,4 +1,4 @@
-"""The box that a robot fills."""
+"""Bounding box of a robot over a motion."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from rps_pin.errors import InputError
 from rps_pin.viewer.scene.links import Link, link_poses
 
 _SIDES = 16
-"""Of the prism that stands for a cylinder."""
+"""Of the prism around a cylinder."""
 
 
-class Box(NamedTuple):
+class BoundingBox(NamedTuple):
     """An axis-aligned box in the world frame, in metres."""
 
     lower: Array
@@ -35,7 +35,7 @@ class Box(NamedTuple):
         return (self.lower + self.upper) / 2.0
 
 
-def bounding_box(model: pin.Model, links: Sequence[Link], configurations: Array) -> Box:
+def bounding_box(model: pin.Model, links: Sequence[Link], configurations: Array) -> BoundingBox:
     """Return a box that holds every link at every configuration.
 
     A cylinder counts with the prism around it, others with their own bounding boxes, so the result
@@ -53,7 +53,7 @@ def bounding_box(model: pin.Model, links: Sequence[Link], configurations: Array)
     Raises
     ------
     InputError
-        If the robot has nothing to draw, or what it has is of no size.
+        If the robot has no visual geometry, or its box has no size.
     """
     if not links:
         raise InputError("the robot has no visual geometry: there is nothing to show")
@@ -63,7 +63,7 @@ def bounding_box(model: pin.Model, links: Sequence[Link], configurations: Array)
     )
     lower, upper = corners.min(axis=0), corners.max(axis=0)
     radius = float(np.linalg.norm(corners - (lower + upper) / 2.0, axis=1).max())
-    box = Box(lower, upper, radius)
+    box = BoundingBox(lower, upper, radius)
     if not np.isfinite(box.radius) or box.radius <= 0.0:
         raise InputError(f"the robot's bounding box has radius {box.radius} m: it cannot be shown")
     return box

@@ -1,21 +1,13 @@
-"""The key of the layers, as the page shows it: what each is, and in what scale.
-
-The key travels as the ``userData`` of the world's node, a place that three.js leaves to its users:
-our pages draw it, and Meshcat's own take no notice.
-"""
+"""Legend of the layers: an entry for each, with its scale and the meaning of its colours."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-
-from rps_pin.viewer.scene.stage import WORLD
-from rps_pin.viewer.server.window import RawCommand
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class ColourBar:
-    """Colours from one end to the other, and what the ends mean."""
+    """Colours from the lowest value to the highest, and what these are."""
 
     colours: tuple[str, ...]
     """As ``#rrggbb``, evenly spaced."""
@@ -26,8 +18,8 @@ class ColourBar:
 
 
 @dataclass(frozen=True)
-class Key:
-    """One line of the key."""
+class LegendEntry:
+    """One line of the legend."""
 
     name: str
     """The layer's name: its node below ``/world/layers``."""
@@ -35,31 +27,5 @@ class Key:
     """What it shows, with its scale: plain text."""
     colour: str = "#888888"
     """``#rrggbb``, of the swatch."""
-    bar: ColourBar | None = field(default=None)
-    """Where colours mean something."""
-
-
-def legend_command(keys: Sequence[Key], visible: Sequence[bool]) -> RawCommand:
-    """Return the command that puts the key on the page."""
-    entries = [
-        {
-            "name": key.name,
-            "text": key.text,
-            "colour": key.colour,
-            "visible": shown,
-            **(
-                {"colours": list(key.bar.colours), "low": key.bar.low, "high": key.bar.high}
-                if key.bar
-                else {}
-            ),
-        }
-        for key, shown in zip(keys, visible, strict=True)
-    ]
-    return RawCommand(
-        {
-            "type": "set_property",
-            "path": WORLD,
-            "property": "userData",
-            "value": {"layers": entries},
-        }
-    )
+    bar: ColourBar | None = None
+    """For layers whose colours are a scale."""

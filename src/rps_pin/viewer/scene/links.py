@@ -1,22 +1,23 @@
-"""A robot's links: what moves as one, with the geometries that it carries."""
+"""Links of a robot: frames that carry geometry and move as one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
+from rps_pin.viewer.scene.shapes import Material, Part, drawn_shapes, material_of
 
-FIXED_JOINT = 0
-"""Pinocchio's index of the universe: what hangs on it never moves."""
+UNIVERSE = 0
+"""Pinocchio's index of the joint that never moves."""
 
 
 @dataclass(frozen=True)
 class Link:
-    """One link that has something to draw."""
+    """A link with visual geometry."""
 
     name: str
     """Its name in the scene tree: the link's own, made unique and free of ``/``."""
@@ -25,45 +26,53 @@ class Link:
     placement: pin.SE3
     """Pose of the link's frame in the joint's frame."""
     geometries: tuple[pin.GeometryObject, ...]
-    """What it carries; each geometry's `placement` is in the joint's frame."""
+    """Its geometry; each one's `placement` is in the joint's frame."""
 
     @property
     def moves(self) -> bool:
         """Whether any joint lies between the link and the world."""
-        return self.joint != FIXED_JOINT
+        return self.joint != UNIVERSE
 
     def pose(self, data: pin.Data) -> pin.SE3:
         """Return the link's pose in the world from `data` after forward kinematics."""
         return data.oMi[self.joint] * self.placement
 
+    def parts(self, material: Material | None = None) -> list[Part]:
+        """Return the parts that draw the link, in its own material or in another one."""
+        parts: list[Part] = []
+        for item in self.geometries:
+            in_link = self.placement.actInv(item.placement).homogeneous
+            for shape, placement in drawn_shapes(item):
+                name = node_name(item.name, [part.name for part in parts])
+                own = material_of(item) if material is None else material
+                parts.append(Part(self.name, name, shape, own, in_link @ placement))
+        return parts
+
 
 def links_of(model: pin.Model, visual: pin.GeometryModel) -> list[Link]:
     """Group a visual model's geometries by the link that carries them.
 
-    A geometry that names no link (one added by hand) is grouped under its joint.
+    A geometry without a parent frame is grouped under its joint.
     """
     carried: dict[tuple[int, int | None], list[pin.GeometryObject]] = {}
     for item in visual.geometryObjects:
         frame = int(item.parentFrame)
-        known = 0 < frame < model.nframes
-        key = (int(item.parentJoint), frame if known else None)
+        key = (int(item.parentJoint), frame if 0 < frame < model.nframes else None)
         carried.setdefault(key, []).append(item)
 
     links: list[Link] = []
-    taken: set[str] = set()
     for (joint, frame_index), items in carried.items():
         if frame_index is None:
             label, placement = model.names[joint], pin.SE3.Identity()
         else:
             label = model.frames[frame_index].name
             placement = model.frames[frame_index].placement
-        name = node_name(label, taken)
-        taken.add(name)
+        name = node_name(label, [link.name for link in links])
         links.append(Link(name, joint, placement.copy(), tuple(items)))
     return links
 
 
-def node_name(label: str, taken: set[str]) -> str:
+def node_name(label: str, taken: Collection[str] = ()) -> str:
     """Return a scene-tree name for `label`: not empty, without ``/``, not in `taken`."""
     base = label.replace("/", ".") or "unnamed"
     name, count = base, 1
@@ -73,11 +82,7 @@ def node_name(label: str, taken: set[str]) -> str:
     return name
 
 
-def link_poses(
-    model: pin.Model,
-    links: Sequence[Link],
-    configurations: Array,
-) -> Array:
+def link_poses(model: pin.Model, links: Sequence[Link], configurations: Array) -> Array:
     """Return every link's pose in the world at every configuration.
 
     Parameters
@@ -85,13 +90,13 @@ def link_poses(
     model
         The robot.
     links
-        The links asked for.
-    configurations : ndarray, shape (n, nq)
+        n of its links.
+    configurations : ndarray, shape (m, nq)
         Configurations of `model`.
 
     Returns
     -------
-    ndarray, shape (n, len(links), 4, 4)
+    ndarray, shape (m, n, 4, 4)
         Homogeneous matrices, in metres.
     """
     data = model.createData()

@@ -1,53 +1,53 @@
-"""A robot on its stage, in any Meshcat window."""
+"""Scene of a robot: its links on a stage, drawn by a front end."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
 
-import meshcat
-import meshcat.geometry as mg
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.viewer.motion import FRAME_RATE, Motion, checked_configurations
-from rps_pin.viewer.scene.animation import Clip, animation_command, link_clips
 from rps_pin.viewer.scene.bounds import bounding_box
-from rps_pin.viewer.scene.links import Link, links_of, node_name
-from rps_pin.viewer.scene.objects import put_object
-from rps_pin.viewer.scene.shapes import material_of, parts_of
-from rps_pin.viewer.scene.stage import WORLD, grid_spacing, set_stage
-from rps_pin.viewer.server.window import Window
+from rps_pin.viewer.scene.keyframes import NodeKeyframes, link_keyframes
+from rps_pin.viewer.scene.links import Link, links_of
+from rps_pin.viewer.scene.stage import WORLD, grid_spacing, stage_around
+from rps_pin.viewer.writers.meshcat_writer import MeshcatWriter
+from rps_pin.viewer.writers.scene_writer import SceneWriter
+from rps_pin.viewer.writers.window import Window
 
 ROBOT = f"{WORLD}/robot"
 """Path of the node that holds the robot: one child for each link, by the link's name."""
 _MOST_FRAMED = 200
-"""How many of the configurations are looked at to frame the picture."""
+"""Configurations that the bounding box is computed from, at most."""
 
 
 class Scene:
-    """Load a robot into a window, frame it, and show it at the first configuration.
+    """A robot on its stage, shown at the first of the given configurations.
 
     Parameters
     ----------
     model
         The robot.
     visual
-        What to draw; see `rps_pin.viewer.scene.shapes.parts_of` for the shapes that can be.
+        Its geometry; see `rps_pin.viewer.scene.shapes.drawn_shapes` for the kinds of shapes.
     window
-        Where the commands go: a `Recorder`, a `LocalViewer.window`, or Meshcat's own.
+        Meshcat's window: a `Recorder`, a `LocalViewer.window`, or Meshcat's own; or another front
+        end, a `SceneWriter`.
     configurations : array_like, shape (nq,) or (n, nq)
-        What shall fit into the picture: one configuration, or those of a whole motion. A robot
-        with closed loops has no neutral configuration worth showing, so one must be given.
+        The configurations that the picture is framed for: one, or those of a whole motion. There
+        is no default: the neutral configuration of a robot with closed loops is open.
 
     Attributes
     ----------
     paths : dict of str to str
         The scene-tree path of every link that has something to draw, by the link's name there.
-    box : Box
-        What the robot fills at these configurations.
+    writer : SceneWriter
+        The front end.
+    box : BoundingBox
+        The box that the robot fills at these configurations.
     grid_spacing : float
         Distance between the lines of the floor's grid, in metres.
 
@@ -61,27 +61,24 @@ class Scene:
         self,
         model: pin.Model,
         visual: pin.GeometryModel,
-        window: Window,
+        window: Window | SceneWriter,
         configurations: ArrayLike,
     ) -> None:
         self.model = model
         self.window = window
         self._data = model.createData()
         self._links = links_of(model, visual)
-        self._view = meshcat.Visualizer(window=window)
+        self.writer: SceneWriter = MeshcatWriter(window) if isinstance(window, Window) else window
         self.paths = {link.name: f"{ROBOT}/{link.name}" for link in self._links}
 
         shown = checked_configurations(model, configurations)
-        pieces = {self.paths[link.name]: _pieces(link) for link in self._links}
+        parts = [part for link in self._links for part in link.parts()]
         stride = -(-len(shown) // _MOST_FRAMED)
         self.box = bounding_box(model, self._links, shown[::stride])
         self.grid_spacing = grid_spacing(self.box.radius)
-        set_stage(window, self.box)
-        for path, carried in pieces.items():
-            for piece in carried:
-                place = f"{path}/{piece.name}"
-                put_object(window, place, piece.drawn)
-                self._view[place].set_transform(piece.placement)
+        self.writer.set_stage(stage_around(self.box))
+        for part in parts:
+            self.writer.add_part(f"{ROBOT}/{part.node}/{part.name}", part)
         self._place(shown[0], self._links)
 
     def display(self, q: ArrayLike) -> None:
@@ -103,9 +100,13 @@ class Scene:
         self._place(rows[0], [link for link in self._links if link.moves])
 
     def animate(
-        self, motion: Motion, *, frame_rate: float = FRAME_RATE, more: Sequence[Clip] = ()
+        self,
+        motion: Motion,
+        *,
+        frame_rate: float = FRAME_RATE,
+        more: Sequence[NodeKeyframes] = (),
     ) -> None:
-        """Let the window play a motion by itself, in a loop, with Meshcat's playback controls.
+        """Let the window play a motion in a loop, with Meshcat's playback controls.
 
         Parameters
         ----------
@@ -114,7 +115,7 @@ class Scene:
         frame_rate
             Keyframes per second; between them the browser interpolates.
         more
-            What else moves, with keyframes at the same times.
+            Keyframes of other nodes, at the same times.
 
         Raises
         ------
@@ -124,35 +125,10 @@ class Scene:
         if motion.duration <= 0.0:
             raise InputError("a single configuration cannot be animated")
         elapsed, configurations = motion.sampled(frame_rate)
-        clips = link_clips(self.model, self._links, self.paths, configurations)
-        self.window.send(animation_command(elapsed, [*clips, *more]))
+        keyframes = link_keyframes(self.model, self._links, self.paths, configurations)
+        self.writer.animate(elapsed, [*keyframes, *more])
 
-    def _place(self, q: ArrayLike, links: list[Link]) -> None:
+    def _place(self, q: Array, links: Sequence[Link]) -> None:
         pin.forwardKinematics(self.model, self._data, q)
         for link in links:
-            self._view[self.paths[link.name]].set_transform(link.pose(self._data).homogeneous)
-
-
-class _Piece(NamedTuple):
-    """One Meshcat object, fixed to a link."""
-
-    name: str
-    """Its name in the scene tree, below the link."""
-    drawn: Any
-    """A ``meshcat.geometry.Mesh``."""
-    placement: Array
-    """Homogeneous 4 x 4 placement in the link's frame."""
-
-
-def _pieces(link: Link) -> list[_Piece]:
-    """Return what draws a link's geometries."""
-    pieces: list[_Piece] = []
-    taken: set[str] = set()
-    for item in link.geometries:
-        in_link = link.placement.actInv(item.placement).homogeneous
-        for part in parts_of(item):
-            name = node_name(item.name, taken)
-            taken.add(name)
-            drawn = mg.Mesh(part.geometry, material_of(item))
-            pieces.append(_Piece(name, drawn, in_link @ part.placement))
-    return pieces
+            self.writer.place(self.paths[link.name], link.pose(self._data).homogeneous)

@@ -1,38 +1,99 @@
-"""Collision-library shapes as Meshcat draws them.
+"""Shapes, materials and parts of a scene, as plain data; and those of a robot's geometry.
 
-Three differences are bridged here: Meshcat's cylinders stand along y, coal's along z; Meshcat has
-no capsule; and coal keeps half lengths.
+Lengths are in metres, and every shape has its own frame at its centre. A cylinder stands along z.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import meshcat.geometry as mg
 import numpy as np
 import pinocchio as pin
 from pinocchio import coal
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Indices
 from rps_pin.errors import InputError
 
-_Y_TO_Z: Array = np.array(
-    [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
-)
-"""Turns Meshcat's y axis onto coal's z axis."""
+
+class Box(NamedTuple):
+    """A box along the axes of its frame."""
+
+    size: tuple[float, float, float]
+    """Lengths of its edges along x, y, z."""
+
+
+class Sphere(NamedTuple):
+    """A ball."""
+
+    radius: float
+
+
+class Ellipsoid(NamedTuple):
+    """An ellipsoid along the axes of its frame."""
+
+    radii: tuple[float, float, float]
+
+
+class Cylinder(NamedTuple):
+    """A cylinder along z, or a cone with its tip up where the upper radius is zero."""
+
+    length: float
+    radius: float
+    """Of its lower end."""
+    upper_radius: float
+
+
+class TriangleMesh(NamedTuple):
+    """Triangles between vertices."""
+
+    vertices: Array
+    """Shape (n, 3)."""
+    faces: Indices
+    """Indices of vertices, shape (m, 3)."""
+    colours: Array | None = None
+    """Red, green and blue of each vertex, 0 to 1, shape (n, 3); None for the material's colour."""
+
+
+class LineSegments(NamedTuple):
+    """Straight lines between pairs of points."""
+
+    points: Array
+    """Two rows for each line, shape (2 n, 3)."""
+    colours: Array | None = None
+    """Red, green and blue of each point, 0 to 1, shape (2 n, 3); None for the material's colour."""
+
+
+Shape = Box | Sphere | Ellipsoid | Cylinder | TriangleMesh | LineSegments
+
+
+class Material(NamedTuple):
+    """Surface of a shape."""
+
+    colour: int
+    """As 0xrrggbb."""
+    opacity: float = 1.0
+    """0 is invisible, 1 hides what is behind."""
+    flat: bool = False
+    """Whether each triangle has one shade; else the surface looks rounded."""
+    on_top: bool = False
+    """Whether it is drawn over everything else, where the front end can."""
 
 
 class Part(NamedTuple):
-    """One drawable piece of a shape."""
+    """A shape with its material, fixed to a node of the scene tree."""
 
-    geometry: Any
-    """A ``meshcat.geometry.Geometry`` (an untyped library)."""
+    node: str
+    """Name of the node; empty for the robot's or layer's own node."""
+    name: str
+    """Its own name below the node."""
+    shape: Shape
+    material: Material
     placement: Array
-    """Its homogeneous 4 x 4 placement in the shape's own frame, in metres."""
+    """Homogeneous (4, 4), in the node's frame."""
 
 
-def parts_of(item: pin.GeometryObject) -> list[Part]:
-    """Return the pieces that draw a geometry.
+def drawn_shapes(item: pin.GeometryObject) -> list[tuple[Shape, Array]]:
+    """Return the shapes that draw a geometry, each with its placement in the geometry's frame.
 
     Parameters
     ----------
@@ -41,77 +102,58 @@ def parts_of(item: pin.GeometryObject) -> list[Part]:
 
     Returns
     -------
-    list of Part
-        One piece; three for a capsule.
+    list of (Shape, ndarray of shape (4, 4))
+        One shape; three for a capsule: a cylinder and a ball at either end.
 
     Raises
     ------
     InputError
-        If the shape is of another kind.
+        If the geometry is of another kind.
     """
     shape = item.geometry
     if isinstance(shape, coal.Capsule):
-        return _capsule(float(shape.halfLength), float(shape.radius))
-    geometry = _geometry_of(shape)
-    if geometry is None:
-        raise InputError(
-            f"the geometry {item.name!r} is a {type(shape).__name__}; the viewer draws boxes, "
-            "cylinders, spheres, capsules, cones, ellipsoids and triangle meshes"
-        )
-    return [_upright(geometry) if isinstance(geometry, mg.Cylinder) else _centred(geometry)]
+        half, radius = float(shape.halfLength), float(shape.radius)
+        ends = [(Sphere(radius), translated([0.0, 0.0, height])) for height in (-half, half)]
+        return [(Cylinder(2.0 * half, radius, radius), np.eye(4)), *ends]
+    return [(_single_shape(item), np.eye(4))]
 
 
-def _geometry_of(shape: coal.CollisionGeometry) -> Any:
-    """Return the one Meshcat geometry of this size, or None where there is none."""
-    geometry: Any = None
+def _single_shape(item: pin.GeometryObject) -> Shape:
+    shape = item.geometry
     match shape:
         case coal.Box():
-            geometry = mg.Box([2.0 * float(half) for half in shape.halfSide])
+            x, y, z = (2.0 * float(half) for half in shape.halfSide)
+            return Box((x, y, z))
         case coal.Sphere():
-            geometry = mg.Sphere(float(shape.radius))
+            return Sphere(float(shape.radius))
         case coal.Ellipsoid():
-            geometry = mg.Ellipsoid([float(radius) for radius in shape.radii])
+            a, b, c = (float(radius) for radius in shape.radii)
+            return Ellipsoid((a, b, c))
         case coal.Cylinder():
-            geometry = mg.Cylinder(2.0 * float(shape.halfLength), float(shape.radius))
+            return Cylinder(2.0 * float(shape.halfLength), float(shape.radius), float(shape.radius))
         case coal.Cone():
-            height, radius = 2.0 * float(shape.halfLength), float(shape.radius)
-            geometry = mg.Cylinder(height, radiusTop=0.0, radiusBottom=radius)
+            return Cylinder(2.0 * float(shape.halfLength), float(shape.radius), 0.0)
         case coal.BVHModelBase() if shape.num_tris > 0:
-            geometry = _mesh(shape)
-    return geometry
-
-
-def material_of(item: pin.GeometryObject) -> Any:
-    """Return a shaded Meshcat material in the geometry's colour and opacity (`meshColor`)."""
-    red, green, blue, opacity = (float(value) for value in np.clip(item.meshColor, 0.0, 1.0))
-    colour = (round(255 * red) << 16) | (round(255 * green) << 8) | round(255 * blue)
-    # A mesh shares its vertices between faces: smooth shading would round off a machine's edges.
-    flat = isinstance(item.geometry, coal.BVHModelBase)
-    return mg.MeshPhongMaterial(
-        color=colour, opacity=opacity, flatShading=flat, specular=0x303030, shininess=40
+            # coal has applied the URDF's scale to the vertices already.
+            triangles = (shape.tri_indices(index) for index in range(shape.num_tris))
+            faces = np.array([[triangle[0], triangle[1], triangle[2]] for triangle in triangles])
+            return TriangleMesh(shape.vertices(), faces)
+    raise InputError(
+        f"the geometry {item.name!r} is a {type(shape).__name__}; the viewer draws boxes, "
+        "cylinders, spheres, capsules, cones, ellipsoids and triangle meshes"
     )
 
 
-def _centred(geometry: Any) -> Part:
-    return Part(geometry, np.eye(4))
+def material_of(item: pin.GeometryObject) -> Material:
+    """Return a material with the geometry's colour and opacity (`meshColor`)."""
+    red, green, blue, opacity = (float(value) for value in np.clip(item.meshColor, 0.0, 1.0))
+    colour = (round(255 * red) << 16) | (round(255 * green) << 8) | round(255 * blue)
+    # Faces of a mesh share their vertices: smooth shading would round off its edges.
+    return Material(colour, opacity, flat=isinstance(item.geometry, coal.BVHModelBase))
 
 
-def _upright(geometry: Any) -> Part:
-    return Part(geometry, _Y_TO_Z)
-
-
-def _capsule(half_length: float, radius: float) -> list[Part]:
-    """Return a cylinder along z with a ball at either end."""
-    ends = []
-    for height in (-half_length, half_length):
-        placement = np.eye(4)
-        placement[2, 3] = height
-        ends.append(Part(mg.Sphere(radius), placement))
-    return [_upright(mg.Cylinder(2.0 * half_length, radius)), *ends]
-
-
-def _mesh(shape: coal.BVHModelBase) -> Any:
-    """Return a mesh's triangles; coal has applied the URDF's scale to them already."""
-    triangles = (shape.tri_indices(index) for index in range(shape.num_tris))
-    corners = np.array([[triangle[0], triangle[1], triangle[2]] for triangle in triangles])
-    return mg.TriangularMeshGeometry(shape.vertices(), corners)
+def translated(point: Array | list[float]) -> Array:
+    """Return the placement (4, 4) at a point, not rotated."""
+    placement = np.eye(4)
+    placement[:3, 3] = point
+    return placement

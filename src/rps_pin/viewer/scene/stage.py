@@ -1,158 +1,128 @@
-"""What stands around a robot: camera, light, background, floor and grid.
+"""Stage of a scene, as plain data: camera, lights, background, grid and floor around a robot.
 
-Meshcat's camera always turns about the origin of its scene, and its lights, clipping planes and
-zoom suit something about a metre large. So the world hangs in one node, ``/world``, which moves
-the middle of the robot to that origin and scales the robot to radius one; whatever its real size,
-the same stage fits. Everything inside ``/world`` is in metres, in the world frame.
+Camera and lights are given in radii of the sphere around the robot, from its centre, so that one
+stage suits robots of every size. Grid, axes and floor are in metres, in the world frame.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-import meshcat
-import meshcat.geometry as mg
 import numpy as np
-from numpy.typing import NDArray
 
 from rps_pin.arrays import Array
-from rps_pin.viewer.scene.bounds import Box
-from rps_pin.viewer.scene.objects import put_object
-from rps_pin.viewer.server.window import RawCommand, Window
+from rps_pin.viewer.scene.bounds import BoundingBox
+from rps_pin.viewer.scene.shapes import LineSegments, Material, Part
 
 WORLD = "/world"
-"""Path of the node whose inside is the world frame in metres."""
+"""Path of the node whose frame is the world frame, in metres."""
 
 _FIELD_OF_VIEW = 30.0
-"""Vertical angle of the camera, in degrees: narrow, for little distortion."""
-_CAMERA_AZIMUTH = math.radians(-55.0)
-_CAMERA_ELEVATION = math.radians(22.0)
-_CAMERA_DISTANCE = 1.02 / math.sin(math.radians(_FIELD_OF_VIEW / 2.0))
-"""In radii of the robot: where the sphere around it just fits into the picture's height."""
-_CAMERA = "/Cameras/default/rotated/<object>"
-
-_TOP_COLOUR = (0.86, 0.90, 0.94)
-_BOTTOM_COLOUR = (0.99, 0.99, 1.0)
-_GRID_COLOUR = 0xB4BDC8
+_AZIMUTH, _ELEVATION = math.radians(-55.0), math.radians(22.0)
+_DISTANCE = 1.02 / math.sin(math.radians(_FIELD_OF_VIEW / 2.0))
+"""Of the camera, in radii of the robot: its sphere just fits into the picture's height."""
 _GRID_RADIUS = 2.6
-"""Radius of the grid's disc, in radii of the robot."""
-_SHADOW_DARKNESS = 0.16
+"""Of the grid's disc, in radii of the robot."""
+
+
+class Camera(NamedTuple):
+    """A camera that looks at the robot's centre."""
+
+    field_of_view: float
+    """Vertical angle, in degrees."""
+    position: tuple[float, float, float]
+    """In radii of the robot, from its centre, world axes."""
+
+
+class Lights(NamedTuple):
+    """One lamp that casts the shadows, and weak light from elsewhere; intensities from 0 to 1."""
+
+    lamp_position: tuple[float, float, float]
+    """In radii of the robot, from its centre, world axes."""
+    lamp: float
+    ambient: float
+    fill: float
+    """From the camera's side."""
+    sides: float
+    """From -x and from +x each."""
+
+
+class Stage(NamedTuple):
+    """Everything around a robot."""
+
+    box: BoundingBox
+    """The box that the robot fills over its whole motion."""
+    camera: Camera
+    lights: Lights
+    top_colour: tuple[float, float, float]
+    """Red, green, blue of the background's upper edge, 0 to 1."""
+    bottom_colour: tuple[float, float, float]
+    shadow_opacity: float
+    """Of shadows on the floor."""
+    floor_height: float
+    """z of the floor, m."""
+    floor_size: float
+    """Length of the floor's sides, m."""
+    parts: tuple[Part, ...]
+    """The grid and the world's axes, in `WORLD`."""
+
+
+def stage_around(box: BoundingBox) -> Stage:
+    """Return the stage for a robot that fills `box`."""
+    flat = _DISTANCE * math.cos(_ELEVATION)
+    position = (
+        flat * math.cos(_AZIMUTH),
+        flat * math.sin(_AZIMUTH),
+        _DISTANCE * math.sin(_ELEVATION),
+    )
+    # Just below the robot, so that the two do not flicker through each other.
+    floor_height = float(box.lower[2]) - 0.002 * box.radius
+    lines = LineSegments(_grid_points(box, floor_height))
+    grid = Part("", "grid", lines, Material(0xB4BDC8), np.eye(4))
+    axes = Part("", "axes", _axes(0.25 * box.radius), Material(0xFFFFFF), np.eye(4))
+    return Stage(
+        box=box,
+        camera=Camera(_FIELD_OF_VIEW, position),
+        lights=Lights((1.5, -2.5, 5.0), lamp=0.5, ambient=0.5, fill=0.15, sides=0.25),
+        top_colour=(0.86, 0.90, 0.94),
+        bottom_colour=(0.99, 0.99, 1.0),
+        shadow_opacity=0.16,
+        floor_height=floor_height,
+        floor_size=2.0 * _GRID_RADIUS * box.radius,
+        parts=(grid, axes),
+    )
 
 
 def grid_spacing(radius: float) -> float:
     """Return a round spacing (1, 2 or 5 times a power of ten), about a quarter of `radius`."""
-    wanted = radius / 4.0
+    return round_number(radius / 4.0)
+
+
+def round_number(wanted: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, the largest that is not above `wanted`."""
     decade = 10.0 ** math.floor(math.log10(wanted))
     return decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= wanted * (1 + 1e-9))
 
 
-def set_stage(window: Window, box: Box) -> None:
-    """Set up camera, lights, background, floor and grid for a robot that fills `box`.
-
-    Parameters
-    ----------
-    window
-        Where the commands go.
-    box
-        The robot's bounding box, over everything that shall be in the picture.
-    """
-    _place_world(window, box)
-    _aim_camera(window)
-    _light(window)
-    _set(window, "/Background", "top_color", list(_TOP_COLOUR))
-    _set(window, "/Background", "bottom_color", list(_BOTTOM_COLOUR))
-    _set(window, "/Grid", "visible", False)
-    _set(window, "/Axes", "visible", False)
-    _lay_floor(window, box)
-    for path, lines in (
-        (f"{WORLD}/grid", _grid(box)),
-        (f"{WORLD}/axes", mg.triad(0.25 * box.radius)),
-    ):
-        put_object(window, path, lines)
-        _set(window, f"{path}/<object>", "castShadow", False)
+def length_text(length: float) -> str:
+    """Return a length in words, in a unit that suits it."""
+    if length >= 1.0:
+        return f"{length:.3g} m"
+    return f"{1e3 * length:.3g} mm" if length >= 1e-4 else f"{1e6 * length:.3g} µm"
 
 
-def _set(window: Window, path: str, name: str, value: object) -> None:
-    """Set a property; Meshcat's own command would write ``castShadow`` in small letters."""
-    message = {"type": "set_property", "path": path, "property": name, "value": value}
-    window.send(RawCommand(message))
+def _axes(length: float) -> LineSegments:
+    """Return the world's axes: x red, y green, z blue."""
+    points, colours = np.zeros((6, 3)), np.zeros((6, 3))
+    points[1::2] = length * np.eye(3)
+    colours[::2] = np.eye(3)
+    colours[1::2] = [[1.0, 0.6, 0.0], [0.6, 1.0, 0.0], [0.0, 0.6, 1.0]]  # lighter at the tips
+    return LineSegments(points, colours)
 
 
-def _place_world(window: Window, box: Box) -> None:
-    """Bring the robot's middle to the scene's origin and its radius to one."""
-    matrix = np.eye(4)
-    matrix[:3, :3] /= box.radius
-    matrix[:3, 3] = -box.centre / box.radius
-    meshcat.Visualizer(window=window)[WORLD].set_transform(matrix)
-
-
-def _aim_camera(window: Window) -> None:
-    """Put the camera in front, to the right and above; it looks at the origin by itself."""
-    flat = _CAMERA_DISTANCE * math.cos(_CAMERA_ELEVATION)
-    x, y = flat * math.cos(_CAMERA_AZIMUTH), flat * math.sin(_CAMERA_AZIMUTH)
-    z = _CAMERA_DISTANCE * math.sin(_CAMERA_ELEVATION)
-    _set(window, _CAMERA, "fov", _FIELD_OF_VIEW)
-    # The camera's parent has y up: (x, y, z) of the world is (x, z, -y) there.
-    _set(window, _CAMERA, "position", [x, z, -y])
-
-
-def _light(window: Window) -> None:
-    """Light mostly from one lamp, which casts the shadows, and fill in from the others."""
-    _set(window, "/Lights/SpotLight", "visible", True)
-    lamp = "/Lights/SpotLight/<object>"
-    _set(window, lamp, "position", [1.5, -2.5, 5.0])
-    _set(window, lamp, "intensity", 0.5)
-    _set(window, lamp, "castShadow", True)
-    _set(window, "/Lights/AmbientLight/<object>", "intensity", 0.5)
-    _set(window, "/Lights/FillLight/<object>", "intensity", 0.15)
-    for side in ("PointLightNegativeX", "PointLightPositiveX"):
-        _set(window, f"/Lights/{side}/<object>", "intensity", 0.25)
-
-
-def _lay_floor(window: Window, box: Box) -> None:
-    """Lay an invisible floor under the robot that shows nothing but shadows."""
-    size = 2.0 * _GRID_RADIUS * box.radius
-    path = f"{WORLD}/floor"
-    plane = {"uuid": "floor-plane", "type": "PlaneGeometry", "width": size, "height": size}
-    shadow = {
-        "uuid": "floor-shadow",
-        "type": "ShadowMaterial",
-        "color": 0x000000,
-        "opacity": _SHADOW_DARKNESS,
-        "transparent": True,
-    }
-    mesh = {
-        "uuid": "floor",
-        "type": "Mesh",
-        "geometry": plane["uuid"],
-        "material": shadow["uuid"],
-        "matrix": np.eye(4).flatten().tolist(),
-    }
-    floor = {
-        "metadata": {"version": 4.5, "type": "Object"},
-        "geometries": [plane],
-        "materials": [shadow],
-        "object": mesh,
-    }
-    window.send(RawCommand({"type": "set_object", "path": path, "object": floor}))
-    matrix = np.eye(4)
-    matrix[:3, 3] = [box.centre[0], box.centre[1], _floor_height(box)]
-    meshcat.Visualizer(window=window)[path].set_transform(matrix)
-
-
-def _floor_height(box: Box) -> float:
-    """Return the floor's z: just below the robot, so that the two never flicker through."""
-    return float(box.lower[2]) - 0.002 * box.radius
-
-
-def _grid(box: Box) -> mg.LineSegments:
-    """Return a disc of grid lines on the floor, at whole multiples of the spacing."""
-    material = mg.LineBasicMaterial(color=_GRID_COLOUR)
-    return mg.LineSegments(mg.PointsGeometry(_grid_points(box).T), material)
-
-
-def _grid_points(box: Box) -> NDArray[np.float32]:
-    """Return the ends of the grid's lines, two rows for each line, shape (2 m, 3)."""
+def _grid_points(box: BoundingBox, height: float) -> Array:
+    """Return a disc of lines at whole multiples of the spacing, two rows each, shape (2 n, 3)."""
     spacing, reach = grid_spacing(box.radius), _GRID_RADIUS * box.radius
     points: list[Array] = []
     for across, along in ((0, 1), (1, 0)):
@@ -162,8 +132,8 @@ def _grid_points(box: Box) -> NDArray[np.float32]:
             offset = index * spacing - box.centre[across]
             half = math.sqrt(max(0.0, reach**2 - offset**2))
             for side in (-half, half):
-                point = np.full(3, _floor_height(box))
+                point = np.full(3, height)
                 point[across] = index * spacing
                 point[along] = box.centre[along] + side
                 points.append(point)
-    return np.array(points, dtype=np.float32)
+    return np.array(points)

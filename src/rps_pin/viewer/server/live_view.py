@@ -1,4 +1,4 @@
-"""The newest pose of a running loop in the browser, without disturbing the loop.
+"""Live view of a running control loop, in a process of its own.
 
 The viewer is a process of its own. Between it and the loop lies a small shared memory: the loop
 writes a pose there, which takes about a microsecond and never waits; the viewer looks at its own

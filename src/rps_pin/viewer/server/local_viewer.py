@@ -19,7 +19,7 @@ import umsgpack
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.viewer.server.store import SceneStore
 from rps_pin.viewer.server.web import Hub, application
-from rps_pin.viewer.server.window import Command
+from rps_pin.viewer.writers.window import Command
 
 HOST = "127.0.0.1"
 """The only address that is ever listened on."""

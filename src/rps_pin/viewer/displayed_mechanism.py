@@ -1,4 +1,4 @@
-"""What is shown: a mechanism, what it looks like, and the 3-RPS it may be."""
+"""Mechanism and motion of a view, from what its user gives."""
 
 from __future__ import annotations
 
@@ -18,65 +18,72 @@ from rps_pin.rps.robot import RPSRobot
 from rps_pin.viewer.motion import Motion
 
 _SAMPLE_RATE = 100.0
-"""Samples a second of a trajectory."""
+"""Samples per second of a trajectory."""
 
 
 @dataclass(frozen=True)
-class Subject:
-    """A mechanism with its shapes."""
+class DisplayedMechanism:
+    """A mechanism with its visual geometry."""
 
     mechanism: ClosedLoopModel
     """Its tree, closures and actuated joints."""
     visual: pin.GeometryModel
-    """Its shapes."""
+    """Its geometry."""
     robot: RPSRobot | None
-    """The 3-RPS that it is, or None."""
+    """The 3-RPS, if it is one."""
 
     @property
     def model(self) -> pin.Model:
         """The open tree."""
         return self.mechanism.model
 
+    @property
+    def title(self) -> str:
+        """The robot's name, for captions."""
+        if self.robot is not None:
+            return f"3-RPS {self.robot.parameters.name}"
+        return self.mechanism.name
 
-def subject_of(
+
+def displayed(
     what: RPSRobot | ClosedLoopModel, visual: pin.GeometryModel | None = None
-) -> Subject:
-    """Return what is to be shown.
+) -> DisplayedMechanism:
+    """Return a mechanism with its visual geometry.
 
     Parameters
     ----------
     what
         A 3-RPS, or any mechanism.
     visual
-        What to draw. Left out: a robot's own shapes; of a mechanism, bars between its joints.
+        Its geometry. Default: a robot's own; for a mechanism, bars between its joints.
 
     Raises
     ------
     InputError
-        If it is neither.
+        If `what` is neither.
     """
     if isinstance(what, RPSRobot):
-        return Subject(what.mechanism, visual or what.visual_model(), what)
+        return DisplayedMechanism(what.mechanism, visual or what.visual_model(), what)
     if isinstance(what, ClosedLoopModel):
-        return Subject(what, visual or skeleton(what), None)
+        return DisplayedMechanism(what, visual or skeleton(what), None)
     raise InputError(f"{type(what).__name__} cannot be shown: an RPSRobot or ClosedLoopModel can")
 
 
-def motion_of(subject: Subject, given: Any = None) -> Motion:
-    """Return the motion that is meant.
+def motion_of(subject: DisplayedMechanism, given: Any = None) -> Motion:
+    """Return the motion of a mechanism.
 
     Parameters
     ----------
     subject
-        What moves.
+        The mechanism.
     given
-        A `Motion`, a `Simulation`, a `MotionRun` or a trajectory of a 3-RPS; or what stands still:
-        a pose (3,) of a 3-RPS, or a configuration (nq,). Left out: the mechanism's home.
+        A `Motion`, a `Simulation`, a `MotionRun` or a trajectory of a 3-RPS; or one pose (3,) of a
+        3-RPS, or one configuration (nq,). Default: the mechanism's home.
 
     Raises
     ------
     InputError
-        If it does not fit the subject; a 3-RPS has no home, and needs one of these.
+        If it does not fit the mechanism, or is left out for a 3-RPS, which has no home.
     UnreachableError
         If a pose is out of reach.
     """
@@ -107,8 +114,8 @@ def motion_of(subject: Subject, given: Any = None) -> Motion:
     return Motion(model, [0.0], configuration_of(subject, given)[None])
 
 
-def configuration_of(subject: Subject, given: Any) -> Array:
-    """Return the configuration (nq,) that is meant: itself, or a pose (3,) of a 3-RPS."""
+def configuration_of(subject: DisplayedMechanism, given: Any) -> Array:
+    """Return a configuration (nq,), given as such or as a pose (3,) of a 3-RPS."""
     if subject.robot is not None and np.shape(given) == (3,):
         still = np.zeros(3)
         q: Array = subject.robot.state(given, still, still)[0]
@@ -120,7 +127,7 @@ def _one(given: Any, model: pin.Model) -> Array:
     try:
         q = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"{shown(given)} is no motion, and no configuration") from None
+        raise InputError(f"{shown(given)} is not a motion or a configuration") from None
     if q.shape != (model.nq,):
         raise InputError(
             f"a configuration of {model.name!r} has shape ({model.nq},), not {q.shape}"

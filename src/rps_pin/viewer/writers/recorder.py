@@ -1,4 +1,4 @@
-"""A Meshcat window that only remembers what it is told."""
+"""Recording of a scene's commands, for pages."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import umsgpack
 
-from rps_pin.viewer.server.window import Command
+from rps_pin.viewer.writers.window import Command
 
 
 class Recorder:

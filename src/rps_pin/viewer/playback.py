@@ -1,4 +1,4 @@
-"""A motion in real time, over and over, until somebody stops it."""
+"""Playback of a motion in real time, in a loop."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ def play(
 ) -> None:
     """Show a motion at the speed of its times, in a loop.
 
-    The picture follows the clock: a machine that is too slow skips frames and stays in time.
+    The picture follows the clock: a slow machine skips frames.
 
     Parameters
     ----------
     scene
-        Where it is shown.
+        The scene to show it in.
     times : array_like, shape (n,)
         Times in seconds, strictly increasing. With n = 1 the pose is shown and kept.
     configurations : array_like, shape (n, nq)
         The configuration at each time.
     stop
-        Set it to end the playing; without it, only an exception such as Ctrl-C's
-        `KeyboardInterrupt` does, and it is passed on.
+        An event that ends the playback. Default: it ends with an exception, such as Ctrl-C's
+        `KeyboardInterrupt`, which is passed on.
     frame_rate
         Pictures per second.
 
@@ -58,7 +58,7 @@ def play(
 def follow_clock(
     duration: float, show: Callable[[float], None], stop: threading.Event, frame_rate: float
 ) -> None:
-    """Show what belongs to the time since now, modulo the duration (s), until `stop` is set."""
+    """Call `show` with the time since now modulo the duration, s, until `stop` is set."""
     start = time.monotonic()
     while not stop.is_set():
         show((time.monotonic() - start) % duration)

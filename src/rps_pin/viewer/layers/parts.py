@@ -1,0 +1,124 @@
+"""Parts that layers are made of: arrows, axes, balls, tubes; and the placements of nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.viewer.scene.shapes import (
+    Cylinder,
+    Material,
+    Part,
+    Sphere,
+    TriangleMesh,
+    translated,
+)
+
+SMALLEST = 1e-6
+"""Scale of a node whose size is zero: with a scale of zero it would have no direction."""
+
+_SHAFT, _HEAD, _HEAD_LENGTH = 0.028, 0.07, 0.22
+"""Radii of an arrow's shaft and head, and the head's length, of an arrow of length 1."""
+
+
+def arrow(node: str, colour: int) -> list[Part]:
+    """Return an arrow from the node's origin to (0, 0, 1)."""
+    length = 1.0 - _HEAD_LENGTH
+    shaft = Cylinder(length, _SHAFT, _SHAFT)
+    return [
+        Part(node, "shaft", shaft, Material(colour), _above(length / 2)),
+        _head(node, "head", colour, 1.0 - _HEAD_LENGTH / 2),
+    ]
+
+
+def double_arrow(node: str, colour: int) -> list[Part]:
+    """Return an arrow with two heads, as moments are drawn."""
+    return [*arrow(node, colour), _head(node, "second_head", colour, 1.0 - 1.3 * _HEAD_LENGTH)]
+
+
+def _head(node: str, name: str, colour: int, height: float) -> Part:
+    return Part(node, name, Cylinder(_HEAD_LENGTH, _HEAD, 0.0), Material(colour), _above(height))
+
+
+def axes(node: str, length: float) -> list[Part]:
+    """Return the axes of a frame: x red, y green, z blue."""
+    radius = 0.022 * length
+    return [
+        Part(
+            node,
+            name,
+            Cylinder(length, radius, radius),
+            Material(colour),
+            rotation_to(axis) @ _above(length / 2),
+        )
+        for name, colour, axis in zip("xyz", (0xD62728, 0x2CA02C, 0x1F5FD0), np.eye(3), strict=True)
+    ]
+
+
+def ball(node: str, radius: float, material: Material) -> Part:
+    """Return a ball about the node's origin."""
+    return Part(node, "ball", Sphere(radius), material, np.eye(4))
+
+
+def tube(points: Array, radius: float, sides: int = 6) -> TriangleMesh:
+    """Return a tube along a line of points, shape (n, 3), n at least 2, neighbours apart."""
+    tangents = np.gradient(points, axis=0)
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    across = np.empty_like(points)
+    side = np.eye(3)[np.argmin(np.abs(tangents[0]))]
+    for index, tangent in enumerate(tangents):  # the last one, turned as little as need be
+        side = side - (side @ tangent) * tangent
+        side /= np.linalg.norm(side)
+        across[index] = side
+    other = np.cross(tangents, across)
+    turn = 2.0 * np.pi * np.arange(sides)[:, None] / sides
+    ring = np.cos(turn) * across[:, None] + np.sin(turn) * other[:, None]
+    vertices = (points[:, None] + radius * ring).reshape(-1, 3)
+    row, column = np.arange(len(points) - 1)[:, None] * sides, np.arange(sides)[None]
+    first, beside = (row + column).ravel(), (row + (column + 1) % sides).ravel()
+    faces = np.concatenate(
+        [
+            np.stack([first, beside, beside + sides], axis=1),
+            np.stack([first, beside + sides, first + sides], axis=1),
+        ]
+    )
+    return TriangleMesh(vertices, faces)
+
+
+def rotation_to(direction: Array) -> Array:
+    """Return a rotation, homogeneous (4, 4), that carries z to a unit vector."""
+    x, y, z = (float(part) for part in direction)
+    placement = np.eye(4)
+    if z < -1.0 + 1e-12:
+        placement[:3, :3] = np.diag([1.0, -1.0, -1.0])
+        return placement
+    # The shortest rotation: I + [w] + [w]^2 / (1 + z), with w = z axis x direction.
+    w = np.array([[0.0, 0, x], [0, 0, y], [-x, -y, 0.0]])
+    placement[:3, :3] = np.eye(3) + w + w @ w / (1.0 + z)
+    return placement
+
+
+def pointing(origin: Array, vector: Array) -> Array:
+    """Return the placement (4, 4) of an arrow from a point, as long as the vector, m."""
+    placement, length = _along(origin, vector)
+    placement[:3, :3] *= length
+    return placement
+
+
+def between(start: Array, end: Array) -> Array:
+    """Return the placement (4, 4) of a bar of length 1 along z that joins two points, m."""
+    placement, length = _along(start, end - start)
+    placement[:3, 2] *= length
+    return placement
+
+
+def _along(origin: Array, vector: Array) -> tuple[Array, float]:
+    """Return a placement at a point with z along a vector, and the vector's length."""
+    length = float(np.linalg.norm(vector))
+    placement = rotation_to(vector / length) if length > 0.0 else np.eye(4)
+    placement[:3, 3] = origin
+    return placement, max(length, SMALLEST)
+
+
+def _above(height: float) -> Array:
+    return translated([0.0, 0.0, height])

@@ -1,0 +1,1 @@
+"""Front ends of a scene: Meshcat for pages and the live viewer, viser for the panel."""

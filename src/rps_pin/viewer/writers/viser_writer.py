@@ -1,0 +1,199 @@
+"""viser as a front end: a scene in viser's page.
+
+Three parts of the description are left to Meshcat: shadows and reflections, which take half of the
+frames where there is no GPU; the background's colours; and drawing over everything else
+(`Material.on_top`), which viser has not. Motions are played by `View.play`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import trimesh
+
+from rps_pin.arrays import Array
+from rps_pin.errors import RPSPinError
+from rps_pin.viewer.scene.keyframes import NodeKeyframes
+from rps_pin.viewer.scene.legend import LegendEntry
+from rps_pin.viewer.scene.shapes import (
+    Box,
+    Cylinder,
+    Ellipsoid,
+    LineSegments,
+    Part,
+    Shape,
+    Sphere,
+    TriangleMesh,
+)
+from rps_pin.viewer.scene.stage import WORLD, Stage
+
+_LIGHT = math.pi
+"""viser's unit of light in Meshcat's: three.js has divided by pi since its release 155."""
+
+
+class ViserWriter:
+    """A scene in a viser server; see `SceneWriter` for the methods.
+
+    Parameters
+    ----------
+    server
+        A ``viser.ViserServer``.
+    """
+
+    def __init__(self, server: Any) -> None:
+        self._server = server
+        self._nodes: dict[str, Any] = {}
+        self._parts: dict[str, list[tuple[Any, Array]]] = {}
+        self._scales: dict[str, Array] = {}
+        self._handles: dict[str, Any] = {}
+        self._ticks: dict[str, Any] = {}
+
+    def set_stage(self, stage: Stage) -> None:
+        """Set camera and lights, and draw grid and axes."""
+        box, lights, scene = stage.box, stage.lights, self._server.scene
+        scene.configure_default_lights(enabled=False)
+        scene.configure_environment_map(None)
+        scene.add_light_ambient("/light/ambient", intensity=_LIGHT * lights.ambient)
+        position = np.asarray(stage.camera.position)
+        for name, direction, intensity in (
+            ("lamp", lights.lamp_position, lights.lamp),
+            ("fill", position, lights.fill),
+            ("side_1", (-1.0, 0.0, 0.0), lights.sides),
+            ("side_2", (1.0, 0.0, 0.0), lights.sides),
+        ):
+            scene.add_light_directional(
+                f"/light/{name}", intensity=_LIGHT * intensity, position=tuple(direction)
+            )
+        for part in stage.parts:
+            self.add_part(f"{WORLD}/{part.name}", part)
+        camera, distance = self._server.initial_camera, box.radius * np.linalg.norm(position)
+        camera.position = tuple(box.centre + box.radius * position)
+        camera.look_at = tuple(box.centre)
+        camera.fov = math.radians(stage.camera.field_of_view)
+        camera.near, camera.far = 0.01 * distance, 100.0 * distance
+
+    def add_part(self, path: str, part: Part, *, casts_shadow: bool = True) -> None:
+        """Draw a part at a path; there are no shadows here."""
+        node, scene, shape = path.rpartition("/")[0], self._server.scene, part.shape
+        self._node(node)
+        colour = tuple((part.material.colour >> shift) & 0xFF for shift in (16, 8, 0))
+        handle: Any
+        if isinstance(shape, LineSegments):
+            colours = np.full((len(shape.points), 3), colour, dtype=np.uint8)
+            if shape.colours is not None:
+                colours = np.round(255 * shape.colours).astype(np.uint8)
+            handle = scene.add_line_segments(
+                path,
+                shape.points.reshape(-1, 2, 3),
+                colours.reshape(-1, 2, 3),
+                thickness=1.0,
+                thickness_units="screen",
+            )
+        elif isinstance(shape, TriangleMesh) and shape.colours is not None:
+            alpha = np.full((len(shape.colours), 1), part.material.opacity)
+            colours = np.round(255 * np.hstack([shape.colours, alpha])).astype(np.uint8)
+            mesh = trimesh.Trimesh(
+                shape.vertices, shape.faces, vertex_colors=colours, process=False
+            )
+            handle = scene.add_mesh_trimesh(path, mesh, cast_shadow=False, receive_shadow=False)
+        else:
+            mesh = _mesh(shape)
+            opacity = part.material.opacity
+            handle = scene.add_mesh_simple(
+                path,
+                mesh.vertices,
+                mesh.faces,
+                color=colour,
+                opacity=None if opacity == 1.0 else opacity,
+                flat_shading=part.material.flat or isinstance(shape, Box | Cylinder),
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        self._handles[path] = handle
+        self._parts.setdefault(node, []).append((handle, part.placement))
+        _place(handle, part.placement)
+
+    def place(self, path: str, placement: Array) -> None:
+        """Place a node in its parent's frame."""
+        scale = np.linalg.norm(placement[:3, :3], axis=0)
+        rigid = placement.copy()
+        rigid[:3, :3] /= scale
+        _place(self._node(path), rigid)
+        # A node's scale is not inherited in viser: it goes to the node's parts.
+        if not np.allclose(scale, self._scales.get(path, 1.0), rtol=1e-12, atol=0.0):
+            self._scales[path] = scale
+            for handle, own in self._parts.get(path, []):
+                scaled = np.diag([*scale, 1.0]) @ own
+                handle.scale = tuple(np.linalg.norm(scaled[:3, :3], axis=0))
+                handle.position = tuple(scaled[:3, 3])
+
+    def set_colour(self, path: str, colour: Sequence[float], opacity: float) -> None:
+        """Colour the part at a path."""
+        handle = self._handles[path]
+        handle.color = tuple(round(255 * share) for share in colour)
+        handle.opacity = None if opacity == 1.0 else opacity
+
+    def set_visible(self, path: str, visible: bool) -> None:
+        """Show or hide a node."""
+        self._node(path).visible = visible
+
+    def set_legend(self, entries: Sequence[LegendEntry], visible: Sequence[bool]) -> None:
+        """Show a tick for each layer beside the scene, with the entry's text as its hint."""
+        for entry, shown in zip(entries, visible, strict=True):
+            if entry.name not in self._ticks:
+                tick = self._server.gui.add_checkbox(entry.name, shown, hint=_hint(entry))
+                path = f"{WORLD}/layers/{entry.name}"
+                tick.on_update(lambda event, path=path: self.set_visible(path, event.target.value))
+                self._ticks[entry.name] = tick
+            self._ticks[entry.name].value = shown
+
+    def animate(self, elapsed: Array, keyframes: Sequence[NodeKeyframes]) -> None:
+        """Refuse: viser plays no keyframes."""
+        raise RPSPinError("viser's page plays no motion by itself: use View.play, or Meshcat")
+
+    def _node(self, path: str) -> Any:
+        """Return a node's handle; it and its parents are made where they are not there."""
+        if path not in self._nodes:
+            parent = path.rpartition("/")[0]
+            if parent:
+                self._node(parent)
+            self._nodes[path] = self._server.scene.add_frame(path, show_axes=False)
+        return self._nodes[path]
+
+
+def _place(handle: Any, placement: Array) -> None:
+    x, y, z, w = pin.Quaternion(placement[:3, :3]).coeffs()
+    handle.wxyz = (w, x, y, z)
+    handle.position = tuple(placement[:3, 3])
+
+
+def _hint(entry: LegendEntry) -> str:
+    bar = entry.bar
+    return entry.text if bar is None else f"{entry.text} ({bar.low} to {bar.high})"
+
+
+def _mesh(shape: Shape) -> trimesh.Trimesh:
+    """Return a shape's surface as triangles."""
+    mesh: trimesh.Trimesh
+    match shape:
+        case Box():
+            mesh = trimesh.creation.box(shape.size)
+        case Sphere():
+            mesh = trimesh.creation.icosphere(subdivisions=3, radius=shape.radius)
+        case Ellipsoid():
+            ball = trimesh.creation.icosphere(subdivisions=3)
+            mesh = trimesh.Trimesh(ball.vertices * shape.radii, ball.faces)
+        case Cylinder():
+            half = shape.length / 2.0
+            outline = [[0.0, -half], [shape.radius, -half], [shape.upper_radius, half], [0.0, half]]
+            mesh = trimesh.creation.revolve(outline, sections=32)
+        case TriangleMesh():
+            mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
+        case _:
+            raise TypeError(f"{type(shape).__name__} is not a surface")
+    return mesh
