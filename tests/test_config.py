@@ -6,9 +6,19 @@ import time
 from pathlib import Path
 
 import pytest
+from pydantic import Field
 
-from rps_pin import InputError
-from rps_pin.config import LARGEST_FILE, read_yaml
+from rps_pin.config import (
+    LARGEST_FILE,
+    Entry,
+    Finite,
+    Positive,
+    Text,
+    Three,
+    read_config,
+    read_yaml,
+)
+from rps_pin.errors import InputError, MechanismError
 
 
 def held(folder: Path, content: str | bytes) -> Path:
@@ -98,9 +108,9 @@ def bomb(levels: int) -> str:
 @pytest.mark.parametrize(
     ("content", "why"),
     [
-        (bomb(40), "would unfold to more than"),
-        ("a: &a [*a]\n", "would unfold to more than"),
-        ("a: &a\n  b: *a\n", "would unfold to more than"),
+        (bomb(40), "would expand to more than"),
+        ("a: &a [*a]\n", "would expand to more than"),
+        ("a: &a\n  b: *a\n", "would expand to more than"),
         ("a: " + "[" * 50_000, "nested too deeply"),
         ("a: " + "{b: " * 20_000, "nested too deeply"),
         ("a: " + "- " * 50_000, "not valid YAML"),
@@ -125,3 +135,66 @@ def test_a_file_without_an_end_is_refused() -> None:
 def test_modest_aliases_and_merges_are_read(tmp_path: Path) -> None:
     text = "base: &b {x: 1}\nmore: {<<: *b, y: 2}\n" + bomb(3)
     assert read_yaml(held(tmp_path, text), "file").values["more"] == {"x": 1, "y": 2}
+
+
+class Inner(Entry):
+    """A mapping in a list."""
+
+    kind: Text
+    size: Positive = 1.0
+
+
+class Whole(Entry):
+    """A schema of every way to nest."""
+
+    name: Text
+    parts: list[Inner] = Field(default_factory=list)
+    best: Inner | None = None
+    home: dict[str, Finite | Three] = Field(default_factory=dict)
+
+
+WRONG = {
+    "name: a\nnme: b\n": "line 2: unknown key 'nme' (did you mean name?); the keys of a test are: "
+    "name, parts, best, home",
+    "name: a\nparts:\n- kind: b\n  sze: 1\n": "line 4: unknown key 'sze' (did you mean size?); the "
+    "keys of parts[0] are: kind, size",
+    "name: a\nbest: {kind: b, colour: 1}\n": "line 2: unknown key 'colour'; the keys of best are: "
+    "kind, size",
+    "parts: []\n": "a test needs name",
+    "name: a\nparts:\n- kind: b\n- {}\n": "line 4: parts[1] needs kind",
+    "nam: a\n": "line 1: unknown key 'nam' (did you mean name?)",
+    "name: a\nbest:\n  kind: b\n  size: -1\n": "line 4: best.size = -1: input should be greater",
+    "name: a\nbest:\n  kind: b\n  size: '1'\n": "line 4: best.size = '1': input should be a valid",
+    "name: a\nhome:\n  crank: .nan\n": "line 3: home.crank = nan: input should be a finite number",
+    "name: a\nhome:\n  ball: [0, 0]\n": "line 3: home.ball = [0, 0]: ",
+    "name: ''\n": "line 1: name = '': ",
+    "name: 3\n": "line 1: name = 3: input should be a valid string",
+}
+
+
+@pytest.mark.parametrize("text", WRONG)
+def test_every_schema_is_read_with_the_same_messages(tmp_path: Path, text: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_config(held(tmp_path, text), "test", Whole)
+    assert str(caught.value).startswith(f"{tmp_path / 'given.yaml'}")
+    assert WRONG[text] in str(caught.value)
+
+
+def test_a_schema_s_values_are_as_given_with_their_lines(tmp_path: Path) -> None:
+    text = "name: a\nparts: [{kind: b}]\nbest:\n  kind: c\n  size: 2\n"
+    file, whole = read_config(held(tmp_path, text), "test", Whole)
+    assert whole.parts[0].kind == "b"
+    best = file.part("best")
+    assert best.validated(Inner, "the best") == whole.best == Inner(kind="c", size=2.0)
+    assert best.place(()) == f"{tmp_path / 'given.yaml'}, line 3"
+    with pytest.raises(KeyError):
+        file.part("worst")
+
+
+def test_errors_are_told_with_their_place(tmp_path: Path) -> None:
+    file = read_yaml(held(tmp_path, "a: 1\nb: [1, 2]\n"), "file")
+    for kind in (InputError, MechanismError):
+        with pytest.raises(kind, match=r"given.yaml, line 2: so"), file.at("b", 1):
+            raise kind("so")
+    with pytest.raises(ZeroDivisionError), file.at("b"):
+        raise ZeroDivisionError

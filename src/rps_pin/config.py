@@ -1,51 +1,71 @@
-"""YAML files as data: read safely, bounded in size, each value with the line it stands on.
+"""YAML files: the one reader, and the types of values that its schemas share.
 
-Nothing in a file is run (tags that name Python objects are refused), keys given twice are refused,
-and a nest of aliases that would unfold to something huge is refused before it is unfolded.
+Files are data. Nothing in a file is run (tags that name Python objects are refused), keys given
+twice are refused, and so are nested aliases that would expand to something huge, before they are
+expanded. A schema is a pydantic model in the package that the file belongs to; messages name the
+file, the line and the key, and list the keys that are possible.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn, TypeVar, get_args
 
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, MechanismError, did_you_mean, shown
 
 #: Larger files are refused: descriptions are written by hand, and reading takes 20 s a megabyte.
 LARGEST_FILE = 200_000
-#: Most values a file may hold once its aliases are unfolded.
+#: Most values of a file, its aliases expanded.
 LARGEST_CONTENT = 100_000
+
+Text = Annotated[str, Field(min_length=1)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Three = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+
+
+class Entry(BaseModel):
+    """A mapping in a file: no other keys than its fields, no conversion of values."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+Schema = TypeVar("Schema", bound=BaseModel)
 
 
 @dataclass(frozen=True)
 class YamlFile:
-    """What a YAML file holds, and where.
+    """The values of a YAML file, and their lines.
 
     Attributes
     ----------
     values
         The file's mapping; every key is text.
     origin
-        The file as messages name it.
+        The file, for messages.
     """
 
     values: Mapping[str, Any]
     origin: str
     _root: Node
+    _line: int = 0
 
     def place(self, path: Sequence[str | int]) -> str:
         """Return ``"FILE, line N"`` of the value at a path of keys and indices.
 
         The line is that of the innermost part of the path that the file holds.
         """
-        node, line = self._root, 0
+        node, line = self._root, self._line
         for part in path:
             child = _child(node, part)
             if child is None:
@@ -53,8 +73,63 @@ class YamlFile:
             node, line = child
         return f"{self.origin}, line {line + 1}" if line or path else self.origin
 
-    def held(self, path: Sequence[str | int]) -> tuple[str | int, ...]:
-        """Return the beginning of a path that leads somewhere in the file."""
+    def part(self, key: str) -> YamlFile:
+        """Return the mapping at a key as a file of its own, with the lines of the whole."""
+        child = _child(self._root, key)
+        if child is None:
+            raise KeyError(key)
+        return YamlFile(self.values[key], self.origin, *child)
+
+    @contextmanager
+    def at(self, *path: str | int) -> Iterator[None]:
+        """Put the place of a path before the message of an `InputError`."""
+        try:
+            yield
+        except InputError as error:
+            kind = MechanismError if isinstance(error, MechanismError) else InputError
+            raise kind(f"{self.place(path)}: {error}") from None
+
+    def validated(self, schema: type[Schema], what: str, root: Sequence[str | int] = ()) -> Schema:
+        """Return the file's values as an instance of a schema.
+
+        Parameters
+        ----------
+        schema
+            The pydantic model.
+        what
+            The name of the whole in messages: ``"a mechanism"``.
+        root
+            The path whose line is told if the whole lacks a key.
+
+        Raises
+        ------
+        InputError
+            If a key is unknown (lists those that are possible) or missing, or a value is not of its
+            key's type; with the line.
+        """
+        try:
+            return schema.model_validate(dict(self.values))
+        except ValidationError as error:
+            problem = first_problem(error)
+        path, value = self._present(problem["loc"]), problem["input"]
+        key = problem["loc"][-1] if problem["loc"] else ""
+        if problem["type"] == "missing":
+            where = self.place(path or root)
+            raise InputError(f"{where}: {path_text(path) or what} needs {key}")
+        where = self.place(path)
+        if problem["type"] == "extra_forbidden":
+            keys = list(_schema_at(schema, path[:-1]).model_fields)
+            raise InputError(
+                f"{where}: unknown key {key!r}{did_you_mean(str(key), keys)}; the keys of "
+                f"{path_text(path[:-1]) or what} are: {', '.join(keys)}"
+            )
+        said = "" if isinstance(value, dict) else f" = {shown(value)}"
+        rule = problem["msg"].removeprefix("Value error, ")
+        rule = rule[0].lower() + rule[1:]
+        raise InputError(f"{where}: {path_text(path) or what}{said}: {rule}")
+
+    def _present(self, path: Sequence[str | int]) -> tuple[str | int, ...]:
+        """Return the beginning of a path that the file holds."""
         values: Any = self.values
         for depth, part in enumerate(path):
             in_list = isinstance(values, list) and isinstance(part, int) and part < len(values)
@@ -63,12 +138,47 @@ class YamlFile:
             values = values[part]
         return tuple(path)
 
-    def part(self, key: str) -> YamlFile:
-        """Return a mapping that stands at a key, as a file of its own; lines stay the file's."""
-        child = _child(self._root, key)
-        if child is None:
-            raise KeyError(key)
-        return YamlFile(self.values[key], self.origin, child[0])
+
+def read_config(
+    path: str | os.PathLike[str], what: str, schema: type[Schema]
+) -> tuple[YamlFile, Schema]:
+    """Read a YAML file of a schema; return its values with their lines, and validated.
+
+    Parameters
+    ----------
+    path
+        The file.
+    what
+        Its kind, for messages: ``"mechanism"``.
+    schema
+        A pydantic model.
+
+    Raises
+    ------
+    InputError
+        As `read_yaml` and `YamlFile.validated`.
+    """
+    file = read_yaml(path, f"{what} file")
+    return file, file.validated(schema, f"a {what}")
+
+
+def first_problem(error: ValidationError) -> Any:
+    """Return the problem to tell first: an unknown key, which may be a misspelt missing one."""
+    return min(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
+
+
+def _schema_at(schema: type[BaseModel], path: Sequence[str | int]) -> type[BaseModel]:
+    for part in path:
+        if isinstance(part, str):
+            schema = next(_schemas_in(schema.model_fields[part].annotation))
+    return schema
+
+
+def _schemas_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _schemas_in(argument)
 
 
 def path_text(path: Sequence[str | int]) -> str:
@@ -87,7 +197,7 @@ def read_yaml(path: str | os.PathLike[str], what: str) -> YamlFile:
     path
         The file.
     what
-        What the file is, for messages: ``"mechanism file"``.
+        Its kind, for messages: ``"mechanism file"``.
 
     Raises
     ------
@@ -142,13 +252,13 @@ def _reader() -> YAML:
 
 
 def _refuse_huge(root: Node, origin: str) -> None:
-    """Count every value as often as aliases repeat it, entering each once; refuse nested keys."""
+    """Count the values with their aliases expanded, each node once; refuse keys that are nests."""
     sizes: dict[int, int] = {}
 
     def size(node: Node) -> int:
         key = id(node)
         if key not in sizes:
-            sizes[key] = LARGEST_CONTENT + 1  # what a node inside itself would meet
+            sizes[key] = LARGEST_CONTENT + 1  # for a node inside itself
             for name, _ in node.value if isinstance(node, MappingNode) else ():
                 if not isinstance(name, ScalarNode):
                     _refuse_key(name, origin)
@@ -157,7 +267,7 @@ def _refuse_huge(root: Node, origin: str) -> None:
 
     if size(root) > LARGEST_CONTENT:
         raise InputError(
-            f"{origin} would unfold to more than {LARGEST_CONTENT} values, the most that is read"
+            f"{origin} would expand to more than {LARGEST_CONTENT} values, the most that is read"
         )
 
 

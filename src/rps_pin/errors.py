@@ -1,4 +1,4 @@
-"""The errors of rps_pin: one small hierarchy under one base class.
+"""Errors of rps_pin: one small hierarchy under one base class.
 
 Every message says what was asked, what is possible, and by how much it failed; the numbers are
 attributes too, so that a program need not read the sentence.
@@ -7,7 +7,8 @@ attributes too, so that a program need not read the sentence.
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from typing import Any, NamedTuple
 
 from rps_pin.arrays import Array
@@ -21,6 +22,12 @@ def shown(value: object) -> str:
     """Return a value as it was given, or the beginning of it if it is large or deeply nested."""
     text = _REPR.repr(value)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """Return ``" (did you mean x?)"`` for a misspelt name, or nothing."""
+    near = get_close_matches(name, list(names), n=1)
+    return f" (did you mean {near[0]}?)" if near else ""
 
 
 class RPSPinError(Exception):
@@ -54,7 +61,7 @@ class ParameterError(InputError):
     rule : str
         What the field has to satisfy.
     place : str
-        The file and line where it stands, if it stands in one.
+        The file and line, if it comes from a file.
     """
 
     def __init__(self, field: str, value: object, rule: str, place: str = "") -> None:

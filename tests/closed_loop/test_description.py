@@ -234,11 +234,15 @@ def test_losses_of_merged_joints_must_be_said_anew(tmp_path: Path) -> None:
 U = "urdf: four_bar.urdf\n"
 C = U + "closures:\n  - {frame_a: knee, frame_b: rocker_tip, "
 WRONG = {
-    "unknown key": (U + "gravty: 3\n", 2, "unknown key 'gravty'; the keys are: name, urdf, mjcf"),
+    "unknown key": (
+        U + "gravty: 3\n",
+        2,
+        "unknown key 'gravty' (did you mean gravity?); the keys of a mechanism are: name, urdf",
+    ),
     "unknown key inside": (
         C + "knd: rigid}\n",
         3,
-        "unknown key 'knd' in closures[0]; the keys are: frame_a, frame_b, kind, name, axis",
+        "unknown key 'knd' (did you mean kind?); the keys of closures[0] are: frame_a, frame_b",
     ),
     "missing": (U + "closures:\n  - {frame_a: knee}\n", 3, "closures[0] needs frame_b"),
     "wrong kind": (C + "kind: ball}\n", 3, "no closure kind 'ball'; there are: spherical, rigid"),
@@ -277,15 +281,15 @@ WRONG = {
         "home of 'crank_joint' (JointModelRevoluteUnaligned) has 2 numbers; it must have 1",
     ),
     "home is text": (U + "home: {crank_joint: x}\n", 2, "home.crank_joint = 'x': input should be"),
-    "home is no rotation": (
+    "home is not a rotation": (
         U + "root: free\nhome: {root_joint: [0, 0, 0, 1, 0, 0, 1]}\n",
         3,
-        "is no rotation",
+        "is not a rotation",
     ),
     "home of zeros": (
         U + "root: free\nhome: {root_joint: [0, 0, 0, 0, 0, 0, 0]}\n",
         3,
-        "is no rotation",
+        "is not a rotation",
     ),
     "root": (U + "root: loose\n", 2, "root = 'loose': input should be 'fixed' or 'free'"),
     "two files": (U + "mjcf: bars.xml\n", 2, "one of urdf and mjcf; both were given"),

@@ -137,8 +137,14 @@ def test_the_files_in_the_documents_move_from_rest_to_rest(file: Path) -> None:
         ("# what\nkind: spiral\n", ", line 2: kind = 'spiral': .* one of helix, .*lissajous, csv$"),
         ("kind: [circle]\n", r", line 1: kind = \['circle'\]: it must be one of"),
         ("kind: circle\nheight: 1\nduration: 1\n", ", line 1: kind circle needs tilt"),
-        (CIRCLE + "speed: 3\n", ", line 5: unknown key 'speed'; those of kind circle are .*tilt"),
-        ("kind: circle\nhight: 1\nduration: 1\n", ", line 2: unknown key 'hight'; .*height, tilt"),
+        (
+            CIRCLE + "speed: 3\n",
+            ", line 5: unknown key 'speed'; the keys of kind circle are: .*tilt",
+        ),
+        (
+            "kind: circle\nhight: 1\nduration: 1\n",
+            ", line 2: unknown key 'hight' .did you mean height.*height, tilt",
+        ),
         (CIRCLE.replace("0.1", "'5.0e-3'"), ", line 3: tilt = '5.0e-3': input should be a valid n"),
         (CIRCLE.replace("0.1", "steep"), ", line 3: tilt = 'steep': input should be a valid num"),
         (CIRCLE.replace("0.1", ".nan"), ", line 3: tilt = nan: input should be a finite number"),
@@ -180,9 +186,9 @@ def test_the_files_in_the_documents_move_from_rest_to_rest(file: Path) -> None:
         (SWINGS + "amplitude: [0, 0]\n", ", line 5: amplitude and lift are zero: nothing moves"),
         (SWINGS + "amplitude: [1]\n", r", line 5: amplitude = \[1\]: .*at least 2"),
         (SWINGS + "amplitude: [1, 1]\nlift: [1, 1.5]\n", r", line 6: lift\[1\] = 1.5: .*integer"),
-        (SWINGS + "amplitude: [1, 1]\nlift: [1]\n", r", line 6: lift = \[1\]: .*how often"),
-        (SWINGS + "amplitude: [1, 1]\nlift: [1, 2, 3]\n", r", line 6: lift = .*how often"),
-        (SWINGS + "amplitude: [1, 1]\nlift: !!set {0.1, 1}\n", ", line 6: lift = .*how often"),
+        (SWINGS + "amplitude: [1, 1]\nlift: [1]\n", r", line 6: lift = \[1\]: .*frequency"),
+        (SWINGS + "amplitude: [1, 1]\nlift: [1, 2, 3]\n", r", line 6: lift = .*frequency"),
+        (SWINGS + "amplitude: [1, 1]\nlift: !!set {0.1, 1}\n", ", line 6: lift = .*frequency"),
         (
             SWINGS.replace("3, 2]", "0, 2]") + "amplitude: [1, 1]\n",
             ", line 4: frequency = 0: .*whole",
@@ -191,7 +197,10 @@ def test_the_files_in_the_documents_move_from_rest_to_rest(file: Path) -> None:
         ("kind: csv\nfile: ''\n", ", line 2: file = '': "),
         (CIRCLE + "fastest: 3\n", ", line 5: fastest = 3: "),
         (CIRCLE + "fastest: {force: -3}\n", ", line 5: fastest.force = -3: .*greater than 0"),
-        (CIRCLE + "fastest:\n  power: 3\n", ", line 6: unknown key 'power'; those of fastest are"),
+        (
+            CIRCLE + "fastest:\n  power: 3\n",
+            ", line 6: unknown key 'power'; the keys of fastest are",
+        ),
         ("", " must hold 'key: value' lines"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What a mechanism looks like: the shapes of the URDF that its description names, or a skeleton."""
+"""Shapes of a mechanism: those of the URDF in its description, or a skeleton."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pinocchio import coal
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import LoopClosure
-from rps_pin.closed_loop.io.mechanism_schema import validated
+from rps_pin.closed_loop.io.mechanism_schema import Description
 from rps_pin.closed_loop.model import ClosedLoopModel
-from rps_pin.config import read_yaml
+from rps_pin.config import read_config
 from rps_pin.errors import MechanismError
 
 
@@ -39,7 +39,7 @@ def visual_model(path: str | os.PathLike[str], model: pin.Model) -> pin.Geometry
     MechanismError
         If a mesh that the URDF names cannot be.
     """
-    description = validated(read_yaml(path, "mechanism file"))
+    _, description = read_config(path, "mechanism", Description)
     if description.urdf is None:
         return None
     urdf = Path(path).parent / Path(description.urdf).expanduser()

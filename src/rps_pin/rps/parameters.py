@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from difflib import get_close_matches
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -27,8 +26,8 @@ from ruamel.yaml.comments import CommentedMap
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED
-from rps_pin.config import YamlFile, read_yaml
-from rps_pin.errors import InputError, ParameterError
+from rps_pin.config import Finite, NonNegative, Positive, YamlFile, first_problem, read_yaml
+from rps_pin.errors import InputError, ParameterError, did_you_mean
 from rps_pin.files import whole_file
 
 #: A printed table rounds its inertias (the paper's Table 1 by 0.5 %): this much of the largest
@@ -72,9 +71,6 @@ def _has_shape(value: object, shape: tuple[int, ...]) -> bool:
 _ToList = PlainSerializer(lambda array: array.tolist(), return_type=list)
 Vector3 = Annotated[np.ndarray, _array(3), _ToList]
 Matrix3 = Annotated[np.ndarray, _array(3, 3), _ToList]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Bound = Annotated[float, Field(gt=0)]  # infinity means: no bound
 Angle = Annotated[float, Field(ge=-math.pi, le=math.pi, allow_inf_nan=False)]
 
@@ -363,19 +359,16 @@ def _refuse(field: str, value: object, rule: str) -> None:
 
 
 def _parameter_error(error: ValidationError) -> ParameterError:
-    """Turn the first complaint of pydantic into ours, and name the fields there are if need be."""
-    # An unknown field first: it is often the one that is then found missing, misspelt.
-    complaints = error.errors(include_url=False)
-    first = min(complaints, key=lambda one: one["type"] != "extra_forbidden")
+    """Return pydantic's first problem as a `ParameterError`."""
+    first = first_problem(error)
     cause = first.get("ctx", {}).get("error")
     if isinstance(cause, ParameterError):
         return cause
     field, *inner = [str(part) for part in first["loc"]] or ["parameters"]
     kind, value = first["type"], first["input"]
     if kind == "extra_forbidden":
-        near = get_close_matches(field, RPSParameters.model_fields, n=1)
-        meant = f" (did you mean {near[0]}?)" if near else ""
-        rule = f"unknown field{meant}; the fields are {', '.join(RPSParameters.model_fields)}"
+        fields = list(RPSParameters.model_fields)
+        rule = f"unknown field{did_you_mean(field, fields)}; the fields are {', '.join(fields)}"
     elif kind == "missing" and not inner:
         return ParameterError(field, None, "is required and was not given")
     elif inner:

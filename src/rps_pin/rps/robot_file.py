@@ -1,4 +1,4 @@
-"""A robot by the name of a preset or the path of a parameter file."""
+"""Robots by the name of a preset or the path of a parameter file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def load_robot(name_or_file: str, folder: Path = Path()) -> RPSRobot:
     name_or_file
         The name or the path.
     folder
-        From where a relative path counts.
+        The folder that a relative path is relative to.
 
     Raises
     ------
@@ -28,7 +28,7 @@ def load_robot(name_or_file: str, folder: Path = Path()) -> RPSRobot:
         return RPSRobot.from_preset(name_or_file)
     if not (folder / name_or_file).exists():
         raise InputError(
-            f"{name_or_file!r} is no file, and no preset; the presets are: "
+            f"{name_or_file!r} is not a file or a preset; the presets are: "
             f"{', '.join(RPSParameters.presets())}"
         )
     return RPSRobot(RPSParameters.from_yaml(folder / name_or_file))

@@ -1,4 +1,4 @@
-"""Mechanisms described in a YAML file: a URDF or MJCF, its closures, what drives it.
+"""Mechanisms from YAML files: a URDF or MJCF, closures, actuated joints, effects at joints.
 
     urdf: slider_crank.urdf            # or mjcf: a file; relative to this one
     closures:
@@ -6,16 +6,16 @@
     actuated: [crank]
     home: {crank: 0.5}
 
-All keys are the fields of `Description`. Every message names the file, the line and the key.
+The keys are the fields of `Description`.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -23,14 +23,12 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure
 from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
-from rps_pin.closed_loop.io.mechanism_schema import Description, validated
+from rps_pin.closed_loop.io.mechanism_schema import Description
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts
-from rps_pin.closed_loop.io.urdf import model_from_urdf
-from rps_pin.config import YamlFile, read_yaml
+from rps_pin.closed_loop.io.urdf import parts_from_urdf
+from rps_pin.config import YamlFile, read_config
 from rps_pin.errors import InputError, MechanismError, shown
-
-Made = TypeVar("Made")
 
 #: How far a joint's given coordinates may be from a rotation's (norm of a quaternion, of a cosine
 #: and sine).
@@ -43,13 +41,12 @@ def parts_from_yaml(path: str | os.PathLike[str]) -> MechanismParts:
     Raises
     ------
     InputError
-        If the file cannot be read, is not YAML, or a value is not what its key takes.
+        If the file cannot be read, is not YAML, or a value is not of its key's type.
     MechanismError
         If what it describes does not hold together (unknown frame, joint or kind; a bad URDF or
         MJCF).
     """
-    file = read_yaml(path, "mechanism file")
-    description = validated(file)
+    file, description = read_config(path, "mechanism", Description)
     tree = _tree(file, description, Path(path))
     parts = _merged(file, description, tree)
     parts = _with_effects(file, description, parts)
@@ -75,7 +72,7 @@ def parts_from_yaml(path: str | os.PathLike[str]) -> MechanismParts:
 
 
 def _tree(file: YamlFile, description: Description, path: Path) -> MechanismParts:
-    """Return what the URDF or MJCF says, with the description's gravity and no merging yet."""
+    """Return the parts in the URDF or MJCF, before merging, with the description's gravity."""
     if (description.urdf is None) == (description.mjcf is None):
         both = description.urdf is not None
         where = file.place(("mjcf",)) if both else file.origin
@@ -87,19 +84,15 @@ def _tree(file: YamlFile, description: Description, path: Path) -> MechanismPart
         raise InputError(f"{file.place((key,))}: {key} must be the name of a file, not its text")
     if description.mjcf and description.root:
         raise MechanismError(
-            f"{file.place(('root',))}: root belongs to urdf; an MJCF says itself what is free"
+            f"{file.place(('root',))}: root belongs to urdf; an MJCF has its own free joints"
         )
     target = path.parent / Path(source).expanduser()
 
-    if description.mjcf:
-        parts = _at(file, (key,), parts_from_mjcf, target, actuated=description.actuated)
-    else:
-        model = _at(file, (key,), model_from_urdf, target, description.root or "fixed")
-        damping, friction = (
-            _losses(model.damping, model),
-            _losses(model.upperDryFrictionLimit, model),
-        )
-        parts = MechanismParts(model, name=model.name, damping=damping, friction=friction)
+    with file.at(key):
+        if description.mjcf:
+            parts = parts_from_mjcf(target, actuated=description.actuated)
+        else:
+            parts = parts_from_urdf(target, description.root or "fixed")
     if description.gravity is not None:
         model = pin.Model(parts.model)
         model.gravity.linear = np.array(description.gravity)
@@ -107,18 +100,13 @@ def _tree(file: YamlFile, description: Description, path: Path) -> MechanismPart
     return parts
 
 
-def _losses(values: Array, model: pin.Model) -> dict[str, float]:
-    """Return the damping or dry friction of a URDF's joints, by name, where there is some."""
-    found = {name: float(values[model.idx_vs[i]]) for i, name in enumerate(model.names) if i}
-    return {name: value for name, value in found.items() if value}
-
-
 def _merged(file: YamlFile, description: Description, tree: MechanismParts) -> MechanismParts:
-    """Merge joints, and let go of what was said about those that are no more."""
+    """Merge joints, and leave out the effects at those that are merged."""
     merges = _merges(file, description)
     if not merges:
         return tree
-    model = _at(file, ("merge",), merged, tree.model, merges)
+    with file.at("merge"):
+        model = merged(tree.model, merges)
     kept = set(model.names)
     changes: dict[str, Any] = {"model": model}
     for effect in EFFECTS:
@@ -131,26 +119,28 @@ def _merged(file: YamlFile, description: Description, tree: MechanismParts) -> M
                     f"what {merge.name!r} has, in {effect}"
                 )
         changes[effect] = {name: value for name, value in values.items() if name in kept}
-    for closure in tree.closures:
-        needed = closure.joint_ids if isinstance(closure, JointCoupling) else closure.frame_ids
-        _at(file, ("merge",), needed, model)
+    with file.at("merge"):
+        for closure in tree.closures:
+            needed = closure.joint_ids if isinstance(closure, JointCoupling) else closure.frame_ids
+            needed(model)
     return replace(tree, **changes)
 
 
 def _merges(file: YamlFile, description: Description) -> list[JointMerge]:
-    return [
-        _at(file, ("merge", i), JointMerge, **entry.model_dump())
-        for i, entry in enumerate(description.merge)
-    ]
+    merges = []
+    for i, entry in enumerate(description.merge):
+        with file.at("merge", i):
+            merges.append(JointMerge(**entry.model_dump()))
+    return merges
 
 
-# What is said about joints ------------------------------------------------------------------------
+# Effects at joints -------------------------------------------------------------------------------
 
 
 def _with_effects(
     file: YamlFile, description: Description, parts: MechanismParts
 ) -> MechanismParts:
-    """Lay the description's effects over those of the tree's file; set armature on a copy."""
+    """Replace effects of the tree's file by the description's; set armature on a copy."""
     joints = list(parts.model.names)[1:]
     changes: dict[str, Any] = {}
     for effect in (*EFFECTS, "armature"):
@@ -174,7 +164,7 @@ def _with_effects(
 def _home(
     file: YamlFile, description: Description, tree: MechanismParts, parts: MechanismParts
 ) -> Array | None:
-    """Return the home configuration: of the tree's file, then by joint name, before and after."""
+    """Return the home of the tree's file, with the coordinates that the description gives."""
     if tree.home is None and not description.home:
         return None
     merges = _merges(file, description)
@@ -211,8 +201,8 @@ def _set_joints(
         near = np.abs(normed - given).max() <= _NORMED
         if not (near and pin.isNormalized(model, whole, _NORMED)):  # zeros stay zeros
             raise InputError(
-                f"{where}: home of {name!r} ({joint.shortname()}) = {shown(value)} is no rotation; "
-                "a quaternion (x, y, z, w), or a cosine and a sine, has length 1"
+                f"{where}: home of {name!r} ({joint.shortname()}) = {shown(value)} is not a "
+                "rotation; a quaternion (x, y, z, w), or a cosine and a sine, has length 1"
             )
         q[joint.idx_q : joint.idx_q + joint.nq] = normed
 
@@ -234,29 +224,17 @@ def _closures(file: YamlFile, description: Description, model: pin.Model) -> lis
                     f"{file.place(where)}: {end} = {name!r}: {frames.count(name)} frames have "
                     "this name"
                 )
-        found.append(_at(file, ("closures", i), LoopClosure, **entry.model_dump()))
+        with file.at("closures", i):
+            found.append(LoopClosure(**entry.model_dump()))
     for i, coupled in enumerate(description.couplings):
-        coupling = _at(file, ("couplings", i), JointCoupling, **coupled.model_dump())
-        _at(file, ("couplings", i), coupling.joint_ids, model)
-        found.append(coupling)
+        with file.at("couplings", i):
+            coupling = JointCoupling(**coupled.model_dump())
+            coupling.joint_ids(model)
+            found.append(coupling)
     return found
 
 
 # Messages -----------------------------------------------------------------------------------------
-
-
-def _at(
-    file: YamlFile,
-    path: tuple[str | int, ...],
-    make: Callable[..., Made],
-    *arguments: Any,
-    **options: Any,
-) -> Made:
-    """Return what `make` returns; put the place in the file before what it complains of."""
-    try:
-        return make(*arguments, **options)
-    except InputError as error:
-        raise type(error)(f"{file.place(path)}: {error}") from None
 
 
 def _unknown(

@@ -13,6 +13,7 @@ from typing import Any
 import pinocchio as pin
 from lxml import etree
 
+from rps_pin.closed_loop.io.parts import MechanismParts
 from rps_pin.closed_loop.io.urdf_check import refuse_mistakes
 from rps_pin.errors import InputError, MechanismError
 
@@ -48,6 +49,24 @@ def model_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") ->
         return pin.buildModelFromXML(text)
     except (ValueError, RuntimeError) as error:
         raise MechanismError(f"{origin} is not a valid URDF: {error}") from None
+
+
+def parts_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") -> MechanismParts:
+    """Return the open tree of a URDF with the damping and dry friction of its joints.
+
+    Parameters and errors are those of `model_from_urdf`.
+    """
+    model = model_from_urdf(path_or_xml, root)
+    damping, friction = (
+        {name: float(values[model.idx_vs[i]]) for i, name in enumerate(model.names) if i}
+        for values in (model.damping, model.upperDryFrictionLimit)
+    )
+    return MechanismParts(
+        model,
+        name=model.name,
+        damping={name: value for name, value in damping.items() if value},
+        friction={name: value for name, value in friction.items() if value},
+    )
 
 
 def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:

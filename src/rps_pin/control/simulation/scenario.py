@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from rps_pin.config import YamlFile, read_yaml
+from rps_pin.config import YamlFile, read_config
 from rps_pin.control.estimator.effective_inertia import effective_inertia
 from rps_pin.control.loop.computed_torque import ComputedTorque
 from rps_pin.control.loop.controller import Controller
@@ -31,7 +31,7 @@ from rps_pin.control.simulation.encoders import Encoders
 from rps_pin.control.simulation.faults import Fault
 from rps_pin.control.simulation.loop_run import LoopRun, run_loop
 from rps_pin.control.simulation.plant import Plant
-from rps_pin.control.simulation.scenario_schema import Machine, ScenarioEntry, validated
+from rps_pin.control.simulation.scenario_schema import Machine, ScenarioEntry
 from rps_pin.control.simulation.wrong_parameters import wrong_parameters
 from rps_pin.errors import InputError
 from rps_pin.rps.dynamics.loads import Payload
@@ -150,8 +150,8 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
     RPSPinError
         If the robot or the trajectory cannot be made.
     """
-    file = read_yaml(path, "scenario")
-    entry, folder = validated(file), Path(path).parent
+    file, entry = read_config(path, "scenario", ScenarioEntry)
+    folder = Path(path).parent
     nominal = load_robot(entry.robot, folder)
     model = _changed(file, nominal, entry.controller.model, ("controller", "model"))
     machine = _changed(file, nominal, entry.plant, ("plant",))
@@ -163,10 +163,8 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
         trajectory = described_trajectory(file.part("trajectory"), folder, nominal)
     faults = []
     for number, one in enumerate(entry.faults):
-        try:
+        with file.at("faults", number):
             faults.append(Fault(**one.model_dump(exclude_none=True)))
-        except InputError as error:
-            raise InputError(f"{file.place(('faults', number))}: {error}") from None
     gains = _gains(entry, model, trajectory)
     return Scenario(entry, model, machine, trajectory, gains, tuple(faults))
 
@@ -175,10 +173,8 @@ def _changed(
     file: YamlFile, nominal: RPSRobot, machine: Machine, path: tuple[str, ...]
 ) -> RPSRobot:
     changes = machine.model_dump(exclude=_OF_PLANT, exclude_none=True)
-    try:
+    with file.at(*path):
         return RPSRobot(wrong_parameters(nominal.parameters, **changes))
-    except InputError as error:
-        raise InputError(f"{file.place(path)}: {error}") from None
 
 
 def _placed(entry: ScenarioEntry) -> Gains:

@@ -1,31 +1,21 @@
-"""The keys of a control scenario's YAML file."""
+"""Keys of a control scenario's YAML file and the types of their values."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from rps_pin.config import YamlFile, path_text
+from rps_pin.config import Entry, Finite, NonNegative, Positive, Text, Three
 from rps_pin.control.simulation.faults import Kind
-from rps_pin.errors import InputError, shown
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(gt=0, le=1)]
 Count = Annotated[int, Field(ge=0)]
-Text = Annotated[str, Field(min_length=1)]
-Three = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 OneOrThree = NonNegative | Annotated[list[NonNegative], Field(min_length=3, max_length=3)]
 
 
-class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
-
-class Machine(_Entry):
-    """What differs from the scenario's robot: factors of its masses, and its friction.
+class Machine(Entry):
+    """Differences from the scenario's robot: factors of its masses, and its friction.
 
     See `wrong_parameters`.
     """
@@ -52,7 +42,7 @@ class PlantEntry(Machine):
     seed: Count = 0
 
 
-class GainsEntry(_Entry):
+class GainsEntry(Entry):
     """See `Gains`."""
 
     proportional: OneOrThree
@@ -60,7 +50,7 @@ class GainsEntry(_Entry):
     integral: OneOrThree = 0.0
 
 
-class ControllerEntry(_Entry):
+class ControllerEntry(Entry):
     """See `ComputedTorque` and `PDControl`.
 
     Gains are given by `bandwidth` (Hz), `damping` and `integral`, as `Gains.placed` takes them; for
@@ -99,7 +89,7 @@ class ControllerEntry(_Entry):
         return self
 
 
-class FaultEntry(_Entry):
+class FaultEntry(Entry):
     """See `Fault`; times count from the start of the run."""
 
     kind: Kind
@@ -110,57 +100,14 @@ class FaultEntry(_Entry):
     offset: Three | None = None
 
 
-class ScenarioEntry(_Entry):
-    """The file: all keys."""
+class ScenarioEntry(Entry):
+    """A control scenario."""
 
     robot: Text
     trajectory: Text | dict[str, Any]
     controller: ControllerEntry
     plant: PlantEntry = PlantEntry()
-    faults: list[FaultEntry] = []
+    faults: list[FaultEntry] = Field(default_factory=list)
     period: Positive = 1e-3
     settle: NonNegative = 1.0
     duration: Positive | None = None
-
-
-_ENTRIES: dict[tuple[str, ...], type[BaseModel]] = {
-    (): ScenarioEntry,
-    ("controller",): ControllerEntry,
-    ("controller", "model"): Machine,
-    ("controller", "gains"): GainsEntry,
-    ("plant",): PlantEntry,
-    ("faults",): FaultEntry,
-}
-
-
-def validated(file: YamlFile) -> ScenarioEntry:
-    """Return the scenario that a file holds.
-
-    Raises
-    ------
-    InputError
-        If a key is unknown (lists those there are) or missing, or a value is not what its key
-        takes; with the line.
-    """
-    try:
-        return ScenarioEntry.model_validate(dict(file.values))
-    except ValidationError as error:
-        errors = error.errors(include_url=False)
-    # A key that is misspelt is unknown, and the right one missing: the first says more.
-    first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
-    path = file.held(first["loc"])
-    inside = path_text(path)
-    if first["type"] == "missing":
-        raise InputError(f"{file.place(path)}: {inside or 'a scenario'} needs {first['loc'][-1]}")
-    if first["type"] == "extra_forbidden":
-        owner = path[:-1]
-        keys = _ENTRIES[tuple(part for part in owner if isinstance(part, str))].model_fields
-        where = f" in {path_text(owner)}" if owner else ""
-        raise InputError(
-            f"{file.place(path)}: unknown key {path[-1]!r}{where}; the keys are: {', '.join(keys)}"
-        )
-    rule = first["msg"].removeprefix("Value error, ")
-    rule = rule[0].lower() + rule[1:]
-    value = first["input"]
-    said = "" if isinstance(value, dict) else f" = {shown(value)}"
-    raise InputError(f"{file.place(path)}: {inside or 'a scenario'}{said}: {rule}")

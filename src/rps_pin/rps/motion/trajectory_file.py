@@ -1,13 +1,13 @@
-"""Trajectories from files: samples in a CSV, or a YAML that says what the motion is.
+"""Trajectories from files: samples in a CSV file, or the arguments of a motion in a YAML file.
 
     kind: circle          # helix, point_to_point, spline, circle, lissajous or csv
     height: 0.223
     tilt: 0.1
     duration: 2.0
 
-The other keys are the arguments of the function that the kind is named after; units are SI. With
-``fastest: {force: 80, speed: 0.2}`` (or ``{}`` for the robot's own limits) the same curve is run
-along in the shortest time that the actuators allow.
+The other keys are the arguments of the function of that name; units are SI. With
+``fastest: {force: 80, speed: 0.2}`` (or ``{}`` for the robot's own limits) the same path takes the
+shortest time that the actuators allow.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ def load_trajectory(path: str | os.PathLike[str], robot: RPSRobot) -> Trajectory
     path
         The file.
     robot
-        Whose platform shall move: a helix depends on its size, the shortest time on its actuators.
+        The robot: a helix depends on its size, the shortest time on its actuators.
 
     Raises
     ------
     InputError
-        If the file cannot be read, its name ends otherwise, or it describes no trajectory; with the
-        file and the line where that shows.
+        If the file cannot be read, its name has another ending, or it does not describe a
+        trajectory; with the file and the line.
     RPSPinError
         If the shortest time is asked for, and the robot cannot follow the curve.
     """
@@ -75,9 +75,9 @@ def described_trajectory(file: YamlFile, folder: Path, robot: RPSRobot) -> Traje
     Parameters
     ----------
     file
-        What it holds.
+        The file.
     folder
-        From where the names of files in it count.
+        The folder that file names in it are relative to.
     robot
         As for `load_trajectory`.
 
@@ -94,7 +94,7 @@ def described_trajectory(file: YamlFile, folder: Path, robot: RPSRobot) -> Traje
 
 
 def _made(file: YamlFile, described: Described, folder: Path, robot: RPSRobot) -> Trajectory:
-    """Return what is described, as it is timed by itself."""
+    """Return the trajectory with its own law of time."""
     keys = described.model_dump(exclude={"kind", "fastest"}, exclude_none=True)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
@@ -119,7 +119,7 @@ def _called(
 
 
 def _key(file: YamlFile, message: str) -> str:
-    """Return the key that a message begins with, or else the kind."""
+    """Return the key that a message begins with, else the kind."""
     word = re.match(r"\w*", message)
     return word.group() if word and word.group() in file.values else "kind"
 
@@ -130,10 +130,8 @@ def _fastest(
     from rps_pin.rps.motion.time_optimal import time_optimal  # noqa: PLC0415 (slow to import)
 
     given = limits.model_dump(exclude_none=True)
-    try:
+    with file.at("fastest"):
         found: Trajectory = time_optimal(
             robot, trajectory, limits=replace(ActuatorLimits.of(robot.parameters), **given)
         )
-    except InputError as error:
-        raise InputError(f"{file.place(('fastest',))}: {error}") from None
     return found

@@ -1,4 +1,4 @@
-"""The keys of a trajectory's YAML file, those that the function of its kind takes."""
+"""Keys of a trajectory's YAML file, by kind: the arguments of the function of that name."""
 
 from __future__ import annotations
 
@@ -7,16 +7,13 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
-    ValidationError,
     ValidationInfo,
     field_validator,
 )
 
-from rps_pin.config import YamlFile, path_text
+from rps_pin.config import Entry, Finite, Positive, Text, Three, YamlFile
 from rps_pin.errors import InputError, shown
 from rps_pin.trajectories.sampled_path import Ends
 from rps_pin.trajectories.time_laws import Profile
@@ -34,30 +31,23 @@ def _one_or_three(value: Any) -> Any:
 
 def _size_and_number(value: Any) -> Any:
     if value is not None and not (isinstance(value, list) and len(value) == 2):
-        raise ValueError("it must be a list of two: how far, m, and how often")
+        raise ValueError("it must be a list of two: amplitude, m, and frequency")
     return value and tuple(value)
 
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Pose = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 Lift = Annotated[tuple[Finite, int] | None, BeforeValidator(_size_and_number)]
 Limit = Annotated[Any, AfterValidator(_one_or_three)]
 
 
-class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
-
-class Fastest(_Entry):
+class Fastest(Entry):
     """Limits of the actuators that replace the robot's own; see `time_optimal`."""
 
     force: Positive | None = None
     speed: Positive | None = None
 
 
-class _Described(_Entry):
+class _Described(Entry):
     kind: str
     fastest: Fastest | None = None
 
@@ -77,8 +67,8 @@ class PointToPoint(_Described):
     """See `rps_pin.trajectories.point_to_point`."""
 
     kind: Literal["point_to_point"]
-    start: Pose
-    end: Pose
+    start: Three
+    end: Three
     profile: Profile | None = None
     duration: Positive | None = None
     max_rate: Limit | None = None
@@ -90,7 +80,7 @@ class Spline(_Described):
     """See `rps_pin.trajectories.spline`."""
 
     kind: Literal["spline"]
-    poses: list[Pose]
+    poses: list[Three]
     times: list[Finite] | None = None
     duration: Positive | None = None
     profile: Profile | None = None
@@ -134,7 +124,7 @@ class Csv(_Described):
     """See `rps_pin.trajectories.read_csv`; the file's name counts from the YAML file's folder."""
 
     kind: Literal["csv"]
-    file: Annotated[str, Field(min_length=1)]
+    file: Text
     max_step: Positive | None = None
     ends: Ends | None = None
 
@@ -162,29 +152,10 @@ def validated(file: YamlFile) -> Described:
     """
     kinds = ", ".join(KINDS)
     if "kind" not in file.values:
-        raise InputError(f"{file.origin} needs the key 'kind', one of {kinds}")
+        raise InputError(f"{file.place(())} needs the key 'kind', one of {kinds}")
     kind = file.values["kind"]
     if not isinstance(kind, str) or kind not in KINDS:
         raise InputError(
             f"{file.place(('kind',))}: kind = {shown(kind)}: it must be one of {kinds}"
         )
-    model = KINDS[kind]
-    try:
-        return model.model_validate(dict(file.values))
-    except ValidationError as error:
-        errors = error.errors(include_url=False)
-    # A key that is misspelt is unknown, and the right one missing: the first says more.
-    first = min(errors, key=lambda one: one["type"] != "extra_forbidden")
-    path = file.held(first["loc"])
-    if first["type"] == "missing":
-        inside = path_text(path) if path else f"kind {kind}"
-        raise InputError(f"{file.place(path or ('kind',))}: {inside} needs {first['loc'][-1]}")
-    if first["type"] == "extra_forbidden":
-        keys, owner = (Fastest, "fastest") if path[1:] else (model, f"kind {kind}")
-        raise InputError(
-            f"{file.place(path)}: unknown key {path[-1]!r}; those of {owner} are "
-            f"{', '.join(keys.model_fields)}"
-        )
-    rule = first["msg"].removeprefix("Value error, ")
-    rule = rule[0].lower() + rule[1:]
-    raise InputError(f"{file.place(path)}: {path_text(path)} = {shown(first['input'])}: {rule}")
+    return file.validated(KINDS[kind], f"kind {kind}", ("kind",))
