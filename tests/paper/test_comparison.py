@@ -25,9 +25,9 @@ from rps_pin.paper.comparison import (
     relabelled,
 )
 from rps_pin.paper.compute import Reproduction
+from rps_pin.paper.interpretations import PathInterpretation
 from rps_pin.paper.paper_data import THIS_STUDY, ForceRange
-from rps_pin.paper.read_helix import ReadHelix
-from rps_pin.paper.readings import PathReading
+from rps_pin.paper.paper_helix import PaperHelix
 
 numbers = st.lists(st.floats(-1e4, 1e4), min_size=6, max_size=6)
 
@@ -84,7 +84,7 @@ def test_a_renamed_table_is_recognised() -> None:
 def test_table_2_s_legs_are_the_path_turned_by_a_third_of_a_turn() -> None:
     """Our legs 3, 1, 2 on branch - are legs 1, 2, 3 on a branch + that begins at phi = 120°."""
     robot = RPSRobot.from_preset("sokolov")
-    pose = ReadHelix(0.23, 0.075, 0.05, 0.4, branch="-").sample(np.linspace(0, 5, 30)).pose
+    pose = PaperHelix(0.23, 0.075, 0.05, 0.4, branch="-").sample(np.linspace(0, 5, 30)).pose
     phi = 2 * np.pi * (pose[:, 0] - 0.4) / 0.05
     beta = 2 * np.arcsin(np.sqrt(0.075 / 0.23))
     alpha = np.pi / 2 - (phi + 2 * np.pi / 3) / 2
@@ -126,12 +126,12 @@ def determinant(robot: RPSRobot, pose: np.ndarray) -> float:
 def test_crossings_are_zeros_of_the_determinant(
     height: str, helix_unit: str, branch: str, count: int
 ) -> None:
-    reading = PathReading(height, helix_unit, "radii", branch, "corrected", "corrected")  # type: ignore[arg-type]
-    result = path_result(reading, 100)
+    meant = PathInterpretation(height, helix_unit, "radii", branch, "corrected", "corrected")  # type: ignore[arg-type]
+    result = path_result(meant, 100)
     assert result.refused == SINGULAR
     assert result.parts is None
     assert result.nearest == 0
-    robot, path = RPSRobot.from_preset("sokolov"), reading.path()
+    robot, path = RPSRobot.from_preset("sokolov"), meant.path()
 
     def at(t: float) -> float:
         return determinant(robot, path.sample(t).pose)
@@ -144,7 +144,7 @@ def test_crossings_are_zeros_of_the_determinant(
 
 
 def test_what_is_out_of_reach_is_refused() -> None:
-    result = path_result(PathReading("m", "m", "radii", "+", "corrected", "corrected"), 100)
+    result = path_result(PathInterpretation("m", "m", "radii", "+", "corrected", "corrected"), 100)
     assert result.refused == OUT_OF_REACH
     assert result.parts is None
 
@@ -153,7 +153,7 @@ def test_ranges_do_not_depend_on_the_sampling(found: Reproduction) -> None:
     for result in found.paths:
         if result.parts is None:
             continue
-        finer = path_result(result.reading, 2000)
+        finer = path_result(result.interpretation, 2000)
         assert finer.parts is not None
         for coarse, fine in zip(result.parts, finer.parts, strict=True):
             one, other = force_range(coarse).numbers(), force_range(fine).numbers()

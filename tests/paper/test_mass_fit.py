@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from rps_pin import RPSParameters
 from rps_pin.paper.comparison import distance, force_range
 from rps_pin.paper.compute import COLUMNS, Reproduction
+from rps_pin.paper.interpretations import PathInterpretation
 from rps_pin.paper.lagrange import lagrange_forces
 from rps_pin.paper.mass_fit import (
     MassFit,
@@ -20,12 +21,11 @@ from rps_pin.paper.mass_fit import (
     moved_fits,
     moved_paths,
 )
-from rps_pin.paper.readings import PathReading
 
 
 def direct(found: Reproduction, fit: MassFit, mass: float, leg_mass: float) -> np.ndarray:
     """Return the forces of Table 1's robot with other masses, in Table 2's order of legs."""
-    result = next(one for one in found.paths if one.reading == fit.path)
+    result = next(one for one in found.paths if one.interpretation == fit.path)
     robot = RPSParameters.from_preset("sokolov").replace(platform_mass=mass, leg_mass=leg_mass)
     force = lagrange_forces(robot, *fit.path.path().sample(result.times)).force
     return fit.labels.sign * force[:, list(fit.labels.order)]
@@ -37,7 +37,7 @@ def test_the_best_fit_is_the_robot_s_own_forces_and_least(found: Reproduction, c
     printed = COLUMNS[column]
     force = direct(found, fit, fit.platform_mass, 0.09)
     assert_allclose(force_range(force).numbers(), fit.forces.numbers(), rtol=1e-9)
-    parts = next(one.parts for one in found.paths if one.reading == fit.path)
+    parts = next(one.parts for one in found.paths if one.interpretation == fit.path)
     assert parts is not None
     assert_allclose(forces_of_fit(parts, fit), force, atol=1e-9 * np.abs(force).max())
     for factor in (0.5, 0.9, 0.99, 1.01, 1.1, 2.0):
@@ -51,7 +51,7 @@ def test_the_best_fit_is_the_robot_s_own_forces_and_least(found: Reproduction, c
 
 def test_masses_that_made_the_forces_are_found_again(found: Reproduction) -> None:
     best = found.fits["This study"].fits[0]
-    parts = next(one.parts for one in found.paths if one.reading == best.path)
+    parts = next(one.parts for one in found.paths if one.interpretation == best.path)
     assert parts is not None
     made = force_range(direct(found, best, 3.7, 0.09))
     fit = fit_mass(best.path, parts, made)
@@ -85,7 +85,7 @@ def test_moving_the_path_makes_it_worse(found: Reproduction) -> None:
 
 
 def test_moved_paths_that_cross_are_told_and_not_fitted() -> None:
-    crossing = PathReading("m", "dm", "radii", "+", "corrected", "corrected")
+    crossing = PathInterpretation("m", "dm", "radii", "+", "corrected", "corrected")
     moved = moved_paths(crossing, quick=True)
     assert all(one.parts is None for one in moved)
     for fit in moved_fits(crossing, moved, COLUMNS["Sokolov"]):

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
+from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 from rps_pin.paper import paper_data as paper
-from rps_pin.paper import reading_tables, tables
+from rps_pin.paper import tables
 from rps_pin.paper.compute import Reproduction
-from rps_pin.paper.equations import equation_lines
 from rps_pin.paper.figures import pictures
-from rps_pin.paper.page import closest_reading, render
-from rps_pin.paper.printing import between, error, markdown
+from rps_pin.paper.misprints import Misprint
+from rps_pin.paper.page import closest_interpretation, equation_status, render, summary_lines
+from rps_pin.paper.tables import between, error, markdown
+from tests.paper.markdown_rows import rows, section
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "reproduction.md"
@@ -26,61 +30,62 @@ def page(found: Reproduction) -> str:
     return render(found)
 
 
-def rows(table: str) -> list[list[str]]:
-    head, line, *body = [row.strip("| ").split(" | ") for row in table.splitlines()]
-    assert set(line) == {"---"}
-    assert all(row.count("|") == table.splitlines()[0].count("|") for row in table.splitlines())
-    return [head, *body]
-
-
-def test_every_equation_has_its_line_and_none_fails(found: Reproduction) -> None:
-    lines = equation_lines(found)
-    assert [line.number for line in lines] == list(range(1, 30))
-    corrected = {line.number for line in lines if line.status.startswith("corrected")}
-    assert corrected == {5, 11, 12, 14, 16, 19, 29}
-    assert not any("not" in line.status for line in lines)
-    assert len(rows(tables.equations(found))) == 30
+def test_every_equation_has_its_line_and_none_fails(page: str, found: Reproduction) -> None:
+    status = equation_status(found)
+    assert list(status) == list(range(1, 30))
+    assert {n for n, one in status.items() if one == "corrected"} == {5, 11, 12, 14, 16, 19, 29}
+    assert not any("not" in one for one in status.values())
+    lines = rows(section(page, "Equations"))[1:]
+    assert [int(line[0]) for line in lines] == list(range(1, 30))
+    for number, _, where, _, said in lines:
+        assert said.startswith(status[int(number)])
+        assert find_spec(f"rps_pin.{where.split()[0]}") is not None
 
 
 def test_a_failing_equation_is_told(found: Reproduction) -> None:
-    from dataclasses import replace
+    for bad in (1e-3, math.nan):
+        broken = replace(found, checks=found.checks | {6: bad, "8 closed": bad})
+        assert equation_status(broken)[6] == equation_status(broken)[8] == "**not reproduced**"
+    unsure = replace(found, misprints={n: Misprint(1.0, 0.5) for n in found.misprints})
+    assert equation_status(unsure)[5] == "**not corrected**"
+    assert rows(section(render(unsure), "Misprints"))[1][-1] == "**not confirmed**"
+    assert (
+        summary_lines(unsure)[1][0],
+        summary_lines(unsure)[1][1][:13],
+    ) == ("misprints not confirmed", "Eq. 5, Eq. 11")
 
-    broken = replace(found, checks=found.checks | {"6": 1e-3})
-    assert equation_lines(broken)[5].status == "**not reproduced**"
-    unsure = [one._replace(error_right=0.5) for one in found.misprints]
-    assert equation_lines(replace(found, misprints=unsure))[4].status == "**not corrected**"
-    assert "**not confirmed**" in tables.misprints(replace(found, misprints=unsure))
 
-
-def test_tables_have_their_rows(found: Reproduction) -> None:
-    assert len(rows(tables.misprints(found))) == 1 + 7
-    assert len(rows(tables.statements(found))) == 1 + len(found.statements)
-    assert len(rows(tables.balances(found))) == 1 + 4
-    assert len(rows(tables.table_1())) == 1 + 11
+def test_tables_have_their_rows(page: str, found: Reproduction) -> None:
+    assert [row[0] for row in rows(section(page, "Misprints"))[1:]] == [
+        f"Eq. {n}" for n in found.misprints
+    ]
+    assert len(rows(section(page, "Table 1 and the helix"))) == 1 + 11
     assert len(rows(tables.reach(found))) == 1 + len(found.reach)
     assert len(rows(tables.helix_ranges(found))) == 1 + 6
     assert len(rows(tables.agreement(found))) == 1 + 7
-    assert rows(tables.table_2())[1][1:] == ["-329", "11", "-422", "509", "95", "426"]
-    assert rows(tables.table_2())[2][1:] == ["-305", "6", "-382", "438", "78", "369"]
-    assert len(rows(reading_tables.grid())) == 1 + 9
-    assert len(rows(reading_tables.probes(found))) == 1 + len(found.probes)
-    assert len(rows(reading_tables.sampled(found))) == 1 + len(found.sampled)
-    assert len(rows(reading_tables.fits(found))) == 1 + 2 * 4
-    assert len(rows(reading_tables.moved(found))) == 1 + 1 + 4
+    table_2 = rows(section(page, "Table 2"))
+    assert table_2[0] == list(tables.FORCES)
+    assert table_2[1][1:] == ["-329", "11", "-422", "509", "95", "426"]
+    assert table_2[2][1:] == ["-305", "6", "-382", "438", "78", "369"]
+    assert len(rows(tables.grid())) == 1 + 9
+    assert len(rows(tables.probes(found))) == 1 + len(found.probes)
+    assert len(rows(tables.sampled(found))) == 1 + len(found.sampled)
+    assert len(rows(tables.fits(found))) == 1 + 2 * 4
+    assert len(rows(tables.moved(found))) == 1 + 1 + 4
 
 
 def test_the_fates_of_paths_add_up(found: Reproduction) -> None:
     regular = 0
-    for row in rows(reading_tables.paths(found))[1:]:
+    for row in rows(tables.paths(found))[1:]:
         _, _, _, count, out, singular, *_ = row
         regular += int(count) - int(out) - int(singular)
     assert regular == sum(not path.refused for path in found.paths)
 
 
 def test_differences_are_differences(found: Reproduction) -> None:
-    best = closest_reading(found)
-    _, reading, less_paper, less_sokolov = rows(reading_tables.differences(best))
-    assert reading[0] == "the reading"
+    best = closest_interpretation(found)
+    _, interpretation, less_paper, less_sokolov = rows(tables.differences(best))
+    assert interpretation[0] == "the interpretation"
     for row, table in ((less_paper, paper.THIS_STUDY), (less_sokolov, paper.SOKOLOV)):
         for text, ours, theirs in zip(
             row[1:7], best.relabelled.numbers(), table.numbers(), strict=True
@@ -89,7 +94,7 @@ def test_differences_are_differences(found: Reproduction) -> None:
 
 
 def test_the_csv_has_every_reading(found: Reproduction) -> None:
-    lines = list(csv.DictReader(io.StringIO(reading_tables.readings_csv(found))))
+    lines = list(csv.DictReader(io.StringIO(tables.interpretations_csv(found))))
     refused = [path for path in found.paths if path.refused]
     assert len(lines) == len(found.comparisons) + len(refused)
     choice = ("z_0", "r_h_p_h", "g_h", "branch", "eq_5", "eq_29", "bodies", "gravity", "eq_14")
@@ -102,7 +107,7 @@ def test_the_csv_has_every_reading(found: Reproduction) -> None:
 
 
 def test_the_page_is_whole(page: str, found: Reproduction) -> None:
-    assert "$" not in page
+    assert not re.search(r"[${}]", page)
     for bad in ("nan", "None", "inf "):
         assert not re.search(rf"\b{bad}\b", page), bad
     shown = set(re.findall(r"\]\(reproduction/(\w+)\.png\)", page))
@@ -115,6 +120,7 @@ def test_errors_are_bounds() -> None:
         bound = float(error(value).removeprefix("< "))
         assert value < bound <= max(1e-12, 31 * value)
     assert error(0.072) == "0.072"
+    assert error(math.nan) == "nan"
     assert between([0.002, 0.001]) == "1.000 to 2.000"
     assert markdown(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |"
 
@@ -136,19 +142,14 @@ def test_the_committed_page_is_this_template_s(page: str) -> None:
     assert [x for x in prose(committed) if x] == [x for x in prose(page) if x]
 
 
-def test_cheap_numbers_of_the_committed_page_are_today_s(found: Reproduction) -> None:
+def test_cheap_numbers_of_the_committed_page_are_today_s(page: str) -> None:
     committed = PAGE.read_text("utf-8")
-    for table in (
-        tables.misprints(found),
-        tables.balances(found),
-        tables.table_1(),
-        tables.table_2(),
-        reading_tables.grid(),
-    ):
-        assert table in committed
-    for row in found.statements:
-        if "random legs" not in row.found and "volume" not in row.found:
-            assert " | ".join(row) in committed
+    assert tables.grid() in committed
+    for heading in ("Misprints", "Table 1 and the helix", "Table 2"):
+        assert section(page, heading) == section(committed, heading)
+    for line in section(page, "What the paper states").splitlines():
+        if "random legs" not in line and "volume" not in line:
+            assert line in committed
 
 
 def test_the_committed_pictures_and_readings_are_there_and_small() -> None:
@@ -156,7 +157,7 @@ def test_the_committed_pictures_and_readings_are_there_and_small() -> None:
     shown = re.findall(r"\]\((reproduction/\w+\.\w+)\)", PAGE.read_text("utf-8"))
     assert {path.name for path in folder.iterdir()} == {Path(name).name for name in shown}
     assert sum(path.stat().st_size for path in folder.glob("*.png")) < 1_000_000
-    with (folder / "readings.csv").open() as file:
+    with (folder / "interpretations.csv").open() as file:
         lines = list(csv.DictReader(file))
     refused = sum(bool(line["refused"]) for line in lines)
     assert len(lines) == 24 * (384 - refused) + refused

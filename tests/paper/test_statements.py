@@ -11,38 +11,38 @@ from lxml import etree
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.paper.compute import Reproduction
-from rps_pin.paper.statements import (
-    CORRECTED,
-    HOLDS,
-    OPEN,
-    greatest_base_radius,
-    theoretical_reach,
-)
+from rps_pin.paper.page import render
+from rps_pin.paper.workspace_comparison import greatest_base_radius, theoretical_reach
+from tests.paper.markdown_rows import rows, section
 from tests.worst import worst
 
 
-def test_verdicts(found: Reproduction) -> None:
-    verdict = [(one.where, one.verdict) for one in found.statements]
-    assert verdict == [
-        ("Sec. 2.2, Eq. 8", CORRECTED),
-        ("Fig. 2", HOLDS),
-        ("Sec. 3, Fig. 3", HOLDS),
-        ("Sec. 3", CORRECTED),
-        ("Sec. 3, Fig. 6", OPEN),
-        ("Sec. 3, Fig. 6", HOLDS),
-        ("Fig. 4", HOLDS),
-        ("Table 1, Eq. 29", CORRECTED),
+@pytest.fixture(scope="module")
+def statements(found: Reproduction) -> list[list[str]]:
+    """The rows of the page's table: where, the paper's words, what is computed, the verdict."""
+    return rows(section(render(found), "What the paper states"))[1:]
+
+
+def test_verdicts(statements: list[list[str]]) -> None:
+    assert [(where, verdict) for where, _, _, verdict in statements] == [
+        ("Sec. 2.2, Eq. 8", "corrected"),
+        ("Fig. 2", "holds"),
+        ("Sec. 3, Fig. 3", "holds"),
+        ("Sec. 3", "corrected"),
+        ("Sec. 3, Fig. 6", "open"),
+        ("Sec. 3, Fig. 6", "holds"),
+        ("Fig. 4", "holds"),
+        ("Table 1, Eq. 29", "corrected"),
         ("Eq. 26 to 29", "the proportions explain Eq. 29"),
-        ("Table 1", CORRECTED),
-        ("Table 1", OPEN),
-        ("Table 1", OPEN),
-        ("Sec. 4.3, Table 2", HOLDS),
+        ("Table 1", "corrected"),
+        ("Table 1", "open"),
+        ("Table 1", "open"),
+        ("Sec. 4.3, Table 2", "holds"),
     ]
 
 
-def test_the_numbers_in_them(found: Reproduction) -> None:
-    text = {(one.where, one.stated): one.found for one in found.statements}
-    all_of_it = "\n".join(text.values())
+def test_the_numbers_in_them(statements: list[list[str]]) -> None:
+    all_of_it = "\n".join(computed for _, _, computed, _ in statements)
     assert f"{len(range(200, 251))} points, or steps of {50 / 49:.4f} mm" in all_of_it
     t_t = (1 + math.sqrt(1 + 9 * math.pi**2)) / 2
     assert f"t_b = {t_t - 1:.5f} s, t_t = {t_t:.5f} s" in all_of_it

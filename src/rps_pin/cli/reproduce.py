@@ -20,15 +20,17 @@ def reproduce_command(
         Path, typer.Option("--output", "-o", help="Folder for the results; made if need be.")
     ] = Path("reproduction"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Coarser grids and a part of the readings: seconds.")
+        bool,
+        typer.Option("--quick", help="Coarser grids, fewer interpretations: seconds."),
     ] = False,
 ) -> None:
     """Reproduce the paper: every equation, figure and table of it beside what is computed here.
 
     Written to the output folder: the page (**reproduction.md**) and, in the folder
-    **reproduction** beside it, its pictures and every reading of the paper's Table 1 that was tried
-    (**readings.csv**). What stands there is replaced. About a minute; Ctrl-C leaves no half-written
-    file. The project's own page, docs/reproduction.md, is made by `rps-pin reproduce -o docs`.
+    **reproduction** beside it, its pictures and every interpretation of the paper's Table 1
+    (**interpretations.csv**). Existing files are replaced. About a minute; Ctrl-C leaves no
+    half-written file. The project's own page, docs/reproduction.md, is made by
+    `rps-pin reproduce -o docs`.
 
     Exit status: 0 done; 1 not (why is said); 2 wrong usage.
 

@@ -51,6 +51,17 @@ class Agreement(NamedTuple):
     lagrange_virtual_work: float
     """Between those two, likewise."""
 
+    @property
+    def drawn(self) -> int:
+        """All states, those left out among them."""
+        return self.states + self.left_out
+
+    @property
+    def forces(self) -> float:
+        """The largest difference of any two ways to the forces."""
+        ways = (self.lagrange, self.virtual_work, self.lagrange_virtual_work)
+        return float(np.max(ways))
+
 
 def random_agreement(
     robots: int = 20, states: int = 100, *, progress: Progress = iter

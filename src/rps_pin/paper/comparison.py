@@ -1,4 +1,4 @@
-"""Every reading of Table 1 held against Table 2.
+"""Forces of every interpretation of Table 1, compared with Table 2.
 
 A path that is out of reach, or crosses a singularity, has no least and greatest force: it is
 refused, and the reason is kept.
@@ -18,12 +18,17 @@ from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.paper import paper_data as paper
 from rps_pin.paper.force_parts import ForceParts, UnitRobot, combined, force_parts
+from rps_pin.paper.interpretations import (
+    BodyInterpretation,
+    PathInterpretation,
+    body_interpretations,
+    path_interpretations,
+)
 from rps_pin.paper.paper_data import ForceRange
-from rps_pin.paper.read_helix import smooth_parts
-from rps_pin.paper.readings import BodyReading, PathReading, body_readings, path_readings
+from rps_pin.paper.paper_helix import smooth_parts
 from rps_pin.rps.singularity.path_check import check_path
 
-Progress = Callable[[Iterable[PathReading]], Iterable[PathReading]]
+Progress = Callable[[Iterable[PathInterpretation]], Iterable[PathInterpretation]]
 
 OUT_OF_REACH, SINGULAR = "out of reach", "crosses a singularity"
 
@@ -32,7 +37,7 @@ OUT_OF_REACH, SINGULAR = "out of reach", "crosses a singularity"
 class PathResult:
     """A path and what it meets; its forces by cause if it meets nothing."""
 
-    reading: PathReading
+    interpretation: PathInterpretation
     refused: str
     """`OUT_OF_REACH`, `SINGULAR`, or empty."""
     crossings: tuple[float, ...]
@@ -59,10 +64,10 @@ class Labels(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """A reading's forces beside Table 2."""
+    """Forces of an interpretation, compared with Table 2."""
 
-    path: PathReading
-    body: BodyReading
+    path: PathInterpretation
+    body: BodyInterpretation
     nearest: float
     forces: ForceRange
     distance: float
@@ -78,7 +83,7 @@ class Comparison(NamedTuple):
 def compute_paths(
     *, samples: int = 1000, quick: bool = False, progress: Progress = iter
 ) -> list[PathResult]:
-    """Return every path reading with what it meets, and its forces by cause.
+    """Return every path interpretation with what it meets, and its forces by cause.
 
     Parameters
     ----------
@@ -87,19 +92,21 @@ def compute_paths(
     quick
         A part of the grid only.
     progress
-        Wraps the loop over the readings, for a progress bar.
+        Wraps the loop over the interpretations, for a progress bar.
     """
-    return [path_result(each, samples) for each in progress(list(path_readings(quick=quick)))]
+    return [
+        path_result(each, samples) for each in progress(list(path_interpretations(quick=quick)))
+    ]
 
 
-def path_result(reading: PathReading, samples: int) -> PathResult:
+def path_result(interpretation: PathInterpretation, samples: int) -> PathResult:
     """Return what a path meets, and its forces by cause if there are."""
     nothing = np.empty(0)
     try:
-        path = reading.path()
+        path = interpretation.path()
     except InputError:
-        return PathResult(reading, OUT_OF_REACH, (), math.nan, nothing, None)
-    robot = UnitRobot(reading.base_radius, reading.platform_radius)
+        return PathResult(interpretation, OUT_OF_REACH, (), math.nan, nothing, None)
+    robot = UnitRobot(interpretation.base_radius, interpretation.platform_radius)
     pieces = smooth_parts(path)
     checks = [check_path(robot, piece, tolerance=1e-6, least_steps=500) for piece in pieces]
     crossings = tuple(
@@ -109,7 +116,7 @@ def path_result(reading: PathReading, samples: int) -> PathResult:
         if event.kind != "grazes"
     )
     if crossings:
-        return PathResult(reading, SINGULAR, crossings, 0.0, nothing, None)
+        return PathResult(interpretation, SINGULAR, crossings, 0.0, nothing, None)
     times, parts = [], []
     for piece, check in zip(pieces, checks, strict=True):
         at = dense_times(piece.duration, check.minimum_time, samples, piece.start)
@@ -117,7 +124,7 @@ def path_result(reading: PathReading, samples: int) -> PathResult:
         parts.append(force_parts(robot, piece.sample(at)))
     joined = ForceParts(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     nearest = min(check.minimum_distance for check in checks)
-    return PathResult(reading, "", (), nearest, np.concatenate(times), joined)
+    return PathResult(interpretation, "", (), nearest, np.concatenate(times), joined)
 
 
 def dense_times(duration: float, near: float, samples: int, start: float = 0.0) -> Array:
@@ -180,16 +187,16 @@ def closest_labels(
 
 
 def compare(paths: Iterable[PathResult]) -> list[Comparison]:
-    """Return every reading that has forces, the closest to Table 2 first."""
+    """Return every interpretation that has forces, the closest to Table 2 first."""
     rows = []
     for result in paths:
         if result.parts is None:
             continue
-        for body in body_readings():
+        for body in body_interpretations():
             forces = force_range(combined(result.parts, body))
             rows.append(
                 Comparison(
-                    result.reading,
+                    result.interpretation,
                     body,
                     result.nearest,
                     forces,
@@ -201,8 +208,8 @@ def compare(paths: Iterable[PathResult]) -> list[Comparison]:
 
 
 def forces_of(paths: Iterable[PathResult], row: Comparison) -> tuple[Array, Array]:
-    """Return times (n,), s, and forces (n, 3), N, of a reading that was compared."""
+    """Return times (n,), s, and forces (n, 3), N, of an interpretation that was compared."""
     for result in paths:
-        if result.reading == row.path and result.parts is not None:
+        if result.interpretation == row.path and result.parts is not None:
             return result.times, combined(result.parts, row.body)
     raise InputError(f"no path was computed for {row.path}")

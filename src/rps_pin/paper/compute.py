@@ -11,7 +11,7 @@ from rps_pin.paper import paper_data as paper
 from rps_pin.paper.agreement import Agreement, helix_agreement, random_agreement
 from rps_pin.paper.comparison import Comparison, PathResult, compare, compute_paths
 from rps_pin.paper.formula_checks import degree_of_eq_8, formula_checks, solution_counts
-from rps_pin.paper.helix_law import HelixLaw, helix_law
+from rps_pin.paper.interpretations import BRANCHES, PathInterpretation
 from rps_pin.paper.mass_fit import (
     MassFit,
     MovedFit,
@@ -31,16 +31,14 @@ from rps_pin.paper.near_singularity import (
     height_probes,
     sampled_across,
 )
-from rps_pin.paper.power_balance import PowerBalance, power_balances
-from rps_pin.paper.readings import BRANCHES, PathReading
-from rps_pin.paper.statements import (
-    Statement,
-    kinematic_statements,
-    table_1_statements,
-    table_2_statements,
-    workspace_statements,
+from rps_pin.paper.paper_helix import HelixLaw, helix_law
+from rps_pin.paper.power_balance import power_balances
+from rps_pin.paper.workspace_comparison import (
+    PaperComparison,
+    greatest_base_radius,
+    paper_comparison,
+    theoretical_reach,
 )
-from rps_pin.paper.workspace_comparison import PaperComparison, paper_comparison
 from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
 from rps_pin.rps.parameters import RPSParameters
@@ -75,23 +73,26 @@ class Reproduction:
     """All results; see the functions that compute them."""
 
     quick: bool
-    checks: dict[str, float]
+    checks: dict[int | str, float]
     degree: int
     counts: dict[int, int]
-    misprints: list[Misprint]
-    statements: list[Statement]
+    misprints: dict[int, Misprint]
     law: HelixLaw
-    balances: list[PowerBalance]
+    balances: dict[str, float]
     modes: AssemblyModes
     workspace: Workspace
     coarse_workspace: Workspace
     """For drawing surfaces."""
+    cylinder: tuple[float, float]
+    """See `theoretical_reach`."""
+    greatest_base_radius: float
     reach: tuple[PaperComparison, ...]
+    """By base radius; the first is g = h."""
     runs: dict[Branch, MotionRun]
     """Along Table 1's helix from z_0 = 0.4 m, by branch."""
     paths: list[PathResult]
     comparisons: list[Comparison]
-    """Every reading that has forces, the closest to Table 2 first."""
+    """Every interpretation that has forces, the closest to Table 2 first."""
     fits: dict[str, ColumnFits]
     """By column of Table 2."""
     approach: Approach
@@ -107,14 +108,14 @@ def compute(*, quick: bool = False, track: Track = lambda items, _: items) -> Re
     Parameters
     ----------
     quick
-        Coarser grids and a part of the readings, for a look in a few seconds; the page says so.
+        Coarser grids and fewer interpretations, in a few seconds; the page says so.
     track
         Wraps the longer loops, for a progress bar.
     """
     paths = compute_paths(
         samples=300 if quick else 1000,
         quick=quick,
-        progress=lambda each: track(each, "readings of Table 1"),
+        progress=lambda each: track(each, "interpretations of Table 1"),
     )
     micro = RPSRobot.from_preset("micro")
     points = 13 if quick else 51
@@ -127,27 +128,20 @@ def compute(*, quick: bool = False, track: Track = lambda items, _: items) -> Re
         branch: _helix_run(branch, 100 if quick else 1000) for branch in track(BRANCHES, "helix")
     }
     heights = {b: h[::8] for b, h in PROBED_HEIGHTS.items()} if quick else PROBED_HEIGHTS
-    modes = micro.assembly_modes([EQUAL_LENGTH] * 3)
-    counts = solution_counts(200 if quick else 2000)
-    degree, law = degree_of_eq_8(), helix_law()
     limits_of_length = _without_angle_limits(micro)
     return Reproduction(
         quick=quick,
         checks=formula_checks(),
-        degree=degree,
-        counts=counts,
+        degree=degree_of_eq_8(),
+        counts=solution_counts(200 if quick else 2000),
         misprints=formula_misprints(),
-        statements=[
-            *kinematic_statements(modes, degree, counts),
-            *workspace_statements(reach),
-            *table_1_statements(law, max(float(run.length.max()) for run in runs.values())),
-            *table_2_statements(),
-        ],
-        law=law,
+        law=helix_law(),
         balances=power_balances(),
-        modes=modes,
+        modes=micro.assembly_modes([EQUAL_LENGTH] * 3),
         workspace=workspace(limits_of_length, leg_grid(micro.parameters, points)),
         coarse_workspace=workspace(limits_of_length, leg_grid(micro.parameters, min(points, 18))),
+        cylinder=theoretical_reach(),
+        greatest_base_radius=greatest_base_radius(),
         reach=reach,
         runs=runs,
         paths=paths,
@@ -165,13 +159,13 @@ def compute(*, quick: bool = False, track: Track = lambda items, _: items) -> Re
 
 def _fits(paths: list[PathResult], quick: bool, track: Track) -> dict[str, ColumnFits]:
     found: dict[str, ColumnFits] = {}
-    moved: dict[PathReading, list[MovedPath]] = {}
+    moved: dict[PathInterpretation, list[MovedPath]] = {}
     for column, printed in track(list(COLUMNS.items()), "free masses"):
         fits = mass_fits(paths, printed)
         path = fits[0].path
         if path not in moved:
             moved[path] = moved_paths(path, quick=quick) if path.eq_29 == "corrected" else []
-        parts = next(result.parts for result in paths if result.reading == path)
+        parts = next(result.parts for result in paths if result.interpretation == path)
         assert parts is not None  # it was fitted
         both = fit_both_masses(fits[0], parts, printed)
         found[column] = ColumnFits(fits, both, moved_fits(path, moved[path], printed))

@@ -14,8 +14,8 @@ from rps_pin.paper.figure_1 import plot_mechanism
 from rps_pin.paper.table_2_figures import (
     plot_approach,
     plot_fit,
+    plot_interpretations,
     plot_probes,
-    plot_readings,
     plot_table_2,
 )
 from rps_pin.plots import STYLE, plot_forces, plot_lengths, plot_path
@@ -46,7 +46,7 @@ def pictures(found: Reproduction) -> dict[str, Callable[[], Figure]]:
         "figure_9": lambda: plot_branches(found, plot_forces),
         "approach": lambda: plot_approach(found.approach),
         "probes": lambda: plot_probes(found.probes),
-        "readings": lambda: plot_readings(found),
+        "interpretations": lambda: plot_interpretations(found),
         "table_2": lambda: plot_table_2(found),
         "fit": lambda: plot_fit(found),
     }

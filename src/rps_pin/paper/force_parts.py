@@ -1,7 +1,7 @@
 """The actuator forces of a path by cause, so that a path is computed once for all masses.
 
 The forces are the paper's own, Lagrange's equations of the first kind. They are linear in the
-masses and inertias: those of a few unit robots give those of every reading of the bodies.
+masses and inertias: those of a few unit robots give those of every interpretation of the bodies.
 """
 
 from __future__ import annotations
@@ -12,8 +12,14 @@ import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.paper import paper_data as paper
+from rps_pin.paper.interpretations import (
+    BODIES,
+    EQ_14,
+    GRAVITIES,
+    STANDARD_GRAVITY,
+    BodyInterpretation,
+)
 from rps_pin.paper.lagrange import lagrange_forces
-from rps_pin.paper.readings import BODIES, EQ_14, GRAVITIES, STANDARD_GRAVITY, BodyReading
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.trajectories.path import PathSample
 
@@ -90,16 +96,16 @@ def force_parts(robot: UnitRobot, motion: PathSample) -> ForceParts:
     )
 
 
-def combined(parts: ForceParts, reading: BodyReading) -> Array:
-    """Return the actuator forces (n, 3) of a reading of the bodies, N."""
-    bodies = BODIES[reading.bodies]
+def combined(parts: ForceParts, interpretation: BodyInterpretation) -> Array:
+    """Return the actuator forces (n, 3) of an interpretation of the bodies, N."""
+    bodies = BODIES[interpretation.bodies]
     lever = paper.LEG_COM_MM * 1e-3
     # Eq. 16 as printed: I_leg + m_leg r^2
     about_com = bodies.leg_mass * lever**2 if bodies.about == "com" else 0.0
     leg_inertia = paper.LEG_INERTIA + about_com
-    inertia = parts.inertia if reading.eq_14 == EQ_14[0] else parts.inertia_as_printed
+    inertia = parts.inertia if interpretation.eq_14 == EQ_14[0] else parts.inertia_as_printed
     force: Array = bodies.platform_mass * parts.mass + inertia + leg_inertia * parts.leg_inertia
-    if reading.gravity != "no gravity":
-        weighed = bodies.platform_mass if reading.gravity == GRAVITIES[0] else 1.0  # Eq. 19
+    if interpretation.gravity != "no gravity":
+        weighed = bodies.platform_mass if interpretation.gravity == GRAVITIES[0] else 1.0  # Eq. 19
         force = force + weighed * parts.weight + bodies.leg_mass * lever * parts.leg_weight
     return force

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.paper import paper_data as paper
 from rps_pin.paper.lagrange_terms import constraints, energies
-from rps_pin.paper.read_helix import corrected_turn
+from rps_pin.paper.paper_helix import corrected_turn
 from rps_pin.rps.kinematics.assembly_modes import eliminant
 from rps_pin.rps.kinematics.legs import RADIAL, LegMotion
 from rps_pin.rps.kinematics.pose import PlatformMotion
@@ -25,8 +26,8 @@ _STATES = 1000
 _ROOT_3 = math.sqrt(3.0)
 
 
-def formula_checks() -> dict[str, float]:
-    """Return the largest error of each equation, by its number ("1", ..., "28")."""
+def formula_checks() -> dict[int | str, float]:
+    """Return the largest error of each equation, by its number, and "8 closed"."""
     robot = RPSRobot.from_preset("sokolov")
     rng = np.random.default_rng(SEED)
     size, way = rng.uniform(0.0, 1.0, _STATES), rng.uniform(-math.pi, math.pi, _STATES)
@@ -44,7 +45,7 @@ def formula_checks() -> dict[str, float]:
 
 def _kinematics(
     robot: RPSRobot, pose: Array, platform: PlatformMotion, legs: LegMotion
-) -> dict[str, float]:
+) -> dict[int | str, float]:
     g, h = robot.parameters.base_radius, robot.parameters.platform_radius
     u, v, p = platform.rotation[..., 0], platform.rotation[..., 1], platform.position
     eq_1 = p[:, None] + h * RADIAL @ np.swapaxes(platform.rotation, -1, -2)
@@ -74,16 +75,16 @@ def _kinematics(
     )
     open_angle = phi + 0.3  # not closed: Eq. 8 is tried where it is not zero, too
     return {
-        "1": _largest(eq_1 - eq_2) / h,
-        "2": _largest(eq_2 - eq_7) / h,
-        "3": _largest(np.array(eq_3)) / h,
-        "4": _largest(np.array(eq_4)),
-        "6": _largest(np.linalg.norm(eq_2 - g * RADIAL, axis=-1) - found.length) / h,
-        "7": _largest(eq_7 - eq_1) / h,
-        "8": _largest(eq_8(d, open_angle, g, h) - constraints(robot.parameters, d, open_angle))
+        1: _largest(eq_1 - eq_2) / h,
+        2: _largest(eq_2 - eq_7) / h,
+        3: _largest(np.array(eq_3)) / h,
+        4: _largest(np.array(eq_4)),
+        6: _largest(np.linalg.norm(eq_2 - g * RADIAL, axis=-1) - found.length) / h,
+        7: _largest(eq_7 - eq_1) / h,
+        8: _largest(eq_8(d, open_angle, g, h) - constraints(robot.parameters, d, open_angle))
         / h**2,
         "8 closed": _largest(eq_8(d, phi, g, h)) / h**2,
-        "20": _largest((d * np.sin(phi)).mean(axis=-1) - pose[:, 0]) / h,
+        20: _largest((d * np.sin(phi)).mean(axis=-1) - pose[:, 0]) / h,
     }
 
 
@@ -102,7 +103,7 @@ def eq_8(d: Array, phi: Array, g: float, h: float) -> Array:
 
 def _rates(
     robot: RPSRobot, pose: Array, rate: Array, platform: PlatformMotion, legs: LegMotion
-) -> dict[str, float]:
+) -> dict[int | str, float]:
     """Compare rates with central differences of placements and angles."""
     step = 1e-5
     (p2, R2), (p1, R1) = (robot.platform_placement(pose + s * step * rate) for s in (1, -1))
@@ -117,17 +118,19 @@ def _rates(
 
     moved = np.linalg.norm(centre(after.angle) - centre(before.angle), axis=-1) / (2 * step)
     return {
-        "15": max(
-            _largest(velocity - platform.velocity) / _largest(platform.velocity),
-            _largest(found - platform.angular_velocity) / _largest(platform.angular_velocity),
+        15: _largest(
+            [
+                _largest(velocity - platform.velocity) / _largest(platform.velocity),
+                _largest(found - platform.angular_velocity) / _largest(platform.angular_velocity),
+            ]
         ),
-        "17": _largest(moved - np.abs(r * legs.angle_rate)) / _largest(r * legs.angle_rate),
-        "18": _largest((after.angle - before.angle) / (2 * step) - legs.angle_rate)
+        17: _largest(moved - np.abs(r * legs.angle_rate)) / _largest(r * legs.angle_rate),
+        18: _largest((after.angle - before.angle) / (2 * step) - legs.angle_rate)
         / _largest(legs.angle_rate),
     }
 
 
-def _energies(robot: RPSRobot, platform: PlatformMotion, legs: LegMotion) -> dict[str, float]:
+def _energies(robot: RPSRobot, platform: PlatformMotion, legs: LegMotion) -> dict[int | str, float]:
     p = robot.parameters
     found = energies(p, legs.length, legs.angle, legs.speed, legs.angle_rate)
     spin = platform.angular_velocity
@@ -137,21 +140,21 @@ def _energies(robot: RPSRobot, platform: PlatformMotion, legs: LegMotion) -> dic
     )
     eq_21 = 9.81 * p.leg_com * p.leg_mass * np.sin(legs.angle).sum(axis=-1)
     return {
-        "13": _largest(found.platform_kinetic - eq_13) / _largest(eq_13),
-        "21": _largest(found.legs_potential - eq_21) / _largest(eq_21),
+        13: _largest(found.platform_kinetic - eq_13) / _largest(eq_13),
+        21: _largest(found.legs_potential - eq_21) / _largest(eq_21),
     }
 
 
-def _helix(robot: RPSRobot) -> dict[str, float]:
+def _helix(robot: RPSRobot) -> dict[int | str, float]:
     radius, pitch, height = paper.HELIX_RADIUS * 1e-3, paper.HELIX_PITCH * 1e-3, 0.4
     path = helix(robot, radius=radius, pitch=pitch, height=height)
     times = np.linspace(0.0, path.duration, _STATES)
     phi = corrected_turn(times)[0]
     x, y, z = robot.platform_placement(path.sample(times).pose)[0].T
     return {
-        "26": _largest(x - radius * np.cos(phi)) / radius,
-        "27": _largest(y - radius * np.sin(phi)) / radius,
-        "28": _largest(z - height - pitch / (2 * math.pi) * phi) / pitch,
+        26: _largest(x - radius * np.cos(phi)) / radius,
+        27: _largest(y - radius * np.sin(phi)) / radius,
+        28: _largest(z - height - pitch / (2 * math.pi) * phi) / pitch,
     }
 
 
@@ -183,5 +186,5 @@ def solution_counts(count: int = 1000) -> dict[int, int]:
     return {int(n): int(t) for n, t in zip(found, times, strict=True)}
 
 
-def _largest(values: Array) -> float:
+def _largest(values: ArrayLike) -> float:
     return float(np.abs(values).max())

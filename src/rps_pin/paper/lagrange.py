@@ -72,8 +72,8 @@ def lagrange_forces(
         Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
     as_printed
         Equations to take as the paper prints them, misprints and all, of
-        `lagrange_terms.PRINTED`: ``"eq_14"``, ``"eq_19"``. None if left out. (Eq. 16's two readings
-        are ``RPSParameters.leg_inertia_about``.)
+        `lagrange_terms.PRINTED`: ``"eq_14"``, ``"eq_19"``. None if left out. (The two
+        interpretations of Eq. 16 are ``RPSParameters.leg_inertia_about``.)
     max_gain
         Largest accepted 1 over the smallest singular value of A_phi, whose entries, made those of
         distances by arcs, are cosines.

@@ -13,8 +13,8 @@ The Lagrangian (Eq. 9) is that of
       M = r_x' Y r_x,    c = r_x' Y (d/dt r_x) x';
 
 - the legs' cylinders (Eq. 16, 17): J phi'^2/2 each, J about the revolute joint. Eq. 16 as printed
-  adds m_leg r^2 to an I_leg that is said to be about that joint already. Which reading is meant is
-  for `RPSParameters.leg_inertia_about`: with ``"joint"`` J = I_leg, with ``"com"``
+  adds m_leg r^2 to an I_leg that is said to be about that joint already. The interpretation is
+  `RPSParameters.leg_inertia_about`: with ``"joint"`` J = I_leg, with ``"com"``
   J = I_leg + m_leg r^2, Eq. 16 as printed;
 - the legs' rods, which the paper leaves out: with the rod's centre of mass at l = d - rod_com along
   the leg, m (d'^2 + l^2 phi'^2)/2 + I phi'^2/2;

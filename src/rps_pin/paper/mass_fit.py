@@ -1,9 +1,9 @@
-"""Which mass would bring a path nearest to Table 2: a fit of one number, and told as one.
+"""Fits of the platform's mass to Table 2, for every path that has forces.
 
-The readings of `rps_pin.paper.readings` fit nothing. Here the platform's mass alone is left
-free, everything else as Table 1 prints it, for *every* path that has forces: what one path gains by
-the freedom is worth only what the others do not. Then the path's own numbers are moved about, to
-see whether Table 1's are the best ones.
+The interpretations of `rps_pin.paper.interpretations` fit nothing. Here the platform's mass is
+fitted and everything else is as Table 1 prints it, for every path, so that one path's gain can be
+compared with the others'. Then the numbers of the best path are changed, to see whether Table 1's
+are the best ones.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from rps_pin.paper.comparison import (
     force_range,
 )
 from rps_pin.paper.force_parts import ForceParts, UnitRobot, force_parts
+from rps_pin.paper.interpretations import PathInterpretation
 from rps_pin.paper.paper_data import ForceRange
-from rps_pin.paper.read_helix import ReadHelix
-from rps_pin.paper.readings import PathReading
+from rps_pin.paper.paper_helix import PaperHelix
 from rps_pin.rps.singularity.path_check import check_path
 
 #: Masses tried before the best one is refined, kg.
@@ -44,7 +44,7 @@ MOVES = {
 class MassFit(NamedTuple):
     """The platform's mass that brings a path nearest to a column of Table 2."""
 
-    path: PathReading
+    path: PathInterpretation
     platform_mass: float
     """Kg."""
     leg_mass: float
@@ -84,14 +84,14 @@ class MovedFit(NamedTuple):
 def mass_fits(paths: Iterable[PathResult], printed: ForceRange = paper.THIS_STUDY) -> list[MassFit]:
     """Return the best platform's mass of every path that has forces, the nearest first."""
     fits = [
-        fit_mass(result.reading, result.parts, printed)
+        fit_mass(result.interpretation, result.parts, printed)
         for result in paths
         if result.parts is not None
     ]
     return sorted(fits, key=lambda fit: round(fit.distance, 9))
 
 
-def fit_mass(path: PathReading, parts: ForceParts, printed: ForceRange) -> MassFit:
+def fit_mass(path: PathInterpretation, parts: ForceParts, printed: ForceRange) -> MassFit:
     """Return the platform's mass that brings a path nearest to a column of Table 2."""
 
     def miss(log_mass: float) -> float:
@@ -127,7 +127,7 @@ def fit_both_masses(start: MassFit, parts: ForceParts, printed: ForceRange) -> M
     return _fit(start.path, parts, printed, float(found.x[0]), float(found.x[1]))
 
 
-def moved_paths(path: PathReading, *, quick: bool = False) -> list[MovedPath]:
+def moved_paths(path: PathInterpretation, *, quick: bool = False) -> list[MovedPath]:
     """Return a path with Eq. 29 corrected, with z_0, r_h or p_h moved; `quick` moves z_0 only."""
     given = {
         "z_0": path.height,
@@ -140,7 +140,7 @@ def moved_paths(path: PathReading, *, quick: bool = False) -> list[MovedPath]:
     for name, changes in moves.items():
         for by in changes:
             numbers = given | {name: given[name] + by}
-            helix = ReadHelix(
+            helix = PaperHelix(
                 path.platform_radius,
                 numbers["r_h"],
                 numbers["p_h"],
@@ -158,7 +158,7 @@ def moved_paths(path: PathReading, *, quick: bool = False) -> list[MovedPath]:
 
 
 def moved_fits(
-    path: PathReading, moved: Iterable[MovedPath], printed: ForceRange
+    path: PathInterpretation, moved: Iterable[MovedPath], printed: ForceRange
 ) -> list[MovedFit]:
     """Return the best mass for each of a path's moved ones."""
     rows = []
@@ -190,7 +190,7 @@ def _forces(parts: ForceParts, mass: float, leg_mass: float) -> Array:
 
 
 def _fit(
-    path: PathReading, parts: ForceParts, printed: ForceRange, mass: float, leg_mass: float
+    path: PathInterpretation, parts: ForceParts, printed: ForceRange, mass: float, leg_mass: float
 ) -> MassFit:
     found = force_range(_forces(parts, mass, leg_mass))
     return MassFit(path, mass, leg_mass, *closest_labels(found, printed))

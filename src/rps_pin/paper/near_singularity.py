@@ -2,7 +2,7 @@
 
 Three looks: the forces on the way into a crossing; what a program reports that steps across a
 crossing without noticing; and helices that come ever nearer to a singularity. The last are probes,
-not readings of Table 1.
+not interpretations of Table 1.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.paper import paper_data as paper
 from rps_pin.paper.comparison import dense_times, distance, force_range
+from rps_pin.paper.interpretations import BRANCHES
 from rps_pin.paper.lagrange import lagrange_forces
 from rps_pin.paper.paper_data import ForceRange
-from rps_pin.paper.read_helix import ReadHelix
-from rps_pin.paper.readings import BRANCHES
+from rps_pin.paper.paper_helix import PaperHelix
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.measures import singularity_measures
 from rps_pin.rps.singularity.path_check import check_path
@@ -84,9 +84,9 @@ class Probe(NamedTuple):
     """To Table 2; not a number if it crosses."""
 
 
-def table_1_helix(height: float, helix_unit: float = 1e-3, branch: Branch = "+") -> ReadHelix:
+def table_1_helix(height: float, helix_unit: float = 1e-3, branch: Branch = "+") -> PaperHelix:
     """Return the helix of Table 1 from a height (m), with r_h and p_h in a unit (m)."""
-    return ReadHelix(
+    return PaperHelix(
         paper.PLATFORM_RADIUS_MM * 1e-3,
         paper.HELIX_RADIUS * helix_unit,
         paper.HELIX_PITCH * helix_unit,
@@ -118,7 +118,7 @@ def sampled_across() -> list[Sampled]:
     lie.
     """
     robot = RPSRobot.from_preset("sokolov")
-    paths: list[tuple[str, ReadHelix]] = [
+    paths: list[tuple[str, PaperHelix]] = [
         ("as printed: z_0 = 0.4 mm, branch +", table_1_helix(0.4e-3)),
         ("as printed: z_0 = 0.4 mm, branch -", table_1_helix(0.4e-3, branch="-")),
         ("z_0 = 0.4 m, r_h = 75 mm, p_h = 50 mm, branch +", table_1_helix(0.4, 0.1)),

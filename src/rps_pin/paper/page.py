@@ -4,162 +4,225 @@ from __future__ import annotations
 
 import math
 from importlib.resources import files
-from string import Template
+from string import Formatter
+from typing import Any
 
 import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.paper import paper_data as paper
-from rps_pin.paper import reading_tables, tables
+from rps_pin.paper import tables
 from rps_pin.paper.agreement import NEAREST
 from rps_pin.paper.comparison import Comparison
 from rps_pin.paper.compute import EQUAL_LENGTH, ColumnFits, Reproduction
-from rps_pin.paper.equations import CORRECTED, equation_lines
-from rps_pin.paper.printing import error
-from rps_pin.paper.readings import DISC_MASS, STANDARD_GRAVITY, PathReading
-from rps_pin.paper.statements import greatest_base_radius
+from rps_pin.paper.interpretations import (
+    DISC_MASS,
+    ROD_MASS,
+    STANDARD_GRAVITY,
+    PathInterpretation,
+)
+from rps_pin.paper.misprints import STATES
+from rps_pin.rps.parameters import RPSParameters
 
-_QUICK_NOTE = """**This is a quick run**: coarser grids, and a part of the readings only.
+_QUICK_NOTE = """**This is a quick run**: coarser grids, and a part of the interpretations only.
 
 """
+REPRODUCED, CORRECTED, DEFINITION = "reproduced", "corrected", "a definition"
+_EQUATIONS = 29
+#: Largest error of an equation that counts as reproduced (what central differences leave).
+_LIMIT = 1e-6
 
 
 def render(found: Reproduction) -> str:
     """Return the page as Markdown; its pictures are looked for in the folder `reproduction`."""
-    template = Template((files(__package__) / "page.md.in").read_text("utf-8"))
-    return template.substitute(
-        **_summary(found), **_figures(found), **_tables(found), **_table_2(found)
-    )
+    template = (files(__package__) / "page.md.in").read_text("utf-8")
+    return _PageFormatter().vformat(template, (), _values(found))
 
 
-def closest_reading(found: Reproduction) -> Comparison:
-    """Return the reading that comes closest to Table 2, its columns being any of our legs."""
+def closest_interpretation(found: Reproduction) -> Comparison:
+    """Return the interpretation that comes closest to Table 2, its columns being any legs."""
     return min(found.comparisons, key=lambda row: row.distance_relabelled)
+
+
+def equation_status(found: Reproduction) -> dict[int, str]:
+    """Return how each equation came out, by its number."""
+    errors = {n: value for n, value in found.checks.items() if isinstance(n, int)}
+    errors[8] = float(np.max([errors[8], found.checks["8 closed"]]))
+    errors[9] = found.balances["Eq. 13 to 21 corrected"]
+    errors |= dict.fromkeys((22, 24, 25), found.random.lagrange)
+    status = dict.fromkeys(range(1, _EQUATIONS + 1), DEFINITION)
+    for n, value in errors.items():
+        status[n] = REPRODUCED if value < _LIMIT else f"**not {REPRODUCED}**"
+    for n, misprint in found.misprints.items():
+        status[n] = CORRECTED if misprint.confirmed else f"**not {CORRECTED}**"
+    return status
+
+
+def verdicts(found: Reproduction) -> dict[str, str]:
+    """Return whether what the paper states of itself holds, by what it is about."""
+    first, ratio = found.reach[0], _ratio_to_sokolov()
+    across, climb = first.x[1] - first.x[0], first.z[1] - first.z[0]
+    xx, yy, zz = paper.PLATFORM_INERTIA
+    holds = {
+        "solutions": len(found.modes.angle) == paper.STATED_SOLUTIONS,
+        "cylinder": found.cylinder[1] <= 1 + 1e-12,
+        "points": _points() == paper.STATED_POINTS,
+        "scale": climb > 5 * across,
+        "volume": first.cylinder_volume > 10 * first.volume,
+        "inertia": zz <= xx + yy,
+        "smaller": ratio.max() < 1,
+    }
+    return {name: "holds" if so else CORRECTED for name, so in holds.items()}
 
 
 def summary_lines(found: Reproduction) -> list[tuple[str, str]]:
     """Return the results in a few lines: what, and how it came out."""
-    text = _summary(found) | _table_2(found)
-    bad = [one.where for one in found.misprints if not one.confirmed]
-    return [
-        ("equations", f"{text['equations_held']} hold, {text['equations_corrected']} corrected"),
-        ("misprints not confirmed", ", ".join(bad) or "none"),
-        ("three ways to the forces", f"{text['agreement']} at {text['states']} random states"),
-        ("forces of Table 1 from z_0 = 0.4 m", f"{text['clean_forces']} N"),
-        ("readings of Table 1", f"{text['reading_count']} on {text['path_count']} paths"),
-        ("closest to Table 2", f"{text['best_path']}; distance {text['best_distance']}"),
-        (
-            "the same with the platform's mass fitted",
-            f"within {text['fit_this_percent']} % at {text['fit_this_mass']} kg; Sokolov: "
-            f"{text['fit_sokolov_percent']} % at {text['fit_sokolov_mass']} kg",
-        ),
-    ]
+    bad = [f"Eq. {n}" for n, one in found.misprints.items() if not one.confirmed]
+    lines = {
+        "equations": "{reproduced} hold, {corrected} corrected",
+        "misprints not confirmed": ", ".join(bad) or "none",
+        "three ways to the forces": "{found.random.forces:error} at {found.random.drawn:,} "
+        "random states",
+        "forces of Table 1 from z_0 = 0.4 m": "{clean_forces} N",
+        "interpretations of Table 1": "{interpretation_count:,} on {path_count} paths",
+        "closest to Table 2": "{best_path}; distance {best.distance_relabelled:.3f}",
+        "the same with the platform's mass fitted": "within {this.fits[0].distance:.1%} at "
+        "{this.fits[0].platform_mass:.1f} kg; Sokolov: {sokolov.fits[0].distance:.1%} at "
+        "{sokolov.fits[0].platform_mass:.1f} kg",
+    }
+    values, formatter = _values(found), _PageFormatter()
+    return [(name, formatter.vformat(text, (), values)) for name, text in lines.items()]
 
 
-def _tables(found: Reproduction) -> dict[str, str]:
+class _PageFormatter(Formatter):
+    """Formats fields; the spec ``error`` gives a bound, and percents have a space."""
+
+    def format_field(self, value: Any, format_spec: str) -> Any:
+        if format_spec == "error":
+            return tables.error(value)
+        text = super().format_field(value, format_spec)
+        return f"{text[:-1]} %" if format_spec.endswith("%") else text
+
+
+def _values(found: Reproduction) -> dict[str, Any]:
+    """Return what the template's fields name."""
+    best = closest_interpretation(found)
     return {
-        "equations": tables.equations(found),
-        "misprints": tables.misprints(found),
-        "balances": tables.balances(found),
-        "statements": tables.statements(found),
-        "reach": tables.reach(found),
-        "table_1": tables.table_1(),
-        "helix_ranges": tables.helix_ranges(found),
-        "agreement_table": tables.agreement(found),
-        "table_2": tables.table_2(),
-        "probes": reading_tables.probes(found),
-        "sampled": reading_tables.sampled(found),
-        "crossings": reading_tables.crossings(found),
-        "grid": reading_tables.grid(),
-        "paths": reading_tables.paths(found),
-        "closest": reading_tables.closest(found, relabelled=False),
-        "closest_relabelled": reading_tables.closest(found, relabelled=True),
-        "differences": reading_tables.differences(closest_reading(found)),
-        "fits": reading_tables.fits(found),
-        "moved": reading_tables.moved(found),
+        "found": found,
+        "paper": paper,
+        "checks": found.checks,
+        "misprints": found.misprints,
+        "balances": found.balances,
+        "best": best,
+        "this": found.fits["This study"],
+        "sokolov": found.fits["Sokolov"],
+        "tables": _tables(found, best),
+        **_of_equations(found),
+        **_of_statements(found),
+        **_of_table_2(found, best),
     }
 
 
-def _summary(found: Reproduction) -> dict[str, str]:
-    status = [line.status for line in equation_lines(found)]
-    mended = sum(CORRECTED in one and "number" not in one for one in status)
-    clean = [run.force for run in found.runs.values()]
-    low, high = min(f.min() for f in clean), max(f.max() for f in clean)
-    ways = found.random
+def _tables(found: Reproduction, best: Comparison) -> dict[str, str]:
+    whole = (
+        *(tables.reach, tables.helix_ranges, tables.agreement, tables.probes, tables.sampled),
+        *(tables.crossings, tables.paths, tables.fits, tables.moved),
+    )
+    return {
+        **{table.__name__: table(found) for table in whole},
+        "grid": tables.grid(),
+        "closest": tables.closest(found, relabelled=False),
+        "closest_relabelled": tables.closest(found, relabelled=True),
+        "differences": tables.differences(best),
+    }
+
+
+def _of_equations(found: Reproduction) -> dict[str, Any]:
+    status = equation_status(found)
+    corrected = sum(one == CORRECTED for one in status.values())
     return {
         "quick_note": _QUICK_NOTE if found.quick else "",
-        "equations_held": str(len(status) - mended),
-        "equations_corrected": str(mended),
-        "agreement": error(max(ways.lagrange, ways.virtual_work, ways.lagrange_virtual_work)),
-        "states": f"{ways.states + ways.left_out:,}",
-        "left_out": str(ways.left_out),
-        "nearest_limit": f"{NEAREST:g}",
-        "clean_forces": f"{low:.2f} to {high:.2f}",
-        "largest_printed": f"{_largest(paper.THIS_STUDY.numbers()):.0f}",
-        "times_too_small": f"{_largest(paper.THIS_STUDY.numbers()) / high:.0f}",
-        "path_count": str(len(found.paths)),
-        "reading_count": f"{len(found.comparisons):,}",
-        "t_t": f"{found.law.end:.5f}",
-        "t_b": f"{found.law.end - 2 * paper.RAMP_END:.5f}",
+        "status": status,
+        "corrected": corrected,
+        "reproduced": len(status) - corrected,
+        "misprint_states": STATES,
+        "solutions": 2 * found.degree,
+        "most_solutions": max(found.counts),
+        "nearest_limit": NEAREST,
     }
 
 
-def _figures(found: Reproduction) -> dict[str, str]:
+def _of_statements(found: Reproduction) -> dict[str, Any]:
     low, high = paper.STROKE_MM
+    first, law, ratio = found.reach[0], found.law, _ratio_to_sokolov()
+    xx, yy, zz = paper.PLATFORM_INERTIA
+    above, modes = int(found.modes.above.sum()), len(found.modes.angle)
+    table_1 = RPSParameters.from_preset("sokolov")
     return {
-        "modes": str(len(found.modes.angle)),
-        "modes_above": str(int(found.modes.above.sum())),
-        "equal_length": f"{1e3 * EQUAL_LENGTH:g}",
-        "workspace_h": f"{paper.WORKSPACE_PLATFORM_RADIUS_MM:g}",
-        "stroke": f"{low:g} to {high:g}",
-        "greatest_g": f"{1e3 * greatest_base_radius():.2f}",
+        "verdicts": verdicts(found),
+        "solution_counts": ", ".join(f"{times} times {n}" for n, times in found.counts.items()),
+        "modes": modes,
+        "modes_above": above,
+        "modes_below": modes - above,
+        "equal_length": 1e3 * EQUAL_LENGTH,
+        "cylinder_error": found.cylinder[0],
+        "cylinder_reach": found.cylinder[1],
+        "points": _points(),
+        "step": (high - low) / (paper.STATED_POINTS - 1),
+        "greatest_g": 1e3 * found.greatest_base_radius,
+        "climb": 1e3 * (first.z[1] - first.z[0]),
+        "across": 1e3 * (first.x[1] - first.x[0]),
+        "volume_ratio": first.cylinder_volume / first.volume,
+        "t_b": law.end - 2 * paper.RAMP_END,
+        "turns": law.turn_at_end / math.pi,
+        "short_of_a_turn": 2 * math.pi - law.turn_at_printed_end,
+        "table_1": table_1,
+        "inertia": np.diag(table_1.platform_inertia),
+        "inertia_excess": zz - xx - yy,
+        "disc_mass": DISC_MASS,
+        "disc_radius": math.sqrt(2 * zz / paper.PLATFORM_MASS),
+        "rod_mass": ROD_MASS,
+        "gyration": math.sqrt(paper.LEG_INERTIA / paper.LEG_MASS),
+        "longest_leg": max(run.length.max() for run in found.runs.values()),
+        "sokolov_ratio_low": ratio.min(),
+        "sokolov_ratio_high": ratio.max(),
     }
 
 
-def _table_2(found: Reproduction) -> dict[str, str]:
-    best = closest_reading(found)
-    this, sokolov = found.fits["This study"], found.fits["Sokolov"]
+def _of_table_2(found: Reproduction, best: Comparison) -> dict[str, Any]:
+    force = np.concatenate([run.force for run in found.runs.values()])
+    largest_printed = np.abs(paper.THIS_STUDY.numbers()).max()
     ratio = best.relabelled.numbers() / paper.THIS_STUDY.numbers()
-    strong = [
-        p.nearest
-        for p in found.probes
-        if p.forces is not None and _largest(p.forces.numbers()) > 100.0
-    ]
+    regular = [(probe, probe.forces) for probe in found.probes if probe.forces is not None]
+    strong = [p.nearest for p, ranges in regular if np.abs(ranges.numbers()).max() > 100.0]
     # By the largest distance among probes of 100 N or more; if none was tried, by the smallest.
-    reached = max(strong) if strong else min(p.nearest for p in found.probes if p.nearest)
-    upper = [p.distance for p in found.probes if p.branch == "+" and p.forces is not None]
-    weight = (paper.PLATFORM_MASS + 3 * paper.LEG_MASS) * STANDARD_GRAVITY
-    jump = next(one.error_printed for one in found.misprints if one.where == "Eq. 29")
+    reached = max(strong) if strong else min(p.nearest for p, _ in regular)
     return {
-        "slope": f"{found.approach.slope:.3f}",
-        "crossing_time": f"{found.approach.crossing:.4f}",
-        "weight": f"{weight:.1f}",
-        "printed_crossings_plus": str(_crossings(found, "+")),
-        "printed_crossings_minus": str(_crossings(found, "-")),
-        "probe_distance": f"{10 ** math.ceil(math.log10(reached)):g}",
-        "probe_best": f"{min(upper):.2f}",
-        "jump": f"{jump:.0f}",
-        "spin": f"{found.law.printed_end_rate:.0f}",
+        "clean_forces": f"{force.min():.2f} to {force.max():.2f}",
+        "largest_printed": largest_printed,
+        "times_too_small": largest_printed / force.max(),
+        "path_count": len(found.paths),
+        "interpretation_count": len(found.comparisons),
+        "weight": (paper.PLATFORM_MASS + 3 * paper.LEG_MASS) * STANDARD_GRAVITY,
+        "crossings": {branch: _crossings(found, branch) for branch in "+-"},
+        "probe_distance": 10 ** math.ceil(math.log10(reached)),
+        "probe_best": min(p.distance for p, _ in regular if p.branch == "+"),
         "best_path": _words(best.path),
-        "best_labels": str(best.labels),
-        "best_bodies": reading_tables.bodies_words(best),
-        "best_near": f"{best.nearest:.4f}",
-        "best_distance": f"{best.distance_relabelled:.3f}",
-        "ratio_low": f"{ratio.min():.2f}",
-        "ratio_high": f"{ratio.max():.2f}",
-        "fit_this_percent": f"{100 * this.fits[0].distance:.1f}",
-        "fit_sokolov_percent": f"{100 * sokolov.fits[0].distance:.1f}",
-        "fit_this_mass": f"{this.fits[0].platform_mass:.1f}",
-        "fit_sokolov_mass": f"{sokolov.fits[0].platform_mass:.1f}",
-        "second_this_percent": f"{100 * this.fits[1].distance:.0f}",
-        "second_sokolov_percent": f"{100 * sokolov.fits[1].distance:.0f}",
-        "both_this_mass": f"{this.both.platform_mass:.1f}",
-        "both_this_leg": f"{this.both.leg_mass:.1f}",
-        "mass_change": f"{100 * _mass_change(this):.0f}",
-        "printed_mass": f"{paper.PLATFORM_MASS:g}",
-        "disc_mass": f"{DISC_MASS:.1f}",
-        "gyration": f"{math.sqrt(paper.LEG_INERTIA / paper.LEG_MASS):.2f}",
+        "best_bodies": tables.bodies_words(best),
+        "ratio_low": ratio.min(),
+        "ratio_high": ratio.max(),
+        "mass_change": _mass_change(found.fits["This study"]),
     }
+
+
+def _points() -> int:
+    """Return how many of the paper's steps span its stroke, ends included."""
+    return round((paper.STROKE_MM[1] - paper.STROKE_MM[0]) / paper.STEP_MM) + 1
+
+
+def _ratio_to_sokolov() -> Array:
+    """Return the sizes of Table 2's forces over Sokolov's, shape (6,)."""
+    return np.abs(paper.THIS_STUDY.numbers() / paper.SOKOLOV.numbers())
 
 
 def _crossings(found: Reproduction, branch: str) -> int:
@@ -167,9 +230,9 @@ def _crossings(found: Reproduction, branch: str) -> int:
     return next(
         len(one.crossings)
         for one in found.paths
-        if one.reading.as_meant
-        and (one.reading.height_unit, one.reading.helix_unit) == ("mm", "mm")
-        and one.reading.branch == branch
+        if one.interpretation.as_meant
+        and (one.interpretation.height_unit, one.interpretation.helix_unit) == ("mm", "mm")
+        and one.interpretation.branch == branch
     )
 
 
@@ -183,13 +246,9 @@ def _mass_change(fits: ColumnFits) -> float:
     )
 
 
-def _words(path: PathReading) -> str:
+def _words(path: PathInterpretation) -> str:
     return (
         f"z_0 = {path.height:g} m, r_h = {1e3 * path.helix_radius:g} mm, p_h = "
         f"{1e3 * path.helix_pitch:g} mm, branch {path.branch}, g = {1e3 * path.base_radius:.0f} "
         f"mm, h = {1e3 * path.platform_radius:.0f} mm, Eq. 5 {path.eq_5}, Eq. 29 {path.eq_29}"
     )
-
-
-def _largest(values: Array) -> float:
-    return float(np.abs(values).max())

@@ -12,6 +12,14 @@ import numpy as np
 
 from rps_pin.arrays import Array
 
+#: The paper, and what is known of its publication.
+TITLE = "Analysis of a parallel robot for micro movements"
+REFERENCE = (
+    "Authors, venue and year are not known: the available text does not name them. Its most recent "
+    "source is Almeida (2018), so it was written in 2018 or later. Table 1's robot and the helix "
+    "are taken from Sokolov, whom it cites as 2003 and as 2013."
+)
+
 # Table 1, in the units it prints ------------------------------------------------------------------
 
 #: g and h, mm.

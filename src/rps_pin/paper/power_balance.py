@@ -1,8 +1,6 @@
-"""Work of the constraint models' forces beside the energies of Eq. 13 to 21, as read."""
+"""Power of the constraint models' forces compared with the energies of Eq. 13 to 21."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,22 +12,14 @@ from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.path import PathSample
 
 
-class PowerBalance(NamedTuple):
-    """Work of the constraint models' forces beside the energies of Eq. 13 to 21."""
+def power_balances(samples: int = 200) -> dict[str, float]:
+    """Return the largest difference of power and energy rate over the largest power.
 
-    variant: str
-    error: float
-    """Largest difference of power and energy rate, over the largest power."""
-
-
-def power_balances(samples: int = 200) -> list[PowerBalance]:
-    """Return how well each variant of the energies balances the power of the actuators.
-
-    Along a lively motion (`_Lively`), with the forces of the constraint models and the energies'
-    rates by central differences in time.
+    By variant of the energies; along a fast motion (`_SwingingMotion`), with the forces of the
+    constraint models, and the energies' rates by central differences in time.
     """
     robot = RPSRobot.from_preset("sokolov")
-    given, path = robot.parameters, _Lively()
+    given, path = robot.parameters, _SwingingMotion()
     times = np.linspace(0.1, path.duration - 0.1, samples)
     q, v, a = robot.state(*path.sample(times))
     force = np.array([robot.inverse_dynamics(*state).tau for state in zip(q, v, a, strict=True)])
@@ -40,7 +30,7 @@ def power_balances(samples: int = 200) -> list[PowerBalance]:
         ("Eq. 16 as printed", given.replace(leg_inertia_about="com"), ()),
         ("Eq. 19 as printed", given, ("eq_19",)),
     ]
-    found = []
+    found = {}
     for name, parameters, printed in variants:
 
         def energy(
@@ -54,11 +44,11 @@ def power_balances(samples: int = 200) -> list[PowerBalance]:
 
         step = 1e-5
         change = (energy(times + step) - energy(times - step)) / (2 * step)
-        found.append(PowerBalance(name, float(np.abs(change - power).max() / np.abs(power).max())))
+        found[name] = float(np.abs(change - power).max() / np.abs(power).max())
     return found
 
 
-class _Lively:
+class _SwingingMotion:
     """Heave and tilts that swing at 3, 6 and 9 rad/s."""
 
     duration = 3.0

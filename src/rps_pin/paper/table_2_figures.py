@@ -1,4 +1,4 @@
-"""Pictures about Table 2: forces near singularities, and the readings of Table 1."""
+"""Pictures about Table 2: forces near singularities, and the interpretations of Table 1."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def plot_probes(probes: list[Probe]) -> Figure:
     return figure
 
 
-def plot_readings(found: Reproduction) -> Figure:
-    """Draw every reading that has forces: its distance to Table 2 over its largest force."""
+def plot_interpretations(found: Reproduction) -> Figure:
+    """Draw every interpretation that has forces: its distance to Table 2 over its largest force."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=_SIZE, layout="constrained")
         axes = figure.add_subplot()
@@ -64,7 +64,7 @@ def plot_readings(found: Reproduction) -> Figure:
         axes.axhline(1.0, color=_BLACK, lw=1, ls=":", label="no forces at all")
         axes.set_xlabel("largest $|F_i|$ (N)")
         axes.set_ylabel("distance to Table 2 (1)")
-        axes.set_title("Every reading that has forces, legs in any order", loc="left")
+        axes.set_title("Every interpretation that has forces, legs in any order", loc="left")
         axes.legend(frameon=False)
     return figure
 
@@ -76,7 +76,7 @@ def plot_table_2(found: Reproduction) -> Figure:
     bars = [
         ("Sokolov (Table 2)", paper.SOKOLOV, _BLACK),
         ("This study (Table 2)", paper.THIS_STUDY, _GREY),
-        ("closest reading", closest.relabelled, LEG_COLOURS[0]),
+        ("closest interpretation", closest.relabelled, LEG_COLOURS[0]),
         ("its path, the mass fitted", found.fits["This study"].fits[0].forces, LEG_COLOURS[1]),
         ("$z_0$ = 0.4 m, mm, as printed", clean, LEG_COLOURS[2]),
     ]
@@ -93,7 +93,7 @@ def plot_table_2(found: Reproduction) -> Figure:
         axes.axhline(0.0, color=_BLACK, lw=0.8)
         axes.set_xticks(range(3), [f"$d_{leg}$ of Table 2" for leg in (1, 2, 3)])
         axes.set_ylabel("least to greatest force (N)")
-        axes.set_title("Table 2 beside readings of Table 1", loc="left")
+        axes.set_title("Table 2 beside interpretations of Table 1", loc="left")
         figure.legend(loc="outside right center", frameon=False)
     return figure
 
@@ -106,7 +106,7 @@ def plot_fit(found: Reproduction) -> Figure:
             figure.subplots(1, 2, sharey=True), COLUMNS.items(), strict=True
         ):
             fit = found.fits[column].fits[0]
-            result = next(one for one in found.paths if one.reading == fit.path)
+            result = next(one for one in found.paths if one.interpretation == fit.path)
             assert result.parts is not None  # it was fitted
             force = forces_of_fit(result.parts, fit)
             for leg, (colour, style) in enumerate(zip(LEG_COLOURS, ("-", "--", "-."), strict=True)):

@@ -1,78 +1,55 @@
-"""The reproduction page's tables in Markdown: all but those of the readings."""
+"""The reproduction page's tables in Markdown, and every interpretation as CSV."""
 
 from __future__ import annotations
 
-from rps_pin.paper import paper_data as paper
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from rps_pin.paper import interpretations
 from rps_pin.paper.agreement import Agreement
-from rps_pin.paper.compute import Reproduction
-from rps_pin.paper.equations import equation_lines
-from rps_pin.paper.printing import FORCES, between, error, forces, markdown
-from rps_pin.rps.parameters import RPSParameters
+from rps_pin.paper.comparison import OUT_OF_REACH, SINGULAR, Comparison, PathResult, distance
+from rps_pin.paper.compute import COLUMNS, Reproduction
+from rps_pin.paper.interpretations import PathInterpretation
+from rps_pin.paper.paper_data import ForceRange
+
+#: Head of the columns that `forces` fills.
+FORCES = tuple(f"F_{leg} {which}" for which in ("min", "max") for leg in (1, 2, 3))
+#: Interpretations in each list on the page, each path once.
+_SHOWN = 6
+#: Fits shown of each column.
+_FITS = 3
 
 
-def equations(found: Reproduction) -> str:
-    """Return the table of equations 1 to 29."""
-    return markdown(
-        ["Eq.", "the paper", "code (`rps_pin.`)", "largest error", "status"],
-        [[str(n), says, where, measured, status]
-         for n, says, where, measured, status in equation_lines(found)],
-    )  # fmt: skip
+def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def misprints(found: Reproduction) -> str:
-    """Return the table of the formulas' misprints."""
-    return markdown(
-        ["where", "printed", "right", "test", "printed misses by", "right misses by", "verdict"],
-        [
-            [
-                one.where,
-                one.printed,
-                one.right,
-                one.test,
-                error(one.error_printed),
-                error(one.error_right),
-                "confirmed" if one.confirmed else "**not confirmed**",
-            ]
-            for one in found.misprints
-        ],
-    )
+def error(value: float) -> str:
+    """Return an error; small ones as a power of ten that bounds them with room for another machine.
+
+    Rounding errors differ between machines; the printed page does not.
+    """
+    if value > 1e-3 or math.isnan(value):
+        return f"{value:.3g}"
+    return f"< 1e{max(-12, math.ceil(math.log10(3 * value)))}" if value > 0 else "< 1e-12"
 
 
-def statements(found: Reproduction) -> str:
-    """Return what the paper states beside what is computed."""
-    return markdown(["where", "the paper", "computed", "verdict"], found.statements)
+def forces(ranges: ForceRange) -> list[str]:
+    """Return six forces, N, to three digits, or whole newtons."""
+    return [f"{x:.3g}" if abs(x) < 1000 else f"{x:.0f}" for x in ranges.numbers()]
 
 
-def balances(found: Reproduction) -> str:
-    """Return how the energies, as read, balance the actuators' work."""
-    return markdown(
-        ["energies", "power and energy rate differ by, of the largest power"],
-        [[one.variant, error(one.error)] for one in found.balances],
-    )
-
-
-def table_1() -> str:
-    """Return Table 1 beside the preset `sokolov`, as it is read from the package."""
-    p = RPSParameters.from_preset("sokolov")
-    xx, yy, zz = (p.platform_inertia[i, i] for i in range(3))
-    ramp, steady, end = paper.PRINTED_TIMES
-    rows = [
-        ["g", f"{paper.BASE_RADIUS_MM:g} mm", f"{p.base_radius:g} m"],
-        ["h", f"{paper.PLATFORM_RADIUS_MM:g} mm", f"{p.platform_radius:g} m"],
-        ["m", f"{paper.PLATFORM_MASS:g} kg", f"{p.platform_mass:g} kg"],
-        ["I_xx; I_yy; I_zz", "; ".join(f"{x:g}" for x in paper.PLATFORM_INERTIA) + " kg m²",
-         f"{xx:g}; {yy:g}; {zz:g} kg m², kept as printed"],
-        ["r", f"{paper.LEG_COM_MM:g} mm", f"{p.leg_com:g} m"],
-        ["m_leg", f"{paper.LEG_MASS:g} kg", f"{p.leg_mass:g} kg"],
-        ["I_leg", f"{paper.LEG_INERTIA:g} kg m²",
-         f"{p.leg_inertia:g} kg m², about the {p.leg_inertia_about}"],
-        ["moving rods", "not given", f"{p.rod_mass:g} kg"],
-        ["r_h, p_h", f"{paper.HELIX_RADIUS:g} mm, {paper.HELIX_PITCH:g} mm", "as printed"],
-        ["z_0", f"{paper.HELIX_HEIGHT:g} mm", f"{paper.HELIX_HEIGHT:g} m: see Table 2"],
-        ["t_a, t_b, t_t", f"{ramp:g}, {steady:g}, {end:g} s",
-         f"{paper.RAMP_END:g}, {paper.BRAKE_START - paper.RAMP_END:.5f}, {paper.END:.5f} s"],
-    ]  # fmt: skip
-    return markdown(["", "printed", "used"], rows)
+def between(values: Iterable[float], unit: float = 1e-3, digits: int = 3) -> str:
+    """Return the least and the greatest of values, in a unit."""
+    numbers = list(values)
+    return f"{min(numbers) / unit:.{digits}f} to {max(numbers) / unit:.{digits}f}"
 
 
 def reach(found: Reproduction) -> str:
@@ -107,7 +84,7 @@ def helix_ranges(found: Reproduction) -> str:
 def agreement(found: Reproduction) -> str:
     """Return how well the ways to the forces agree."""
     columns: dict[str, Agreement] = {
-        f"{found.random.states + found.random.left_out} random states": found.random,
+        f"{found.random.drawn} random states": found.random,
         **{f"helix, branch {branch}": one for branch, one in found.helix.items()},
     }
     quantities = {
@@ -128,12 +105,209 @@ def agreement(found: Reproduction) -> str:
     )
 
 
-def table_2() -> str:
-    """Return the paper's Table 2, N."""
+def grid() -> str:
+    """Return what each choice of the grid can be."""
+    masses = "; ".join(
+        f"{name} (m = {b.platform_mass:.2f} kg, m_leg = {b.leg_mass:.2f} kg)"
+        for name, b in interpretations.BODIES.items()
+    )
     return markdown(
-        ["", *FORCES],
+        ["choice", "values"],
         [
-            ["Sokolov, as the paper quotes him", *forces(paper.SOKOLOV)],
-            ["This study", *forces(paper.THIS_STUDY)],
+            ["z_0 = 0.4 in", ", ".join(interpretations.UNITS)],
+            ["r_h = 0.75, p_h = 0.5 in", ", ".join(interpretations.UNITS)],
+            ["460 and 230 mm are", ", ".join(interpretations.RADII)],
+            ["branch (sign of β)", ", ".join(interpretations.BRANCHES)],
+            ["Eq. 5", ", ".join(interpretations.FORMS)],
+            ["Eq. 29", ", ".join(interpretations.FORMS)],
+            ["masses and Eq. 16", masses],
+            ["gravity and Eq. 19", ", ".join(interpretations.GRAVITIES)],
+            ["Eq. 14", ", ".join(interpretations.EQ_14)],
         ],
     )
+
+
+def paths(found: Reproduction) -> str:
+    """Return what becomes of the path interpretations, by the units of z_0 and of r_h and p_h."""
+    groups: dict[tuple[str, str, str], list[PathResult]] = {}
+    for result in found.paths:
+        groups.setdefault(_group(result.interpretation), []).append(result)
+    rows = []
+    for (height, helix, law), results in groups.items():
+        fate = Counter(result.refused for result in results)
+        mine = [r for r in found.comparisons if _group(r.path) == (height, helix, law)]
+        peaks = [float(np.abs(r.forces.numbers()).max()) for r in mine]
+        rows.append(
+            [
+                f"0.4 {height}",
+                f"0.75, 0.5 {helix}",
+                law,
+                str(len(results)),
+                str(fate[OUT_OF_REACH]),
+                str(fate[SINGULAR]),
+                f"{min(peaks):.3g} to {max(peaks):.3g}" if peaks else "-",
+                f"{min(r.distance for r in mine):.3f}" if mine else "-",
+                f"{min(r.distance_relabelled for r in mine):.3f}" if mine else "-",
+            ]
+        )
+    head = ["z_0", "r_h, p_h", "Eq. 29", "paths", "out of reach", "singular"]
+    last = ["largest force of the rest (N)", "least distance", "legs in any order"]
+    return markdown([*head, *last], rows)
+
+
+def closest(found: Reproduction, *, relabelled: bool) -> str:
+    """Return the closest interpretations, each path once, with their forces."""
+
+    def key(row: Comparison) -> float:
+        return row.distance_relabelled if relabelled else row.distance
+
+    seen: dict[PathInterpretation, Comparison] = {}
+    for row in sorted(found.comparisons, key=lambda r: round(key(r), 9)):
+        seen.setdefault(row.path, row)
+    return markdown(
+        ["distance", "path", "bodies", "Table 2's d_1, d_2, d_3", *FORCES],
+        [
+            [
+                f"{key(row):.3f}",
+                path_words(row.path),
+                bodies_words(row),
+                str(row.labels) if relabelled else "legs 1, 2, 3",
+                *forces(row.relabelled if relabelled else row.forces),
+            ]
+            for row in list(seen.values())[:_SHOWN]
+        ],
+    )
+
+
+def differences(row: Comparison) -> str:
+    """Return the differences of the closest interpretation to both columns of Table 2, N."""
+    lines = [["the interpretation", *forces(row.relabelled), ""]]
+    for name, ranges in COLUMNS.items():
+        gap = row.relabelled.numbers() - ranges.numbers()
+        share = distance(row.relabelled, ranges)
+        lines.append([f"less {name}", *(f"{x:+.1f}" for x in gap), f"{share:.3f}"])
+    return markdown(["", *FORCES, "distance"], lines)
+
+
+def fits(found: Reproduction) -> str:
+    """Return the paths that come closest with a free mass, and the nearest with two."""
+    rows = []
+    for column, one in found.fits.items():
+        both = ("platform and legs", one.both)
+        for free, fit in [*(("platform", fit) for fit in one.fits[:_FITS]), both]:
+            masses = [f"{fit.platform_mass:.2f}", f"{fit.leg_mass:.2f}"]
+            rows.append(
+                [
+                    *(column, path_words(fit.path), free, *masses, str(fit.labels)),
+                    *forces(fit.forces),
+                    f"{fit.distance:.3f}",
+                ]
+            )
+    head = ["column", "path", "free masses", "m (kg)", "m_leg (kg)", "Table 2's d_1, d_2, d_3"]
+    return markdown([*head, *FORCES, "distance"], rows)
+
+
+def moved(found: Reproduction) -> str:
+    """Return the nearest path's fits with one of its numbers moved."""
+    columns = list(found.fits)
+    rows = [["as it is", *_mass_and_distance(*((fit.fits[0].platform_mass, fit.fits[0].distance)
+             for fit in found.fits.values()))]]  # fmt: skip
+    for each in zip(*(found.fits[column].moved for column in columns), strict=True):
+        name = f"{each[0].moved} {1e3 * each[0].by:+g} mm"
+        rows.append(
+            [name, *_mass_and_distance(*((one.platform_mass, one.distance) for one in each))]
+        )
+    head = [text for column in columns for text in (f"{column}: m (kg)", "distance")]
+    return markdown(["path", *head], rows)
+
+
+def crossings(found: Reproduction) -> str:
+    """Return when the paths with Table 1's radii, Eq. 5 and 29 corrected, cross singularities."""
+    rows = []
+    for result in found.paths:
+        path = result.interpretation
+        if path.as_meant and result.crossings:
+            times = ", ".join(f"{time:.4f}" for time in result.crossings)
+            rows.append([f"0.4 {path.height_unit}", path.helix_unit, path.branch, times])
+    return markdown(["z_0", "r_h, p_h in", "branch", "crosses a singularity at (s)"], rows)
+
+
+def sampled(found: Reproduction) -> str:
+    """Return what sampling across crossings reports."""
+    return markdown(
+        ["path", "crossings", "samples a second", *FORCES, "distance"],
+        [
+            [
+                *(row.path, str(row.crossings), f"{row.rate:.0f}"),
+                *forces(row.forces),
+                f"{row.distance:.3g}",
+            ]
+            for row in found.sampled
+        ],
+    )
+
+
+def probes(found: Reproduction) -> str:
+    """Return the helices of several heights."""
+    rows = []
+    for probe in found.probes:
+        name = [f"{1e3 * probe.height:.5g}", probe.branch]
+        if probe.forces is None:
+            times = ", ".join(f"{time:.3f}" for time in probe.crossings)
+            rows.append([*name, f"crosses at {times} s", *["-"] * 7])
+        else:
+            near = f"{probe.nearest:.1e}"
+            rows.append([*name, near, *forces(probe.forces), f"{probe.distance:.3f}"])
+    return markdown(["z_0 (mm)", "branch", "nearest", *FORCES, "distance"], rows)
+
+
+def interpretations_csv(found: Reproduction) -> str:
+    """Return every interpretation as CSV, the closest to Table 2 first and those refused last."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    path = ["z_0", "r_h_p_h", "g_h", "branch", "eq_5", "eq_29"]
+    columns = [f"F{leg}_{which}_N" for which in ("min", "max") for leg in (1, 2, 3)]
+    last = ["distance", "distance_any_labels", "labels", "refused", "singular_at_s"]
+    writer.writerow([*path, "bodies", "gravity", "eq_14", "nearest", *columns, *last])
+    for row in found.comparisons:
+        numbers = [f"{x:.4g}" for x in row.forces.numbers()]
+        ends = [f"{row.distance:.4f}", f"{row.distance_relabelled:.4f}", str(row.labels), "", ""]
+        writer.writerow([*_fields(row.path), *row.body, f"{row.nearest:.3g}", *numbers, *ends])
+    for result in found.paths:
+        if result.refused:
+            times = " ".join(f"{time:.4f}" for time in result.crossings)
+            writer.writerow([*_fields(result.interpretation), *[""] * 13, result.refused, times])
+    return text.getvalue()
+
+
+def path_words(path: PathInterpretation) -> str:
+    """Return what a path reads Table 1 as."""
+    return (
+        f"z_0 in {path.height_unit}; r_h, p_h in {path.helix_unit}; {path.radii}; branch "
+        f"{path.branch}; Eq. 5 {path.eq_5}, Eq. 29 {path.eq_29}"
+    )
+
+
+def bodies_words(row: Comparison) -> str:
+    """Return what an interpretation takes the bodies to be."""
+    return f"{row.body.bodies}; {row.body.gravity}; {row.body.eq_14}"
+
+
+# Inner workings -----------------------------------------------------------------------------------
+
+
+def _mass_and_distance(*pairs: tuple[float, float]) -> Sequence[str]:
+    return [
+        text
+        for mass, gap in pairs
+        for text in (("crosses", "-") if math.isnan(gap) else (f"{mass:.1f}", f"{gap:.3f}"))
+    ]
+
+
+def _fields(path: PathInterpretation) -> list[str]:
+    choice = [path.height_unit, path.helix_unit, path.radii, path.branch]
+    return [*choice, path.eq_5, path.eq_29]
+
+
+def _group(path: PathInterpretation) -> tuple[str, str, str]:
+    return path.height_unit, path.helix_unit, path.eq_29

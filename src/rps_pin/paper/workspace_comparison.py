@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from rps_pin.errors import InputError
+from rps_pin.rps.kinematics.pose import position
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import parameters_of, workspace
 from rps_pin.rps.workspace.geometry import volume
@@ -80,6 +82,31 @@ def paper_comparison(
         raise InputError("base_radii is empty: at least one is needed")
     free = given.replace(leg_angle_limits=(-math.pi, math.pi), spherical_cone_limit=math.pi)
     return tuple(_row(free.replace(base_radius=float(g)), points) for g in base_radii)
+
+
+def theoretical_reach() -> tuple[float, float]:
+    """Return the error of |(p_x, p_y)| = h sin^2(beta/2) to half a turn, and its greatest value.
+
+    Both over h, and the error not less than 1e-12.
+    """
+    beta, way = np.meshgrid(np.linspace(0.0, math.pi, 181), np.linspace(0.0, 2 * math.pi, 73))
+    pose = np.stack([np.ones_like(beta), beta * np.cos(way), beta * np.sin(way)], axis=-1)
+    sideways = np.hypot(*np.moveaxis(position(pose, 1.0)[..., :2], -1, 0))
+    error = float(np.abs(sideways - np.sin(beta / 2) ** 2).max())
+    return max(error, 1e-12), float(sideways.max())
+
+
+def greatest_base_radius() -> float:
+    """Return the greatest g for which p_x and p_y stay within the paper's 2.5 mm, m.
+
+    The extremes lie at corners of the stroke: two lengths a leg will do.
+    """
+    micro = RPSParameters.from_preset("micro")
+
+    def beyond(base_radius: float) -> float:
+        return paper_comparison(micro, [base_radius], points=2)[0].reach - (STATED_REACH)
+
+    return float(brentq(beyond, micro.platform_radius, 1.5 * micro.platform_radius, xtol=1e-9))
 
 
 def _row(parameters: RPSParameters, points: int) -> PaperComparison:

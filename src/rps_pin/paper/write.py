@@ -1,4 +1,4 @@
-"""The reproduction as files: the page, its pictures and every reading that was tried."""
+"""The reproduction as files: the page, its pictures and every interpretation that was tried."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rps_pin.files import whole_file
 from rps_pin.paper.compute import Reproduction
 from rps_pin.paper.figures import write_figures
 from rps_pin.paper.page import render
-from rps_pin.paper.reading_tables import readings_csv
+from rps_pin.paper.tables import interpretations_csv
 
 
 def write(
@@ -17,7 +17,7 @@ def write(
     folder: Path,
     track: Callable[[Iterable[str], str], Iterable[str]] = lambda items, _: items,
 ) -> list[Path]:
-    """Write ``reproduction.md``, and its pictures and readings into ``reproduction/`` beside it.
+    """Write ``reproduction.md``, and its pictures and the CSV into ``reproduction/`` beside it.
 
     Each file is written whole or not at all, the page last. What stands there is replaced.
 
@@ -38,8 +38,8 @@ def write(
     page, beside = folder / "reproduction.md", folder / "reproduction"
     beside.mkdir(parents=True, exist_ok=True)
     pictures = write_figures(found, beside, track)
-    readings = beside / "readings.csv"
-    for path, text in ((readings, readings_csv(found)), (page, render(found))):
+    interpretations = beside / "interpretations.csv"
+    for path, text in ((interpretations, interpretations_csv(found)), (page, render(found))):
         with whole_file(path) as scratch:
             scratch.write_text(text, "utf-8")
-    return [page, *pictures, readings]
+    return [page, *pictures, interpretations]

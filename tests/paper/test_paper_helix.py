@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from rps_pin import RPSRobot, helix
 from rps_pin.errors import InputError
-from rps_pin.paper.read_helix import (
+from rps_pin.paper.paper_helix import (
+    PaperHelix,
     PartOfPath,
-    ReadHelix,
     corrected_turn,
     printed_turn,
     smooth_parts,
@@ -28,7 +28,7 @@ END = (1 + ROOT) / 2
 def test_corrected_it_is_the_project_s_helix(branch: Literal["+", "-"]) -> None:
     robot = RPSRobot.from_preset("sokolov")
     theirs = helix(robot, radius=0.03, pitch=0.02, height=0.5, branch=branch)
-    mine = ReadHelix(0.23, 0.03, 0.02, 0.5, branch=branch)
+    mine = PaperHelix(0.23, 0.03, 0.02, 0.5, branch=branch)
     times = np.linspace(0, END, 301)
     for one, other in zip(mine.sample(times), theirs.sample(times), strict=True):
         assert_allclose(one, other, rtol=0, atol=1e-12)
@@ -39,7 +39,7 @@ def test_corrected_it_is_the_project_s_helix(branch: Literal["+", "-"]) -> None:
 def test_rates_and_accelerations_are_derivatives(
     eq_5: Literal["corrected", "printed"], eq_29: Literal["corrected", "printed"]
 ) -> None:
-    path = ReadHelix(0.23, 0.05, 0.02, 0.5, eq_5=eq_5, eq_29=eq_29)
+    path = PaperHelix(0.23, 0.05, 0.02, 0.5, eq_5=eq_5, eq_29=eq_29)
     step = 1e-6
     times = np.array([0.1, 0.3, 1.7, 3.3, 4.9, 5.1])
     after, before = path.sample(times + step), path.sample(times - step)
@@ -52,7 +52,7 @@ def test_rates_and_accelerations_are_derivatives(
 def test_equation_5_as_printed_is_inverted_by_its_path() -> None:
     """The pose of the path, put into the printed Eq. 5, gives the helix's centre."""
     h, radius = 0.23, 0.05
-    path = ReadHelix(h, radius, 0.02, 0.5, eq_5="printed")
+    path = PaperHelix(h, radius, 0.02, 0.5, eq_5="printed")
     times = np.linspace(0, END, 50)
     tilt = path.sample(times).pose[:, 1:]
     beta = np.linalg.norm(tilt, axis=1)
@@ -70,7 +70,7 @@ def test_the_corrected_path_s_centre_is_on_the_helix() -> None:
     """By rotations of SciPy and Eq. 4."""
     h, radius = 0.23, 0.05
     times = np.linspace(0, END, 50)
-    pose = ReadHelix(h, radius, 0.02, 0.5, branch="-").sample(times).pose
+    pose = PaperHelix(h, radius, 0.02, 0.5, branch="-").sample(times).pose
     turn = Rotation.from_rotvec(np.column_stack([pose[:, 1:], np.zeros(50)])).as_matrix()
     phi = corrected_turn(times)[0]
     assert_allclose(h / 2 * (turn[:, 0, 0] - turn[:, 1, 1]), radius * np.cos(phi), atol=1e-14)
@@ -92,16 +92,16 @@ def test_equation_29_as_the_paper_prints_it() -> None:
 
 
 def test_a_path_is_smooth_but_where_the_printed_one_jumps() -> None:
-    (whole,) = smooth_parts(ReadHelix(0.23, 0.05, 0.02, 0.5))
+    (whole,) = smooth_parts(PaperHelix(0.23, 0.05, 0.02, 0.5))
     assert (whole.start, whole.duration) == (0.0, pytest.approx(END))
-    first, second = smooth_parts(ReadHelix(0.23, 0.05, 0.02, 0.5, eq_29="printed"))
+    first, second = smooth_parts(PaperHelix(0.23, 0.05, 0.02, 0.5, eq_29="printed"))
     assert first.duration + second.duration == pytest.approx(END)
     end, start = first.sample(first.duration).pose, second.sample(0.0).pose
     assert abs(end - start).max() > 0.1
 
 
 def test_a_part_is_the_whole_later() -> None:
-    whole = ReadHelix(0.23, 0.05, 0.02, 0.5)
+    whole = PaperHelix(0.23, 0.05, 0.02, 0.5)
     part = PartOfPath(whole, 1.0, 3.0)
     times = np.linspace(0, part.duration, 7)
     assert_allclose(part.sample(times).pose, whole.sample(times + 1.0).pose, rtol=1e-15)
@@ -111,4 +111,4 @@ def test_a_part_is_the_whole_later() -> None:
 
 def test_a_helix_wider_than_the_platform_is_refused() -> None:
     with pytest.raises(InputError, match=r"r_h = 0\.75 m exceeds h = 0\.23 m"):
-        ReadHelix(0.23, 0.75, 0.5, 0.4)
+        PaperHelix(0.23, 0.75, 0.5, 0.4)

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.paper.paper_data import BRAKE_START, END, RAMP_END, ROOT
+from rps_pin.paper.paper_data import (
+    BRAKE_START,
+    END,
+    HELIX_PITCH,
+    HELIX_RADIUS,
+    PRINTED_TIMES,
+    RAMP_END,
+    ROOT,
+)
 from rps_pin.trajectories.helix import Branch
 from rps_pin.trajectories.path import PathSample, Trajectory, checked_times
 
@@ -33,7 +42,7 @@ def corrected_turn(t: ArrayLike) -> tuple[Array, Array, Array]:
     return _turn(t, _corrected_branch)
 
 
-class ReadHelix:
+class PaperHelix:
     """The helix of Eq. 26 to 28, with Eq. 5 and Eq. 29 corrected or as printed.
 
     On p_x = r cos(phi), p_y = r sin(phi), Eq. 5 gives a constant tilt beta, r = h sin^2(beta/2),
@@ -111,12 +120,57 @@ class PartOfPath:
         return self.whole.sample(np.minimum(times, self.start + self.duration))
 
 
-def smooth_parts(path: ReadHelix) -> tuple[PartOfPath, ...]:
+def smooth_parts(path: PaperHelix) -> tuple[PartOfPath, ...]:
     """Return the stretches in which a helix does not jump: two if Eq. 29 is as printed."""
     if path.jumps:
         # The first ends on the middle branch's side of the jump.
         return PartOfPath(path, 0.0, BRAKE_START - 1e-12), PartOfPath(path, BRAKE_START, END)
     return (PartOfPath(path, 0.0, END),)
+
+
+class HelixLaw(NamedTuple):
+    """What Eq. 29, corrected, does."""
+
+    end: float
+    """First time after the brakes go on at which phi' is zero, s."""
+    turn_at_end: float
+    """phi there, rad."""
+    greatest_speed: float
+    """Of the centre with r_h = 0.75 and p_h = 0.5, units/s."""
+    ramp: float
+    """Its acceleration along the path while phi' rises, units/s^2."""
+    turn_at_printed_end: float
+    """phi at Table 1's t_t = 5.2 s, rad."""
+    printed_end_turn: float
+    """phi at the end with the last branch as printed, rad."""
+    printed_end_rate: float
+    """phi' there, rad/s."""
+
+
+def helix_law() -> HelixLaw:
+    """Return what Eq. 29 does, corrected and as printed, by root finding and sampling."""
+
+    def rate(t: float) -> float:
+        return float(corrected_turn(t)[1])
+
+    end = float(brentq(rate, BRAKE_START, 6.0, xtol=1e-14))
+    times = np.linspace(0.0, end, 20_001)
+    phi, _, _ = corrected_turn(times)
+    radius, climb = HELIX_RADIUS, HELIX_PITCH / (2 * math.pi)
+    path = np.stack([radius * np.cos(phi), radius * np.sin(phi), climb * phi], axis=-1)
+    speed = np.linalg.norm(np.gradient(path, times, axis=0, edge_order=2), axis=-1)
+    rising = times < RAMP_END - 0.01
+    ramp = np.polynomial.polynomial.polyfit(times[rising], speed[rising], 1)[1]
+    last = printed_turn(end)
+    return HelixLaw(
+        end,
+        float(corrected_turn(end)[0]),
+        float(speed.max()),
+        float(ramp),
+        float(corrected_turn(PRINTED_TIMES[2])[0]),
+        float(last[0]),
+        float(last[1]),
+    )
 
 
 def _pose(z: Array, tilt: Array) -> Array:

@@ -1,8 +1,8 @@
-"""What Table 1 can mean: a declared grid of readings, written down before it was computed.
+"""Interpretations of Table 1: a grid that was declared before it was computed.
 
-A reading is a path (what z_0, r_h and p_h are in, which tilt, which radii, which Eq. 5 and 29) and
-a robot that follows it (masses and inertias, Eq. 14, 16 and 19, gravity). Every combination of the
-lists below is tried; nothing is fitted.
+An interpretation is a path (the units of z_0, r_h and p_h, the branch, the radii, the forms of
+Eq. 5 and 29) and a robot that follows it (masses and inertias, Eq. 14, 16 and 19, gravity). Every
+combination of the lists below is computed; nothing is fitted.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from itertools import product
 from typing import Literal, NamedTuple
 
 from rps_pin.paper import paper_data as paper
-from rps_pin.paper.read_helix import Form, ReadHelix
+from rps_pin.paper.paper_helix import Form, PaperHelix
 from rps_pin.trajectories.helix import Branch
 
 # The path -----------------------------------------------------------------------------------------
@@ -33,7 +33,7 @@ FORMS: tuple[Form, ...] = ("corrected", "printed")
 
 
 @dataclass(frozen=True)
-class PathReading:
+class PathInterpretation:
     """One way to read what Table 1 and Eq. 26 to 29 say of the path."""
 
     height_unit: str
@@ -76,7 +76,7 @@ class PathReading:
         """Whether g and h are radii, and Eq. 5 and 29 are corrected."""
         return (self.radii, self.eq_5, self.eq_29) == ("radii", "corrected", "corrected")
 
-    def path(self) -> ReadHelix:
+    def path(self) -> PaperHelix:
         """Return the helix.
 
         Raises
@@ -84,7 +84,7 @@ class PathReading:
         InputError
             If it lies out of reach: r_h exceeds h.
         """
-        return ReadHelix(
+        return PaperHelix(
             self.platform_radius,
             self.helix_radius,
             self.helix_pitch,
@@ -95,14 +95,14 @@ class PathReading:
         )
 
 
-def path_readings(*, quick: bool = False) -> Iterator[PathReading]:
+def path_interpretations(*, quick: bool = False) -> Iterator[PathInterpretation]:
     """Yield every combination; `quick` leaves out units, and other radii and Eq. 5 than meant."""
     units = ("mm", "m") if quick else tuple(UNITS)
     helix_units = ("mm", "dm") if quick else tuple(UNITS)
     radii = ("radii",) if quick else tuple(RADII)
     eq_5 = FORMS[:1] if quick else FORMS
     for choice in product(units, helix_units, radii, BRANCHES, eq_5, FORMS):
-        yield PathReading(*choice)
+        yield PathInterpretation(*choice)
 
 
 # The bodies ---------------------------------------------------------------------------------------
@@ -139,7 +139,7 @@ EQ_14 = ("R I R'", "R I R")
 STANDARD_GRAVITY = 9.81
 
 
-class BodyReading(NamedTuple):
+class BodyInterpretation(NamedTuple):
     """One way to read what the paper says of the bodies."""
 
     bodies: str
@@ -150,6 +150,6 @@ class BodyReading(NamedTuple):
     """Of `EQ_14`: corrected, or as printed."""
 
 
-def body_readings() -> list[BodyReading]:
+def body_interpretations() -> list[BodyInterpretation]:
     """Return every combination."""
-    return [BodyReading(*choice) for choice in product(BODIES, GRAVITIES, EQ_14)]
+    return [BodyInterpretation(*choice) for choice in product(BODIES, GRAVITIES, EQ_14)]
