@@ -3,7 +3,7 @@
     OPENBLAS_NUM_THREADS=1 python examples/logging_and_live_view.py --output log
 
 The loop of `control_loop.py`. What a real machine knows of itself is logged: encoders, target,
-estimated pose, forces, status, distance to a singularity. The log is one array, allocated before
+estimated pose, forces, status, distance to type II. The log is one array, allocated before
 the loop; files are written after it. The view is a process of its own, which the loop never waits
 for; its address, on this machine only, is printed. `--no-view` leaves it out.
 
@@ -51,14 +51,14 @@ ROW = np.dtype(
         ("target", float, 3),
         ("estimate", float, 3),
         ("force", float, 3),
-        ("distance", float),
+        ("type_ii", float),
         ("status", float),
     ]
 )
 COLUMNS = (
     "time_s,reading_1_m,reading_2_m,reading_3_m,target_z_m,target_tilt_x_rad,target_tilt_y_rad,"
     "estimate_z_m,estimate_tilt_x_rad,estimate_tilt_y_rad,force_1_N,force_2_N,force_3_N,"
-    "distance,status"
+    "type_ii,status"
 )
 
 
@@ -96,8 +96,8 @@ def main() -> int:
                 reading = plant.reading()
                 status = controller.tick(reading, target)
                 plant.step(controller.forces)  # yours: send them to the drives
-                pose, distance = controller.estimate.answers.pose, controller.estimate.distance
-                log[k] = time[k], reading, target[0], pose, controller.forces, distance, status
+                pose, type_ii = controller.estimate.answers.pose, controller.estimate.type_ii
+                log[k] = time[k], reading, target[0], pose, controller.forces, type_ii, status
                 logged = k + 1
                 if view:
                     view.show(pose)

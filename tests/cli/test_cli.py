@@ -80,7 +80,7 @@ def test_json_is_all_that_is_printed_and_complete(tmp_path: Path) -> None:
     assert_allclose(summary["duration"], 0.5 + np.sqrt(1 + 9 * np.pi**2) / 2)
     assert summary["loop_gap_max"] <= 1e-12
     assert summary["residual_max"] <= 1e-10
-    assert 0 < summary["singularity_distance_min"] < 1
+    assert 0 < summary["minimum_distance"] < 1
     assert [one["actuator"] for one in summary["actuators"]] == [1, 2, 3]
     assert all(Path(file).is_file() for file in summary["files"])
 

@@ -62,7 +62,7 @@ def test_the_table_holds_what_the_summary_says(finished: tuple[Path, str]) -> No
     assert summary["force_peak"] == pytest.approx(np.abs(force).max(), rel=1e-9)
     rms = np.sqrt((force**2).mean(axis=0)).max()
     assert summary["force_rms"] == pytest.approx(rms, rel=1e-9)
-    assert summary["nearest_singular"] == pytest.approx(table["distance"][here].min(), rel=1e-9)
+    assert summary["minimum_type_ii"] == pytest.approx(table["type_ii"][here].min(), rel=1e-9)
     assert (
         summary["statuses"] == {"bad input": int((table["status"] == 1).sum())} == {"bad input": 2}
     )

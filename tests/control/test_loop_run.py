@@ -166,7 +166,7 @@ def test_its_arrays_agree_with_each_other() -> None:
     assert fresh.sum() > 60
     estimate = ROBOT.forward_kinematics(run.reading[fresh], run.pose[fresh])
     np.testing.assert_allclose(run.estimate[fresh], estimate, rtol=0, atol=1e-9)
-    assert ((run.distance > 0.1) & (run.distance <= 1.0)).all()
+    assert ((run.type_ii > 0.1) & (run.type_ii <= 1.0)).all()
     for name in ARRAYS:
         assert len(getattr(run, name)) == n
 
@@ -329,7 +329,7 @@ def test_its_csv_reads_back(tmp_path: Path) -> None:
     rows = np.genfromtxt(tmp_path / "run.csv", delimiter=",", names=True)
     assert rows.dtype.names is not None
     assert len(rows) == 200
-    expected = {"time_s": run.time, "distance": run.distance, "status": run.status}
+    expected = {"time_s": run.time, "type_ii": run.type_ii, "status": run.status}
     for name in ("target", "pose", "estimate"):
         for k, entry in enumerate(("z_m", "tilt_x_rad", "tilt_y_rad")):
             expected[f"{name}_{entry}"] = getattr(run, name)[:, k]

@@ -72,7 +72,7 @@ def random_run(seed: int, n: int = 60, apart: float = 1e-3) -> LoopRun:
         command=rng.normal(size=(n, 3)),
         applied=rng.normal(size=(n, 3)) * [1.0, 3.0, 2.0],
         status=rng.choice([0, 0, 0, 2, 32, 1 | 8, 32 | 64, 128], size=n),
-        distance=rng.uniform(size=n),
+        type_ii=rng.uniform(size=n),
         pace=np.ones(n),
         gap=rng.uniform(size=n) * 1e-12,
         events=(),
@@ -170,7 +170,7 @@ def test_figures_are_of_the_ticks_in_the_window(
         "force_peak": max(map(max, force)),
         "force_rms": max(map(rms, force)),
         "saturated": sum(bool(run.status[k] & 32) for k in ticks) / len(ticks),
-        "nearest_singular": min(run.distance[k] for k in ticks),
+        "minimum_type_ii": min(run.type_ii[k] for k in ticks),
         "gap": max(run.gap[k] for k in ticks),
         "ticks": len(ticks),
     }
@@ -247,7 +247,7 @@ def test_the_table_shows_every_figure() -> None:
         *(summary.centre_rms, summary.centre_max, summary.centre_end),
         *(summary.turn_rms, summary.turn_max, summary.turn_end),
         *(summary.length_rms, summary.length_max, summary.force_rms, summary.force_peak),
-        summary.nearest_singular,
+        summary.minimum_type_ii,
     ]
     for value in shown:
         assert f"{value:.4g}" in text

@@ -153,7 +153,7 @@ def test_a_path_through_a_singularity_is_not_followed_into_it(
     assert held
     assert "too near a singularity" in controller.status_text
     if speed < 1.0 and kind != "pd":  # whose gains are a leg's, for the inertia where it started
-        assert controller.estimate.distance > 0.1
+        assert controller.estimate.type_ii > 0.1
         assert not status & Status.STOPPED
         np.testing.assert_allclose(plant.rate, 0.0, atol=1e-2)
     else:  # 50 N do not stop it in time, and that is said

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 from rps_pin import InputError, RPSRobot, SingularityError, UnreachableError, helix
 from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion, sample_times, summarise
+from rps_pin.rps.singularity.measures import singularity_measures
 from rps_pin.trajectories import HelixPath
 from tests.reference import newton_euler
 
@@ -71,10 +72,16 @@ def test_the_summary_says_what_the_samples_say(robot: RPSRobot, run: MotionRun) 
         assert one.speed_peak == max(abs(run.speed[:, leg]))
         assert one.power_peak == max(abs(run.force[:, leg] * run.speed[:, leg]))
         assert 0 < one.power_mean < one.power_peak
-    nearest = int(np.argmin(run.singularity_distance))
-    assert summary.singularity_time == run.time[nearest]
-    condition = robot.mechanism.condition(run.configuration[nearest])
-    assert_allclose(summary.singularity_distance_min, 1 / condition, rtol=1e-9)
+    worst = int(np.argmin(run.passive_conditioning))
+    condition = robot.mechanism.condition(run.configuration[worst])
+    assert_allclose(summary.passive_conditioning_min, 1 / condition, rtol=1e-9)
+    distance = singularity_measures(robot.parameters, run.pose).distance
+    assert_allclose(summary.minimum_distance, distance.min(), rtol=1e-5)
+    nearest = singularity_measures(robot.parameters, summary.minimum_pose)
+    assert_allclose(summary.minimum_distance, nearest.distance, rtol=1e-12)
+    assert summary.minimum_singularity == "type II"
+    pose = helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4).sample(summary.minimum_time).pose
+    assert_allclose(summary.minimum_pose, pose, rtol=0, atol=1e-15)
     assert summary.exceeded == ()
 
 
@@ -113,7 +120,7 @@ def test_a_motion_across_a_singularity_is_refused_and_says_when(
 
 def test_the_other_branch_of_that_motion_crosses_none(robot: RPSRobot) -> None:
     run = run_motion(robot, helix(robot, radius=75e-3, pitch=50e-3, height=0.4, branch="-"), 100.0)
-    assert run.singularity_distance.min() > 1e-4
+    assert run.passive_conditioning.min() > 1e-4
 
 
 def test_a_motion_that_starts_in_a_singularity_says_so(robot: RPSRobot) -> None:

@@ -21,8 +21,9 @@ from rps_pin.cli.helix_options import (
     RadiusOption,
     chosen_helix,
 )
+from rps_pin.rps.singularity.measures import GRAZE
 from rps_pin.rps.singularity.path_check import check_path
-from rps_pin.rps.singularity.path_events import LimitEvent, SingularityEvent
+from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck, SingularityEvent
 from rps_pin.trajectories.helix import PAPER_DURATION
 
 
@@ -35,8 +36,8 @@ def check_command(
     duration: DurationOption = PAPER_DURATION,
     threshold: Annotated[
         float,
-        typer.Option(help="Distance to a singularity (of at most 1) below which a path grazes it."),
-    ] = 1e-3,
+        typer.Option(help="Distance to a singularity (0 to 1) below which a path grazes it."),
+    ] = GRAZE,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the findings as JSON, and nothing else.")
     ] = False,
@@ -59,7 +60,7 @@ def check_command(
     path = chosen_helix(machine, radius, pitch, height, branch, duration)
     found = check_path(machine, path, threshold=threshold)
     if as_json:
-        answer = found._asdict() | {
+        answer = _plain(found) | {
             "robot": machine.parameters.name,
             "ok": found.ok,
             "singularities": [_plain(event) for event in found.singularities],
@@ -74,9 +75,9 @@ def check_command(
         raise typer.Exit(1)
 
 
-def _plain(event: SingularityEvent | LimitEvent) -> dict[str, object]:
-    """Return an event as JSON has it."""
+def _plain(found: PathCheck | SingularityEvent | LimitEvent) -> dict[str, object]:
+    """Return a named tuple as a dictionary without arrays, for JSON."""
     return {
         name: value.tolist() if isinstance(value, np.ndarray) else value
-        for name, value in event._asdict().items()
+        for name, value in found._asdict().items()
     }

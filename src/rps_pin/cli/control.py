@@ -130,7 +130,7 @@ def _write(
             summary,
             {
                 "tracking.png": "Errors against the target over time",
-                "forces.png": "Forces, distance to a singularity and statuses over time",
+                "forces.png": "Forces, distance to type II and statuses over time",
             },
         ),
     }

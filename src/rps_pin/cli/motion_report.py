@@ -74,14 +74,15 @@ def actuator_table(actuators: tuple[ActuatorSummary, ...]) -> Table:
 
 def run_table(summary: MotionSummary) -> Table:
     """Return duration, accuracy, and how near the motion comes to a singularity."""
-    z, tilt_x, tilt_y = summary.singularity_pose
+    z, tilt_x, tilt_y = summary.minimum_pose
     table = Table(show_header=False)
     table.add_row("duration", f"{summary.duration:.6g} s ({summary.samples} samples)")
     table.add_row("largest loop gap", f"{summary.loop_gap_max:.2g} m")
     table.add_row("largest KKT residual", f"{summary.residual_max:.2g} of the largest force")
     table.add_row(
-        "smallest distance to a singularity\n(1 / condition number: 0 singular, 1 best)",
-        f"{summary.singularity_distance_min:.4g} at t = {summary.singularity_time:.4g} s,\n"
+        "smallest distance to a singularity\n(0 singular, 1 best)",
+        f"{summary.minimum_distance:.4g} ({summary.minimum_singularity}) "
+        f"at t = {summary.minimum_time:.4g} s,\n"
         f"z = {z:.6g} m, tilt = ({tilt_x:.4g}, {tilt_y:.4g}) rad",
     )
     return table

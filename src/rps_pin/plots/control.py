@@ -72,7 +72,7 @@ def plot_tracking(
 def plot_loop_forces(
     run: LoopRun, axes: Sequence[Axes] | None = None, *, begin: float = 0.0
 ) -> Figure:
-    """Draw the actuators' forces over time (N), the distance to a singularity, and the statuses.
+    """Draw the actuators' forces over time (N), the distance to type II, and the statuses.
 
     Parameters
     ----------
@@ -107,9 +107,9 @@ def plot_loop_forces(
                 forces.axhline(side, color="black", linewidth=0.8, linestyle=":")
         forces.set_ylabel("force (N)")
         forces.legend(**_LEGEND)
-        distance.plot(time, run.distance[here], color="black")
-        distance.set_ylim(0.0, 1.1 * float(run.distance[here].max(initial=0.1)))
-        distance.set_ylabel("distance to\na singularity (1)")
+        distance.plot(time, run.type_ii[here], color="black")
+        distance.set_ylim(0.0, 1.1 * float(run.type_ii[here].max(initial=0.1)))
+        distance.set_ylabel("distance to\ntype II (1)")
         _draw_statuses(statuses, run)
         _finish((forces, distance, statuses), time)
     return figure

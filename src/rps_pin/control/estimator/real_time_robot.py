@@ -55,7 +55,7 @@ class RealTimeRobot:
     cut_off
         Of the filter of such speeds, Hz (see `rps_pin.control.loop.filters`); infinite for none.
     near_singular
-        `distance`, or `force_determinant`, below which the status has `Status.NEAR_SINGULAR`, 0 to
+        `type_ii`, or `force_determinant`, below which the status has `Status.NEAR_SINGULAR`, 0 to
         1.
     largest_jump
         Largest difference of a leg length from its prediction (the last good length and its speed),
@@ -75,7 +75,7 @@ class RealTimeRobot:
         Ticks since the last good result of each: 0 if the last call gave one.
     determinant : float
         At the estimated pose, 0 at a type II singularity: `SingularityMeasures.determinant`, -1 to
-        1. Its absolute value is at most `distance`.
+        1. Its absolute value is at most `type_ii`.
     force_determinant : float
         At the pose of the last good inverse dynamics: `leg_equations.determinant`, -1 to 1, 0 at
         type II and constraint singularities.
@@ -120,7 +120,7 @@ class RealTimeRobot:
         """Start again from a pose, at rest and without forces. Raises as the constructor does."""
         _, d, way, _ = start_of(near, self._g, self._h, CONDITION_LIMIT)
         self.age, self.elapsed, self._fraction = 0, 0.0, 1.0
-        self._distance: float | None = None
+        self._type_ii: float | None = None
         self.determinant = 0.0
         self._length: Triple | None = d
         self._geometry_flags = 0
@@ -217,14 +217,16 @@ class RealTimeRobot:
     # On demand ------------------------------------------------------------------------------------
 
     @property
-    def distance(self) -> float:
-        """Distance of the estimated pose to a type II singularity.
+    def type_ii(self) -> float:
+        """`SingularityMeasures.type_ii` of the estimated pose, 0 to 1."""
+        if self._type_ii is None:
+            self._type_ii = self._singular_value.of(self.state.jacobian)
+        return self._type_ii
 
-        `SingularityMeasures.type_ii`, 0 to 1.
-        """
-        if self._distance is None:
-            self._distance = self._singular_value.of(self.state.jacobian)
-        return self._distance
+    @property
+    def distance(self) -> float:
+        """Deprecated name of `type_ii`."""
+        return self.type_ii
 
     @property
     def status_text(self) -> str:
@@ -250,7 +252,7 @@ class RealTimeRobot:
             messages.append(f"the last good estimate is kept; it is {self.age} ticks old")
         if status & Status.NEAR_SINGULAR:
             messages.append(
-                f"near a type II singularity: distance {self.distance:.3g}, "
+                f"near a type II singularity: type_ii {self.type_ii:.3g}, "
                 f"at least {self._near:.3g} is required"
             )
         if status & Status.BEYOND_LIMIT:
@@ -297,13 +299,13 @@ class RealTimeRobot:
         geometry, rate, twist, jacobian = reading
         if not math.isfinite(sum(twist)):  # the rate is in it
             return self._keep(_BAD_INPUT)
-        self._distance, self.determinant = None, jacobian.determinant
+        self._type_ii, self.determinant = None, jacobian.determinant
         number = self._geometry_flags = _BEYOND_LIMIT if self._limits.violated(geometry) else 0
         if self._limits.too_fast(speed):
             number = _BEYOND_LIMIT
         self.state = StateEstimate(geometry, rate, speed, jacobian)
         # No singular value of M is above 1, so none is below the determinant's absolute value.
-        if not abs(jacobian.determinant) >= self._near and self.distance < self._near:
+        if not abs(jacobian.determinant) >= self._near and self.type_ii < self._near:
             number |= _NEAR_SINGULAR
         self._filter.update(d, speed)
         # Entry by entry: faster than by slices.
@@ -340,7 +342,7 @@ class RealTimeRobot:
     def _keep(self, number: int) -> Status:
         """Keep the last good estimate, with a status."""
         self.age += 1
-        if self.distance < self._near:
+        if self.type_ii < self._near:
             number |= _NEAR_SINGULAR
         self.status = status = STATUSES[number]
         return status

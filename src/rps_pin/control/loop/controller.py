@@ -75,8 +75,8 @@ class Controller(ABC):
     force_limit
         Of the actuators, N: one or three; default: the robot's.
     near_singular
-        Distance to a singularity (0 to 1) below which the status has `Status.NEAR_SINGULAR`, and
-        targets are refused.
+        `SingularityMeasures.type_ii` below which the status has `Status.NEAR_SINGULAR`, and targets
+        are refused, 0 to 1.
     stop_singular
         Distance below which the controller stops; less than `near_singular`.
     largest_jump
@@ -95,7 +95,7 @@ class Controller(ABC):
     robot : RPSRobot
         As given.
     estimate : RealTimeRobot
-        The state estimate: pose, rate, distance to a singularity.
+        The state estimate: pose, rate, `type_ii`.
     pace : float
         Pace of the target, 0.05 to 1 of its own speed: below 1 while and shortly after actuators
         are at their limits. `PacedTrajectory` follows it; otherwise the robot lags behind.
@@ -174,12 +174,12 @@ class Controller(ABC):
         self.estimate.reset(near)
         geometry = self.estimate.state.geometry
         determinant = turning_determinant(geometry, self._g, self._h)
-        distance = min(abs(determinant), self.estimate.distance)
-        if distance < self._near:
+        nearest = min(abs(determinant), self.estimate.type_ii)
+        if nearest < self._near:
             raise SingularityError(
-                f"the pose to start from is too near a singularity: distance {distance:.3g}, at "
+                f"the pose to start from is too near a singularity: type_ii {nearest:.3g}, at "
                 f"least {self._near:.3g} is required",
-                1 / max(distance, 1e-300),
+                1 / max(nearest, 1e-300),
                 1 / self._near,
             )
         self._setpoints.reset(geometry)
@@ -239,7 +239,7 @@ class Controller(ABC):
                 return self._stopped(number, elapsed, reason)
             state = self._extrapolated(estimate.state, estimate.elapsed)
         if state is None or self._near_singular(state):
-            reason = f"at a distance of less than {self._stop:.3g} to a singularity"
+            reason = f"near a type II singularity: type_ii less than {self._stop:.3g}"
             return self._stopped(number | _NEAR_SINGULAR, elapsed, reason)
         force = self._law(state, self._setpoints.current, elapsed)
         if force is None or not math.isfinite(force[0] + force[1] + force[2]):

@@ -20,7 +20,7 @@ class Status(IntFlag):
     JUMP = 2
     #: The lengths cannot be followed, or the forces are not determined.
     NOT_CONVERGED = 4
-    #: The distance to a singularity, of the result in use, is below `near_singular`.
+    #: `SingularityMeasures.type_ii`, of the result in use, is below `near_singular`.
     NEAR_SINGULAR = 8
     #: A leg's length, angle, ball joint, speed or force is beyond the robot's limits.
     BEYOND_LIMIT = 16

@@ -71,8 +71,8 @@ class LoopRun:
         Forces commanded, and forces of the actuators until the next tick, N.
     status : (n,) array of int
         `Status` of each tick.
-    distance : (n,) array
-        The controller's distance to a singularity: `RealTimeRobot.distance`.
+    type_ii : (n,) array
+        `SingularityMeasures.type_ii` of the estimated pose: `RealTimeRobot.type_ii`.
     gap : (n,) array
         Largest gap of the plant's loops, m.
     events : tuple of LoopEvent
@@ -92,10 +92,15 @@ class LoopRun:
     command: Array
     applied: Array
     status: NDArray[np.int64]
-    distance: Array
+    type_ii: Array
     pace: Array
     gap: Array
     events: tuple[LoopEvent, ...]
+
+    @property
+    def distance(self) -> Array:
+        """Deprecated name of `type_ii`."""
+        return self.type_ii
 
 
 def run_loop(
@@ -184,7 +189,7 @@ class _Record:
         self._controller = controller
         self.rows: dict[str, Array] = {name: np.zeros((ticks, 3)) for name in _ROWS}
         self.rows["configuration"] = np.zeros((ticks, 13))
-        self.rows |= {name: np.zeros(ticks) for name in ("time", "distance", "pace", "gap")}
+        self.rows |= {name: np.zeros(ticks) for name in ("time", "type_ii", "pace", "gap")}
         self._status = np.zeros(ticks, dtype=np.int64)
         self._events: list[tuple[int, LoopEvent]] = []
         self._last = 0
@@ -205,7 +210,7 @@ class _Record:
             "length": plant.length,
             "estimate": estimate.answers.pose,
             "command": controller.forces,
-            "distance": estimate.distance,
+            "type_ii": estimate.type_ii,
             "pace": controller.pace,
             "gap": plant.gap,
         }
@@ -243,8 +248,8 @@ def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
     for name, unit in (("reading", "m"), ("length", "m"), ("command", "N"), ("applied", "N")):
         names += [f"{name}_{leg}_{unit}" for leg in (1, 2, 3)]
         rows.append(getattr(run, name))
-    names += ["distance", "status"]
-    table = np.hstack([*rows, np.column_stack([run.distance, run.status])])
+    names += ["type_ii", "status"]
+    table = np.hstack([*rows, np.column_stack([run.type_ii, run.status])])
     with whole_file(path) as scratch:
         header = ",".join(names)
         np.savetxt(scratch, table, fmt="%.12g", delimiter=",", header=header, comments="")

@@ -66,8 +66,8 @@ class LoopSummary:
         Of the actuators, largest of three, N.
     saturated
         Share of ticks at a force limit.
-    nearest_singular
-        Least distance to a singularity, 0 to 1.
+    minimum_type_ii
+        Least `SingularityMeasures.type_ii`, 0 to 1.
     gap
         Largest gap of the plant's loops, m.
     ticks
@@ -89,7 +89,7 @@ class LoopSummary:
     force_peak: float
     force_rms: float
     saturated: float
-    nearest_singular: float
+    minimum_type_ii: float
     gap: float
     ticks: int
     statuses: dict[str, int]
@@ -125,12 +125,17 @@ class LoopSummary:
             force_peak=float(np.abs(force).max()),
             force_rms=float(np.sqrt((force**2).mean(axis=0)).max()),
             saturated=float(flags[Status.SATURATED][here].mean()),
-            nearest_singular=float(run.distance[here].min()),
+            minimum_type_ii=float(run.type_ii[here].min()),
             gap=float(run.gap[here].max()),
             ticks=int(here.sum()),
             statuses={name: int(on.sum()) for name, on in occurred.items()},
             first={name: float(run.time[on.argmax()]) for name, on in occurred.items()},
         )
+
+    @property
+    def nearest_singular(self) -> float:
+        """Deprecated name of `minimum_type_ii`."""
+        return self.minimum_type_ii
 
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain data."""
@@ -150,7 +155,7 @@ class LoopSummary:
             table.add_row(name, *(f"{f:.4g}" for f in figures), *[""] * (3 - len(figures)), unit)
         table.add_section()
         table.add_row("ticks at a force limit", f"{self.saturated:.2%}")
-        table.add_row("least distance to a singularity", f"{self.nearest_singular:.4g}")
+        table.add_row("smallest distance to type II", f"{self.minimum_type_ii:.4g}")
         for name, count in self.statuses.items():
             table.add_row(name, f"{count} ticks", f"first at {self.first[name]:.6g} s")
         return table

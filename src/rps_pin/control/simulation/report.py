@@ -84,8 +84,8 @@ def _errors(summary: LoopSummary) -> list[str]:
         f"| leg lengths | {s.length_rms:.4g} | {s.length_max:.4g} | | um |",
         f"| actuator force | {s.force_rms:.4g} | {s.force_peak:.4g} | | N |",
         "",
-        f"Ticks at a force limit: {s.saturated:.2%}. Least distance to a singularity: "
-        f"{s.nearest_singular:.4g}. Largest gap of the plant's loops: {s.gap:.2g} m.",
+        f"Ticks at a force limit: {s.saturated:.2%}. Smallest distance to type II: "
+        f"{s.minimum_type_ii:.4g}. Largest gap of the plant's loops: {s.gap:.2g} m.",
     ]
 
 

@@ -22,7 +22,7 @@ from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.kinematics.rates import Errors, check_errors_option, masked_leg_jacobians
 from rps_pin.rps.kinematics.tip_rings import Ring
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.singularity.measures import passive_distance
+from rps_pin.rps.singularity.measures import passive_conditioning
 
 if TYPE_CHECKING:
     from rps_pin.rps.robot import RPSRobot
@@ -152,7 +152,7 @@ def _refused(robot: RPSRobot, pose: Array) -> Bools:
     refused = np.asarray(masked_leg_jacobians(robot.parameters, pose)[1].any(axis=-1))
     with_legs = np.flatnonzero(~refused)
     reachable = robot.inverse_kinematics(pose[with_legs], errors="mask").reachable
-    regular = passive_distance(robot.parameters, pose[with_legs]) >= 1 / _limit(robot)
+    regular = passive_conditioning(robot.parameters, pose[with_legs]) >= 1 / _limit(robot)
     refused[with_legs] = np.logical_not(reachable & regular)
     return refused
 
@@ -165,7 +165,7 @@ def _refuse(robot: RPSRobot, pose: Array, refused: Bools) -> None:
         robot.inverse_kinematics(pose[first])
     except UnreachableError as error:
         raise UnreachableError(f"{which}{error}", error.violations) from None
-    distance = float(passive_distance(robot.parameters, pose[first]))
+    distance = float(passive_conditioning(robot.parameters, pose[first]))
     condition = 1 / distance if distance > 0 else math.inf
     z, tilt_x, tilt_y = pose[first]
     raise SingularityError(

@@ -14,6 +14,7 @@ from scipy.integrate import trapezoid
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.singularity.path_events import PathCheck
 from rps_pin.rps.singularity.path_refusal import require_clear
 from rps_pin.trajectories.path import Trajectory
 
@@ -52,8 +53,16 @@ class MotionRun:
     """Largest gap of the closures, shape (n,), m."""
     residual: Array
     """KKT residual over the largest generalised force, shape (n,)."""
-    singularity_distance: Array
-    """1 / condition number of the passive Jacobian, shape (n,): 0 at a singularity, 1 at best."""
+    passive_conditioning: Array
+    """1 / condition number of the passive Jacobian, shape (n,): 0 at a singularity, 1 at best; see
+    `rps_pin.rps.singularity.measures`."""
+    path_check: PathCheck
+    """Of the trajectory: its smallest distance to a singularity, and where."""
+
+    @property
+    def singularity_distance(self) -> Array:
+        """Deprecated name of `passive_conditioning`."""
+        return self.passive_conditioning
 
     @property
     def power(self) -> Array:
@@ -97,14 +106,33 @@ class MotionSummary:
     """m."""
     residual_max: float
     """Largest KKT residual, relative to the largest generalised force of its sample."""
-    singularity_distance_min: float
-    """Smallest 1 / condition number; 0 would be a singularity, 1 is the best there is."""
-    singularity_time: float
+    minimum_distance: float
+    """Smallest `SingularityMeasures.distance` of the path, 0 to 1, as `PathCheck` has it."""
+    minimum_singularity: str
+    """Which kind of singularity that is to."""
+    minimum_time: float
     """When, s."""
-    singularity_pose: tuple[float, float, float]
+    minimum_pose: tuple[float, float, float]
     """Where: (z, tilt_x, tilt_y), m and rad."""
+    passive_conditioning_min: float
+    """Smallest 1 / condition number of the passive Jacobian."""
     exceeded: tuple[str, ...]
     """Actuator limits that the motion asks too much of, a sentence each."""
+
+    @property
+    def singularity_distance_min(self) -> float:
+        """Deprecated name of `passive_conditioning_min`."""
+        return self.passive_conditioning_min
+
+    @property
+    def singularity_time(self) -> float:
+        """Deprecated name of `minimum_time`."""
+        return self.minimum_time
+
+    @property
+    def singularity_pose(self) -> tuple[float, float, float]:
+        """Deprecated name of `minimum_pose`."""
+        return self.minimum_pose
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, strings, lists and dictionaries, as JSON has them."""
@@ -145,13 +173,13 @@ def run_motion(
         If it meets a singularity; likewise.
     """
     time = sample_times(trajectory.duration, sample_rate)
-    require_clear(robot, trajectory)
+    path_check = require_clear(robot, trajectory)
     pose, rate, acceleration = trajectory.sample(time)
     q, v, a = robot.state(pose, rate, acceleration)
     platform, legs = robot.motion(pose, rate, acceleration)
     n = len(time)
     force, reaction = np.empty((n, 3)), np.empty((n, 3, 3))
-    gap, residual, distance = np.empty(n), np.empty(n), np.empty(n)
+    gap, residual, conditioning = np.empty(n), np.empty(n), np.empty(n)
     side = 0
     for i in progress(range(n)):
         try:
@@ -174,7 +202,7 @@ def run_motion(
         reaction[i] = result.constraint_forces.reshape(3, 3)
         largest = max(np.abs(result.tau).max(), np.abs(result.constraint_forces).max())
         residual[i] = result.residual / largest if largest > 0 else result.residual
-        distance[i] = 1 / result.condition
+        conditioning[i] = 1 / result.condition
         gap[i] = robot.mechanism.loop_gap(q[i])
     return MotionRun(
         time=time,
@@ -190,23 +218,26 @@ def run_motion(
         reaction=reaction,
         loop_gap=gap,
         residual=residual,
-        singularity_distance=distance,
+        passive_conditioning=conditioning,
+        path_check=path_check,
     )
 
 
 def summarise(run: MotionRun, robot: RPSRobot) -> MotionSummary:
     """Return a motion in a few numbers, and the limits of the robot's actuators that it exceeds."""
-    nearest = int(np.argmin(run.singularity_distance))
-    z, tilt_x, tilt_y = (float(x) for x in run.pose[nearest])
+    nearest = run.path_check
+    z, tilt_x, tilt_y = (float(x) for x in nearest.minimum_pose)
     return MotionSummary(
         duration=float(run.time[-1]),
         samples=len(run.time),
         actuators=tuple(_actuator_summary(run, leg) for leg in range(3)),
         loop_gap_max=float(run.loop_gap.max()),
         residual_max=float(run.residual.max()),
-        singularity_distance_min=float(run.singularity_distance[nearest]),
-        singularity_time=float(run.time[nearest]),
-        singularity_pose=(z, tilt_x, tilt_y),
+        minimum_distance=nearest.minimum_distance,
+        minimum_singularity=nearest.minimum_singularity,
+        minimum_time=nearest.minimum_time,
+        minimum_pose=(z, tilt_x, tilt_y),
+        passive_conditioning_min=float(run.passive_conditioning.min()),
         exceeded=tuple(_exceeded(run, robot)),
     )
 

@@ -1,29 +1,19 @@
-"""Refuse a curve that cannot be scaled in time, before anything is solved: where, and why."""
+"""Errors of curves that cannot be scaled in time: raised before anything is solved, say where."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rps_pin.errors import (
-    InfeasibleError,
-    InputError,
-    LimitExcess,
-    LimitViolation,
-    ParameterError,
-    SingularityError,
-    UnreachableError,
-)
+from rps_pin.errors import InfeasibleError, InputError, LimitExcess, ParameterError
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.curve_dynamics import CurveDynamics
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.rps.singularity.path_check import check_path
-from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck
+from rps_pin.rps.singularity.path_refusal import PathWords, require_clear
 from rps_pin.trajectories.curve import Curve
 from rps_pin.trajectories.path import PathSample
 
@@ -47,12 +37,6 @@ class _AsTrajectory:
 
     def sample(self, t: ArrayLike) -> PathSample:
         return PathSample(*self.curve.at(t))
-
-
-class _WithLimits(NamedTuple):
-    """What `check_path` asks of a robot."""
-
-    parameters: RPSParameters
 
 
 def ends_at_rest(robot: RPSRobot, curve: Curve) -> tuple[bool, bool]:
@@ -100,23 +84,14 @@ def require_clear_curve(robot: RPSRobot, curve: Curve, limits: ActuatorLimits) -
         Says at which u, and why.
     """
     parameters = _with_lengths(robot.parameters, limits.length)
-    found = check_path(
-        _WithLimits(parameters), _AsTrajectory(curve), tolerance=_BRACKET * curve.length
+    if parameters != robot.parameters:
+        robot = RPSRobot(parameters)
+    require_clear(
+        robot,
+        _AsTrajectory(curve),
+        tolerance=_BRACKET * curve.length,
+        words=PathWords("curve", "u", "", 9),
     )
-    outside = [event for event in found.limits if event.kind != "returns"]
-    if outside:
-        raise _unreachable(parameters, curve, found, outside[0])
-    met = [event for event in found.singularities if event.kind != "grazes"]
-    if met:
-        z, tilt_x, tilt_y = met[0].pose
-        leg = f" of leg {met[0].leg}" if met[0].leg else ""
-        raise SingularityError(
-            f"at u = {met[0].time:.9g} of {curve.length:.6g} the curve {met[0].kind} a "
-            f"{met[0].singularity} singularity{leg}, at z = {z:.6g} m, tilt = ({tilt_x:.6g}, "
-            f"{tilt_y:.6g}) rad: no law of time carries the robot through it",
-            math.inf,
-            robot.mechanism.max_condition,
-        )
 
 
 def _with_lengths(p: RPSParameters, length: tuple[float, float]) -> RPSParameters:
@@ -131,27 +106,6 @@ def _with_lengths(p: RPSParameters, length: tuple[float, float]) -> RPSParameter
             f"length limits = {length}: the robot's legs have {p.leg_length_limits} m, and no "
             "length is within both"
         ) from None
-
-
-def _unreachable(
-    parameters: RPSParameters, curve: Curve, found: PathCheck, event: LimitEvent
-) -> UnreachableError:
-    """Return the error of the first limit left, with what is broken half-way until all is well."""
-    back = (e.time for e in found.limits if e.kind == "returns" and e.time > event.time)
-    middle = (event.time + next(back, found.duration)) / 2
-    robot = RPSRobot(parameters)
-    violations: tuple[LimitViolation, ...] = ()
-    try:
-        robot.inverse_kinematics(curve.at(middle).pose)
-    except UnreachableError as error:
-        violations = error.violations
-    further = "; ".join(map(str, violations))
-    return UnreachableError(
-        f"at u = {event.time:.9g} of {found.duration:.6g} the curve leaves the workspace: leg "
-        f"{event.leg} breaks its {event.side} limit of {event.quantity}, {event.limit:.6g} "
-        f"{event.unit}{f'. At u = {middle:.6g}, {further}' if further else ''}",
-        violations,
-    )
 
 
 def infeasible(dynamics: CurveDynamics) -> InfeasibleError:

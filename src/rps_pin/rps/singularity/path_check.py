@@ -1,8 +1,7 @@
-"""Where and when a path of the 3-RPS meets a singularity or leaves a limit.
+"""The path check: where and when a path of the 3-RPS meets a singularity or leaves a limit.
 
 Everything that can go wrong is a *signal*: a function of the pose that is zero where it happens,
-with its exact rate along the path. The signals are the signed distances of
-`rps_pin.rps.singularity.measures` and, for each limit of each leg, the room that is left.
+with its exact rate along the path (`rps_pin.rps.singularity.path_signals`).
 
 Between two neighbouring samples of the path,
 
@@ -20,34 +19,27 @@ in z / h and in the tilts, as far as the rates at both ends tell. Accelerations 
 
 from __future__ import annotations
 
-import math
-from numbers import Integral, Real
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.errors import InputError
-from rps_pin.rps.kinematics.legs import RADIAL
-from rps_pin.rps.kinematics.pose import platform_motion
-from rps_pin.rps.kinematics.rates import masked_leg_jacobians
+from rps_pin.numerics.bisection import bisected
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.singularity.measures import bisected, checked_tilt, measure_rates
+from rps_pin.rps.singularity.measures import GRAZE
 from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck, SingularityEvent
+from rps_pin.rps.singularity.path_signals import SINGULARITIES, TYPE_I, PathSignals
 from rps_pin.trajectories.path import Trajectory
+from rps_pin.validation import positive_number, whole_number
 
 #: A path whose distance to a singularity stays below this is in it: what rounding leaves of zero.
 NOISE = 1e-13
-
-#: Limits are kept to rounding error, m or rad (as in `rps_pin.rps.kinematics.legs`).
-_ROUNDING = 1e-12
 
 #: A leg shorter than this part of h, where the sign of type II jumps, is passing through zero.
 _VANISHING = 1e-6
 
 _MOST_SAMPLES = 1_000_000
-_CHUNK = 50_000
 
 
 class _HasParameters(Protocol):
@@ -60,7 +52,7 @@ def check_path(
     trajectory: Trajectory,
     *,
     tolerance: float = 1e-9,
-    threshold: float = 1e-3,
+    threshold: float = GRAZE,
     least_steps: int = 1000,
     max_step: float = 0.01,
 ) -> PathCheck:
@@ -88,9 +80,10 @@ def check_path(
         If a number is out of its range, the trajectory's samples are not finite poses and rates of
         the right shapes, or it is tilted by a whole turn.
     """
-    _check_numbers(tolerance, threshold, least_steps, max_step)
-    path = _Path(robot.parameters, trajectory, tolerance)
-    times = _sample_times(path, int(least_steps), max_step)
+    threshold = positive_number(threshold, "threshold")
+    path = PathSignals(robot.parameters, trajectory, positive_number(tolerance, "tolerance", "s"))
+    steps = whole_number(least_steps, "least_steps")
+    times = _sample_times(path, steps, positive_number(max_step, "max_step"))
     values, rates = path.signals(times)
     found = _Findings(path, times, values, rates, threshold)
     singularities = found.singularities()
@@ -106,144 +99,8 @@ def check_path(
         tolerance,
         times.size,
         float(np.diff(times).max()),
+        path.sample(np.array([when]))[0][0],
     )
-
-
-# Signals ------------------------------------------------------------------------------------------
-
-
-class _Signal(NamedTuple):
-    """What a signal is about."""
-
-    name: str
-    """Kind of singularity, or quantity with a limit."""
-    leg: int
-    """1 to 3; 0 for the whole robot."""
-    side: str = ""
-    limit: float = 0.0
-    unit: str = ""
-
-
-#: In the order of `measure_rates`.
-_SINGULARITIES = (
-    _Signal("type II", 0),
-    _Signal("constraint", 0),
-    *(_Signal("type I", leg) for leg in (1, 2, 3)),
-)
-_TYPE_I = slice(2, 5)
-
-
-class _Path:
-    """A trajectory of a robot as signals of time."""
-
-    def __init__(self, parameters: RPSParameters, trajectory: Trajectory, tolerance: float) -> None:
-        self.parameters = parameters
-        self.trajectory = trajectory
-        self.duration = _checked_duration(trajectory)
-        self.tolerance = tolerance
-        self.limits = _limit_signals(parameters)
-        least = 4 * float(np.spacing(self.duration))
-        if tolerance < least:
-            raise InputError(
-                f"tolerance = {tolerance:.3g} s: times up to {self.duration:.6g} s can be told "
-                f"apart down to {least:.3g} s"
-            )
-
-    def sample(self, times: Array) -> tuple[Array, Array]:
-        """Return poses and rates at times (n,), shape (n, 3) each, checked."""
-        found = self.trajectory.sample(times)
-        pose = _checked_samples(found.pose, times, "pose")
-        rate = _checked_samples(found.rate, times, "rate")
-        return checked_tilt(pose), rate
-
-    def signals(self, times: Array) -> tuple[Array, Array]:
-        """Return every signal and its rate at times (n,), shape (n, signals) each."""
-        parts = [self._signals(times[i : i + _CHUNK]) for i in range(0, times.size, _CHUNK)]
-        values, rates = zip(*parts, strict=True)
-        return np.concatenate(values), np.concatenate(rates)
-
-    def _signals(self, times: Array) -> tuple[Array, Array]:
-        pose, rate = self.sample(times)
-        value, change = measure_rates(self.parameters, pose, rate)
-        # A leg without length is a type I singularity; type II is not determined there.
-        value[(value[:, _TYPE_I] == 0).any(axis=-1), 0] = 1.0
-        room, room_rate = _rooms(self.parameters, self.limits, pose, rate)
-        return np.concatenate([value, room], axis=-1), np.concatenate([change, room_rate], axis=-1)
-
-
-def _limit_signals(parameters: RPSParameters) -> tuple[_Signal, ...]:
-    """Return the limits that a leg can break."""
-    p = parameters
-    sides = [
-        ("length", "lower", p.leg_length_limits[0], "m", p.leg_length_limits[0] > 0),
-        ("length", "upper", p.leg_length_limits[1], "m", math.isfinite(p.leg_length_limits[1])),
-        ("angle", "lower", p.leg_angle_limits[0], "rad", p.leg_angle_limits[0] > -math.pi),
-        ("angle", "upper", p.leg_angle_limits[1], "rad", p.leg_angle_limits[1] < math.pi),
-        (
-            "spherical joint",
-            "upper",
-            p.spherical_cone_limit,
-            "rad",
-            p.spherical_cone_limit < math.pi,
-        ),
-    ]
-    return tuple(
-        _Signal(quantity, leg, side, limit, unit)
-        for quantity, side, limit, unit, breakable in sides
-        if breakable
-        for leg in (1, 2, 3)
-    )
-
-
-def _rooms(
-    parameters: RPSParameters, limits: tuple[_Signal, ...], pose: Array, rate: Array
-) -> tuple[Array, Array]:
-    """Return how much room each limit leaves, and its rate, shape (n, limits); negative: beyond.
-
-    For the spherical joints it is the room of the angle's cosine, which is smooth.
-    """
-    rooms, rates = np.empty((len(pose), len(limits))), np.empty((len(pose), len(limits)))
-    if not limits:
-        return rooms, rates
-    legs, vanishing = masked_leg_jacobians(parameters, pose)
-    speed = np.einsum("...ij,...j->...i", legs.length_jacobian, rate)
-    turning = np.einsum("...ij,...j->...i", legs.angle_jacobian, rate)
-    quantities = {
-        "length": (legs.length, np.where(vanishing, 0.0, speed)),
-        "angle": (legs.angle, turning),
-    }
-    if any(signal.name == "spherical joint" for signal in limits):
-        quantities["spherical joint"] = _cone_cosines(parameters, pose, rate, legs.angle, turning)
-    for column, signal in enumerate(limits):
-        value, change = (array[:, signal.leg - 1] for array in quantities[signal.name])
-        if signal.name == "spherical joint":
-            least = math.cos(min(signal.limit + _ROUNDING, math.pi))
-            rooms[:, column], rates[:, column] = value - least, change
-        elif signal.side == "lower":
-            rooms[:, column], rates[:, column] = value - signal.limit + _ROUNDING, change
-        else:
-            rooms[:, column], rates[:, column] = signal.limit + _ROUNDING - value, -change
-    return rooms, rates
-
-
-def _cone_cosines(
-    parameters: RPSParameters, pose: Array, rate: Array, angle: Array, angle_rate: Array
-) -> tuple[Array, Array]:
-    """Return the cosines of the angles between legs and rest axes, and their rates, (n, 3 legs).
-
-    The leg is l = -cos(phi) e + sin(phi) z, its joint's rest axis R (cos(r) z - sin(r) e).
-    """
-    r = parameters.spherical_rest_angle
-    rest = math.cos(r) * np.array([0.0, 0.0, 1.0]) - math.sin(r) * RADIAL
-    platform = platform_motion(pose, rate, np.zeros_like(pose), parameters.platform_radius)
-    to_base = np.swapaxes(platform.rotation, -1, -2)  # of row vectors
-    axis = rest @ to_base
-    axis_rate = np.cross(platform.angular_velocity[:, None, :], rest) @ to_base
-    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
-    upright = np.array([0.0, 0.0, 1.0])
-    leg = -cosine * RADIAL + sine * upright
-    leg_rate = angle_rate[..., None] * (sine * RADIAL + cosine * upright)
-    return (leg * axis).sum(axis=-1), (leg_rate * axis + leg * axis_rate).sum(axis=-1)
 
 
 # Events -------------------------------------------------------------------------------------------
@@ -277,13 +134,13 @@ class _Findings:
     """The zeros and turning points of every signal, from samples of them."""
 
     def __init__(
-        self, path: _Path, times: Array, values: Array, rates: Array, threshold: float
+        self, path: PathSignals, times: Array, values: Array, rates: Array, threshold: float
     ) -> None:
         self.path = path
         self.times = times
         self.values = values
         self.threshold = threshold
-        singular = np.arange(values.shape[1]) < len(_SINGULARITIES)
+        singular = np.arange(values.shape[1]) < len(SINGULARITIES)
         self.noise = np.where(singular, NOISE, 0.0)
         self.zero = (np.abs(values) <= self.noise) & singular
         self.sign = _filled_signs(np.where(self.zero, 0.0, np.where(values < 0, -1.0, 1.0)))
@@ -310,7 +167,7 @@ class _Findings:
     def limits(self) -> tuple[LimitEvent, ...]:
         """Return every event of the limits, in order of time."""
         zeros = self._only(self.zeros, singular=False)
-        start = np.flatnonzero(self.values[0, len(_SINGULARITIES) :] < 0) + len(_SINGULARITIES)
+        start = np.flatnonzero(self.values[0, len(SINGULARITIES) :] < 0) + len(SINGULARITIES)
         events = [self._limit_event("starts outside", 0.0, 0.0, int(signal)) for signal in start]
         for low, high, signal, negative in zip(*zeros, strict=True):
             kind = "returns" if negative else "leaves"
@@ -319,11 +176,11 @@ class _Findings:
 
     def nearest(self, events: tuple[SingularityEvent, ...]) -> tuple[float, str, float]:
         """Return the smallest distance to a singularity, which kind, and when."""
-        sizes = np.abs(self.values[:, : len(_SINGULARITIES)])
+        sizes = np.abs(self.values[:, : len(SINGULARITIES)])
         sample, signal = np.unravel_index(int(np.argmin(sizes)), sizes.shape)
         best = (
             float(sizes[sample, signal]),
-            _SINGULARITIES[signal].name,
+            SINGULARITIES[signal].name,
             float(self.times[sample]),
         )
         turning = self._only(self.turning, singular=True)
@@ -341,13 +198,11 @@ class _Findings:
         step, signal = np.nonzero(falls & same & ~standing)
         sign = self.sign[step, signal]
 
-        def growth(times: Array, which: Indices) -> Array:
+        def falling(times: Array, which: Indices) -> Bools:
             rates = self.path.signals(times)[1]
-            return np.asarray(sign[which] * rates[np.arange(which.size), signal[which]])
+            return np.asarray(sign[which] * rates[np.arange(which.size), signal[which]] < 0)
 
-        low, high = bisected(
-            growth, self.times[step], self.times[step + 1], -np.ones(step.size), self.path.tolerance
-        )
+        low, high = bisected(falling, self.times[step], self.times[step + 1], self.path.tolerance)
         there = sign * self._at((low + high) / 2, signal)
         beyond = there < -self.noise[signal]
         middle = ((low + high) / 2)[beyond]
@@ -364,11 +219,10 @@ class _Findings:
             self.times[step], self.times[step + 1], signal, self.sign[step, signal] < 0
         ).joined(split)
 
-        def value(times: Array, which: Indices) -> Array:
-            return self._at(times, signal[which])
+        def same_sign(times: Array, which: Indices) -> Bools:
+            return np.asarray((self._at(times, signal[which]) < 0) == negative[which])
 
-        at_low = np.where(negative, -1.0, 1.0)
-        low, high = bisected(value, low, high, at_low, self.path.tolerance)
+        low, high = bisected(same_sign, low, high, self.path.tolerance)
         order = np.lexsort((low, signal))
         return _Brackets(low, high, signal, negative).part(order)
 
@@ -387,12 +241,12 @@ class _Findings:
         jump = np.abs(at_high - at_low)[index, zeros.signal]
         fastest = np.maximum(np.abs(low_rates), np.abs(high_rates))[index, zeros.signal]
         smooth = jump <= 1e-6 + 10 * fastest * (zeros.high - zeros.low)
-        shortest = np.minimum(at_low, at_high)[:, _TYPE_I].min(axis=-1)
+        shortest = np.minimum(at_low, at_high)[:, TYPE_I].min(axis=-1)
         return zeros.part(smooth | (shortest > _VANISHING))
 
     @staticmethod
     def _only(brackets: _Brackets, *, singular: bool) -> _Brackets:
-        return brackets.part((brackets.signal < len(_SINGULARITIES)) == singular)
+        return brackets.part((brackets.signal < len(SINGULARITIES)) == singular)
 
     # What they mean -------------------------------------------------------------------------------
 
@@ -415,7 +269,7 @@ class _Findings:
             near = np.abs(self.values[end]) < self.threshold
             standing = self.zero[end] & self.zero[1 if end == 0 else -2]
             chosen = near & (moving_away | self.zero[end]) & ~standing
-            signal = np.flatnonzero(chosen[: len(_SINGULARITIES)])
+            signal = np.flatnonzero(chosen[: len(SINGULARITIES)])
             time = np.full(signal.size, self.times[end])
             events += self._events("grazes", _Brackets(time, time, signal, signal < 0))
         return events
@@ -423,7 +277,7 @@ class _Findings:
     def _stays(self) -> list[SingularityEvent]:
         """Return when the path stays in a singularity: at two neighbouring samples or more."""
         events = []
-        for signal in range(len(_SINGULARITIES)):
+        for signal in range(len(SINGULARITIES)):
             edges = np.diff(np.concatenate([[0], self.zero[:, signal].astype(int), [0]]))
             first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
             for begin, end in zip(first, last, strict=True):
@@ -437,7 +291,7 @@ class _Findings:
         return events
 
     def _limit_event(self, kind: str, time: float, width: float, signal: int) -> LimitEvent:
-        about = self.path.limits[signal - len(_SINGULARITIES)]
+        about = self.path.limits[signal - len(SINGULARITIES)]
         pose, _ = self.path.sample(np.array([time]))
         return LimitEvent(
             kind,
@@ -482,14 +336,16 @@ def _apart(zeros: _Brackets, tolerance: float) -> tuple[_Brackets, _Brackets]:
 def _singularity_event(
     kind: str, signal: Any, time: float, width: float, pose: Array, distance: float
 ) -> SingularityEvent:
-    about = _SINGULARITIES[int(signal)]
+    about = SINGULARITIES[int(signal)]
     return SingularityEvent(
         kind, about.name, float(time), float(width), pose, float(distance), about.leg
     )
 
 
-def _sample_times(path: _Path, least_steps: int, max_step: float) -> Array:
+def _sample_times(path: PathSignals, least_steps: int, max_step: float) -> Array:
     """Return times so dense that neighbours are no further apart than asked for."""
+    if least_steps > _MOST_SAMPLES:
+        raise InputError(f"least_steps = {least_steps}: at most {_MOST_SAMPLES:,} are accepted")
     scale = np.array([1 / path.parameters.platform_radius, 1.0, 1.0])
     times = np.linspace(0.0, path.duration, least_steps + 1)
     while True:
@@ -511,50 +367,12 @@ def _sample_times(path: _Path, least_steps: int, max_step: float) -> Array:
                 f"max_step = {max_step:.3g} would take {wanted:.3g} samples of this path, and at "
                 f"most {_MOST_SAMPLES:,} are accepted"
             )
-        times = _subdivided(times, parts.astype(int))
+        times = _subdivided(times, parts.astype(np.intp))
 
 
-def _subdivided(times: Array, parts: NDArray[np.int_]) -> Array:
+def _subdivided(times: Array, parts: Indices) -> Array:
     """Return times with each step divided into equal parts."""
     first = np.cumsum(parts) - parts
     within = np.arange(parts.sum()) - np.repeat(first, parts)
     inner = np.repeat(times[:-1], parts) + np.repeat(np.diff(times) / parts, parts) * within
     return np.append(inner, times[-1])
-
-
-def _checked_samples(value: object, times: Array, name: str) -> Array:
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"the trajectory's {name} is not made of numbers") from None
-    if array.shape != (times.size, 3):
-        raise InputError(
-            f"the trajectory's {name} at {times.size} times has shape {array.shape}; "
-            f"it must be ({times.size}, 3)"
-        )
-    finite = np.isfinite(array).all(axis=-1)
-    if not finite.all():
-        raise InputError(
-            f"the trajectory's {name} is not finite at {times[int(np.argmin(finite))]:.9g} s"
-        )
-    return array
-
-
-def _checked_duration(trajectory: Trajectory) -> float:
-    duration = trajectory.duration
-    if not isinstance(duration, Real) or not math.isfinite(duration) or not duration > 0:
-        raise InputError(f"the trajectory's duration is {duration!r}; it must be positive, in s")
-    return float(duration)
-
-
-def _check_numbers(tolerance: Any, threshold: Any, least_steps: Any, max_step: Any) -> None:
-    positive = {"tolerance": tolerance, "threshold": threshold, "max_step": max_step}
-    for name, value in positive.items():
-        number = isinstance(value, Real) and not isinstance(value, bool)
-        if not (number and math.isfinite(value) and value > 0):
-            raise InputError(f"{name} = {value!r}: it must be a positive number")
-    whole = isinstance(least_steps, Integral) and not isinstance(least_steps, bool)
-    if not (whole and 1 <= least_steps <= _MOST_SAMPLES):
-        raise InputError(
-            f"least_steps = {least_steps!r}: it must be a whole number from 1 to {_MOST_SAMPLES:,}"
-        )

@@ -1,4 +1,4 @@
-"""What can happen along a path: singularities met, limits left; and how it reads."""
+"""Events along a path of the 3-RPS: singularities met, limits left; and the check's findings."""
 
 from __future__ import annotations
 
@@ -26,10 +26,15 @@ class SingularityEvent(NamedTuple):
     leg: int
     """The leg without length of a type I singularity, 1 to 3; else 0."""
 
+    @property
+    def which(self) -> str:
+        """The singularity in words."""
+        return f"{self.singularity} singularity" + (f" of leg {self.leg}" if self.leg else "")
+
     def __str__(self) -> str:
         z, tilt_x, tilt_y = self.pose
         where = f"z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad"
-        which = f"{self.singularity} singularity" + (f" of leg {self.leg}" if self.leg else "")
+        which = self.which
         if self.kind == "stays":
             return f"{self.time:.9f} s: stays in a {which} for {self.width:.6g} s; {where}"
         near = f" at a distance of {abs(self.distance):.3g}" if self.kind == "grazes" else ""
@@ -80,7 +85,7 @@ class PathCheck(NamedTuple):
     limits: tuple[LimitEvent, ...]
     """In order of time."""
     minimum_distance: float
-    """Smallest distance to any singularity, dimensionless, at least 0."""
+    """Smallest `SingularityMeasures.distance`, 0 to 1."""
     minimum_singularity: str
     """Which kind that is to."""
     minimum_time: float
@@ -95,6 +100,8 @@ class PathCheck(NamedTuple):
     """At how many times the path was looked at before events were bracketed."""
     largest_gap: float
     """Longest time between two of them, s: within it, no signal may turn more than once."""
+    minimum_pose: Array
+    """(z, tilt_x, tilt_y) where the smallest distance is reached, shape (3,), m and rad."""
 
     @property
     def ok(self) -> bool:
@@ -107,8 +114,9 @@ class PathCheck(NamedTuple):
         events.sort(key=lambda event: event.time)
         return [
             f"{self.duration:.6g} s, {self.samples} samples: {_counted(self)}",
-            f"nearest to a singularity at {self.minimum_time:.9f} s: {self.minimum_singularity}, "
-            f"distance {self.minimum_distance:.3g} (threshold {self.threshold:.3g})",
+            f"smallest distance to a singularity: {self.minimum_distance:.4g} "
+            f"({self.minimum_singularity}) at t = {self.minimum_time:.9g} s "
+            f"(threshold {self.threshold:.3g})",
             *map(str, events),
         ]
 
@@ -126,6 +134,3 @@ def _counted(check: PathCheck) -> str:
         f"crosses singularities {crossings} times, grazes or stays in them {near} times, "
         f"leaves limits {outside} times"
     )
-
-
-# Samples ------------------------------------------------------------------------------------------

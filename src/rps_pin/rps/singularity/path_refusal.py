@@ -1,8 +1,9 @@
-"""Refuse a trajectory that the robot cannot follow, before any force is computed: when, and why."""
+"""Errors of paths that the 3-RPS cannot follow: raised before any force is computed, say where."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,10 +18,39 @@ from rps_pin.trajectories.path import Trajectory
 _LOOKS = 101
 
 
-def require_clear(robot: RPSRobot, trajectory: Trajectory) -> PathCheck:
+class PathWords(NamedTuple):
+    """How an error calls a path and its parameter; digits to which a singularity is located."""
+
+    path: str = "trajectory"
+    parameter: str = "t"
+    unit: str = " s"
+    digits: int = 10
+
+    def at(self, value: float, digits: int = 6) -> str:
+        """Return ``t = 1.5 s``."""
+        return f"{self.parameter} = {value:.{digits}g}{self.unit}"
+
+
+OF_TRAJECTORIES = PathWords()
+
+
+def require_clear(
+    robot: RPSRobot,
+    trajectory: Trajectory,
+    *,
+    tolerance: float = 1e-9,
+    words: PathWords = OF_TRAJECTORIES,
+) -> PathCheck:
     """Return what `check_path` found of a trajectory that the robot can follow.
 
     A trajectory that only grazes a singularity passes: it has forces, however large.
+
+    Parameters
+    ----------
+    robot, trajectory, tolerance
+        As for `check_path`.
+    words
+        For the errors.
 
     Raises
     ------
@@ -29,20 +59,25 @@ def require_clear(robot: RPSRobot, trajectory: Trajectory) -> PathCheck:
     SingularityError
         If it crosses a singularity, or stays in one: says when, where, and which.
     """
-    found = check_path(robot, trajectory)
+    found = check_path(robot, trajectory, tolerance=tolerance)
     outside = [event for event in found.limits if event.kind != "returns"]
     if outside:
-        raise _unreachable(robot, trajectory, found, outside[0])
+        raise _unreachable(robot, trajectory, found, outside, words)
     singular = [event for event in found.singularities if event.kind != "grazes"]
     if singular:
-        raise _singular(robot, found, singular)
+        raise _singular(robot, found, singular, words)
     return found
 
 
 def _unreachable(
-    robot: RPSRobot, trajectory: Trajectory, found: PathCheck, event: LimitEvent
+    robot: RPSRobot,
+    trajectory: Trajectory,
+    found: PathCheck,
+    events: list[LimitEvent],
+    words: PathWords,
 ) -> UnreachableError:
     """Return the error of the first limit left, with the worst of it until it is kept again."""
+    event = events[0]
 
     def same(other: LimitEvent) -> bool:
         return (other.leg, other.quantity, other.side) == (event.leg, event.quantity, event.side)
@@ -52,11 +87,11 @@ def _unreachable(
     poses = trajectory.sample(times).pose
     looks = [_violations(robot, pose) for pose in poses]
     worst = max(range(len(looks)), key=lambda i: _excess(looks[i], event))
-    number = sum(other.kind != "returns" for other in found.limits)
-    more = f"; limits are left {number} times in all" if number > 1 else ""
+    more = f"; limits are left {len(events)} times in all" if len(events) > 1 else ""
     return UnreachableError(
-        f"at t = {event.time:.6g} s of {found.duration:.6g} s the trajectory leaves the workspace; "
-        f"at worst, at t = {times[worst]:.6g} s, {'; '.join(map(str, looks[worst]))}{more}",
+        f"at {words.at(event.time)} of {found.duration:.6g}{words.unit} the {words.path} leaves "
+        f"the workspace; at worst, at {words.at(times[worst])}, "
+        f"{'; '.join(map(str, looks[worst]))}{more}",
         looks[worst],
     )
 
@@ -76,17 +111,18 @@ def _excess(violations: tuple[LimitViolation, ...], event: LimitEvent) -> float:
 
 
 def _singular(
-    robot: RPSRobot, found: PathCheck, events: list[SingularityEvent]
+    robot: RPSRobot, found: PathCheck, events: list[SingularityEvent], words: PathWords
 ) -> SingularityError:
     first = events[0]
     z, tilt_x, tilt_y = first.pose
-    which = f"{first.singularity} singularity" + (f" of leg {first.leg}" if first.leg else "")
-    does = "crosses" if first.kind == "crosses" else f"stays for {first.width:.6g} s in"
-    times = ", ".join(f"{event.time:.6g} s" for event in events[1:])
+    stays = f"stays for {first.width:.6g}{words.unit} in"
+    times = ", ".join(f"{event.time:.6g}{words.unit}" for event in events[1:])
     return SingularityError(
-        f"at t = {first.time:.10g} s of {found.duration:.6g} s the trajectory {does} a {which}, at "
+        f"at {words.at(first.time, words.digits)} of {found.duration:.6g}{words.unit} "
+        f"the {words.path} {'crosses' if first.kind == 'crosses' else stays} a {first.which}, at "
         f"z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad: no actuator forces carry the "
-        f"robot through it{f'; again at {times}' if times else ''}",
+        f"robot through it"
+        f"{f'; again at {times}' if times else ''}",
         math.inf,
         robot.mechanism.max_condition,
     )

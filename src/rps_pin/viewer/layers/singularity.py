@@ -1,4 +1,4 @@
-"""Layer ``singularity``: a ring on the floor, coloured by the distance to a singularity."""
+"""Layer ``singularity``: a ring on the floor, coloured by the conditioning of passive joints."""
 
 from __future__ import annotations
 
@@ -48,6 +48,6 @@ class Singularity(RobotSizedLayer):
             share = np.log(max(measure, self.worst)) / np.log(self.worst)
             return {"ring": NodeState(place, warning(float(share)))}
 
-        text = "distance to a singularity, 1 / condition number"
+        text = "conditioning of the passive joints, 1 / cond(J_p)"
         bar = colour_bar(WARNING, "1: best", f"{self.worst:g}: singular")
         return DrawnLayer(LegendEntry("singularity", text, css(BLUE), bar), parts, update)

@@ -60,7 +60,7 @@ class WorkspaceSurface(RobotSizedLayer):
         mesh = TriangleMesh(points * [factor, factor, 1.0], np.array(surface.faces), colour)
         # On top: it lies about the platform, which would hide it.
         material = Material(0xFFFFFF, opacity=0.55, on_top=True)
-        text = f"workspace of the centre, x and y magnified {factor:g} times: 1 / condition"
+        text = f"workspace of the centre, x and y magnified {factor:g} times: conditioning"
         bar = colour_bar(FIELD, f"{low:.2g}", f"{high:.2g}")
         part = Part("surface", "boundary", mesh, material, np.eye(4))
         return DrawnLayer(LegendEntry("workspace", text, bar.colours[3], bar), [part])

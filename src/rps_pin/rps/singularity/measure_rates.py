@@ -1,0 +1,107 @@
+"""Signed measures of singularities along a path of the 3-RPS, with their exact rates."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.rps.kinematics.pose import checked_motion
+from rps_pin.rps.kinematics.rates import (
+    LegJacobians,
+    TipJacobians,
+    jacobian_rates_of_legs,
+    masked_leg_jacobians,
+    tip_jacobian_rates,
+    tip_jacobians,
+)
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.singularity.measures import checked_tilt, gain_matrix
+
+
+class MeasureRates(NamedTuple):
+    """Signed measures of poses on a path, and their time derivatives."""
+
+    value: Array
+    """Signed type II, constraint, and d_1/h, d_2/h, d_3/h, shape (..., 5)."""
+    rate: Array
+    """Their time derivatives, shape (..., 5), 1/s."""
+
+
+def measure_rates(parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike) -> MeasureRates:
+    """Return the signed measures and their exact time derivatives along a motion.
+
+    With the gains' matrix M = K L^-T / sqrt(3), L L' = Q and Q the mean of the tips' squared speed
+    as a quadratic form of pose', the least gain sigma with M v = sigma u has, for x = L^-T v,
+
+        sigma' = u' K' x / sqrt(3) - sigma x' Q' x / 2.
+
+    Where two gains are equal it is the derivative of one of them. A leg without length has 0 for
+    its measure's and for type II's value and rate.
+
+    Parameters
+    ----------
+    pose, rate
+        Pose and its time derivative, shape (..., 3) each.
+
+    Raises
+    ------
+    InputError
+        As `singularity_measures`.
+    """
+    x, dx, _ = checked_motion(pose, rate, np.zeros(3))
+    checked_tilt(x)
+    h = parameters.platform_radius
+    tip = tip_jacobians(parameters, x)
+    legs, vanishing = masked_leg_jacobians(parameters, x)
+    change = jacobian_rates_of_legs(parameters, x, dx, legs)
+    sigma, dsigma = _least_gain(tip, legs, change.length_jacobian, parameters, x, dx)
+    regular = ~vanishing.any(axis=-1)
+    beta = np.hypot(x[..., 1], x[..., 2])
+    # d/dt cos(beta/2) = -sin(beta/2) / (2 beta) w . w'
+    couple_rate = -np.sinc(beta / (2 * np.pi)) / 4 * (x[..., 1:] * dx[..., 1:]).sum(axis=-1)
+    speed = np.einsum("...ij,...j->...i", legs.length_jacobian, dx)
+    return MeasureRates(
+        np.concatenate(
+            [
+                np.where(regular, sigma, 0.0)[..., None],
+                np.cos(beta / 2)[..., None],
+                np.where(vanishing, 0.0, legs.length) / h,
+            ],
+            axis=-1,
+        ),
+        np.concatenate(
+            [
+                np.where(regular, dsigma, 0.0)[..., None],
+                couple_rate[..., None],
+                np.where(vanishing, 0.0, speed) / h,
+            ],
+            axis=-1,
+        ),
+    )
+
+
+def _least_gain(
+    tip: TipJacobians,
+    legs: LegJacobians,
+    K_rate: Array,
+    parameters: RPSParameters,
+    pose: Array,
+    rate: Array,
+) -> tuple[Array, Array]:
+    """Return the least gain with the sign of det K, and its time derivative (`measure_rates`)."""
+    M, L = gain_matrix(tip, legs)
+    left, gains, right = np.linalg.svd(M)
+    u, v = left[..., :, 2], right[..., 2, :]
+    x = np.linalg.solve(np.swapaxes(L, -1, -2), v[..., None])[..., 0]
+    dU, dW = tip_jacobian_rates(parameters, pose, rate)
+    moving = [np.einsum("...ij,...j->...i", matrix, x) for matrix in (*tip[2:], dU, dW)]
+    # x' Q' x = 2/3 ((U x) . (U' x) + (W x) . (W' x))
+    x_dQ_x = 2 / 3 * (moving[0] * moving[2] + moving[1] * moving[3]).sum(axis=-1)
+    sigma = gains[..., 2]
+    change = np.einsum("...i,...ij,...j->...", u, K_rate, x) / math.sqrt(3) - sigma * x_dQ_x / 2
+    sign = np.where(np.linalg.det(M) < 0, -1.0, 1.0)
+    return sign * sigma, sign * change

@@ -1,0 +1,176 @@
+"""Signals of a path of the 3-RPS: functions of time that are zero where something goes wrong.
+
+The signals are the signed measures of singularities (`rps_pin.rps.singularity.measure_rates`) and,
+for each limit of each leg, the room that is left, each with its exact rate along the path.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.errors import InputError
+from rps_pin.rps.kinematics.legs import RADIAL
+from rps_pin.rps.kinematics.pose import platform_motion
+from rps_pin.rps.kinematics.rates import masked_leg_jacobians
+from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.singularity.measure_rates import measure_rates
+from rps_pin.rps.singularity.measures import checked_tilt
+from rps_pin.trajectories.path import Trajectory
+from rps_pin.validation import positive_number
+
+#: Limits are kept to rounding error, m or rad (as in `rps_pin.rps.kinematics.legs`).
+_ROUNDING = 1e-12
+#: Times that are worked on at once.
+_CHUNK = 50_000
+
+
+class Signal(NamedTuple):
+    """What a signal is about."""
+
+    name: str
+    """Kind of singularity, or quantity with a limit."""
+    leg: int
+    """1 to 3; 0 for the whole robot."""
+    side: str = ""
+    limit: float = 0.0
+    unit: str = ""
+
+
+#: In the order of `measure_rates`.
+SINGULARITIES = (
+    Signal("type II", 0),
+    Signal("constraint", 0),
+    *(Signal("type I", leg) for leg in (1, 2, 3)),
+)
+TYPE_I = slice(2, 5)
+
+
+class PathSignals:
+    """A trajectory of a robot as signals of time."""
+
+    def __init__(self, parameters: RPSParameters, trajectory: Trajectory, tolerance: float) -> None:
+        self.parameters = parameters
+        self.trajectory = trajectory
+        self.duration = positive_number(trajectory.duration, "the trajectory's duration", "s")
+        self.tolerance = tolerance
+        self.limits = _limits_of(parameters)
+        least = 4 * float(np.spacing(self.duration))
+        if tolerance < least:
+            raise InputError(
+                f"tolerance = {tolerance:.3g} s: times up to {self.duration:.6g} s can be told "
+                f"apart down to {least:.3g} s"
+            )
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        """Return poses and rates at times (n,), shape (n, 3) each, checked."""
+        found = self.trajectory.sample(times)
+        pose = _checked_samples(found.pose, times, "pose")
+        rate = _checked_samples(found.rate, times, "rate")
+        return checked_tilt(pose), rate
+
+    def signals(self, times: Array) -> tuple[Array, Array]:
+        """Return every signal and its rate at times (n,), shape (n, signals) each."""
+        parts = [self._signals(times[i : i + _CHUNK]) for i in range(0, times.size, _CHUNK)]
+        values, rates = zip(*parts, strict=True)
+        return np.concatenate(values), np.concatenate(rates)
+
+    def _signals(self, times: Array) -> tuple[Array, Array]:
+        pose, rate = self.sample(times)
+        value, change = measure_rates(self.parameters, pose, rate)
+        # A leg without length is a type I singularity; type II is not determined there.
+        value[(value[:, TYPE_I] == 0).any(axis=-1), 0] = 1.0
+        room, room_rate = _rooms(self.parameters, self.limits, pose, rate)
+        return np.concatenate([value, room], axis=-1), np.concatenate([change, room_rate], axis=-1)
+
+
+def _limits_of(parameters: RPSParameters) -> tuple[Signal, ...]:
+    """Return the limits that a leg can break."""
+    p = parameters
+    sides = [
+        ("length", "lower", p.leg_length_limits[0], "m", p.leg_length_limits[0] > 0),
+        ("length", "upper", p.leg_length_limits[1], "m", math.isfinite(p.leg_length_limits[1])),
+        ("angle", "lower", p.leg_angle_limits[0], "rad", p.leg_angle_limits[0] > -math.pi),
+        ("angle", "upper", p.leg_angle_limits[1], "rad", p.leg_angle_limits[1] < math.pi),
+        (
+            "spherical joint",
+            "upper",
+            p.spherical_cone_limit,
+            "rad",
+            p.spherical_cone_limit < math.pi,
+        ),
+    ]
+    return tuple(
+        Signal(quantity, leg, side, limit, unit)
+        for quantity, side, limit, unit, breakable in sides
+        if breakable
+        for leg in (1, 2, 3)
+    )
+
+
+def _rooms(
+    parameters: RPSParameters, limits: tuple[Signal, ...], pose: Array, rate: Array
+) -> tuple[Array, Array]:
+    """Return how much room each limit leaves, and its rate, shape (n, limits); negative: beyond.
+
+    For the spherical joints it is the room of the angle's cosine, which is smooth.
+    """
+    rooms, rates = np.empty((len(pose), len(limits))), np.empty((len(pose), len(limits)))
+    if not limits:
+        return rooms, rates
+    legs, vanishing = masked_leg_jacobians(parameters, pose)
+    speed = np.einsum("...ij,...j->...i", legs.length_jacobian, rate)
+    turning = np.einsum("...ij,...j->...i", legs.angle_jacobian, rate)
+    quantities = {
+        "length": (legs.length, np.where(vanishing, 0.0, speed)),
+        "angle": (legs.angle, turning),
+    }
+    if any(signal.name == "spherical joint" for signal in limits):
+        quantities["spherical joint"] = _cone_cosines(parameters, pose, rate, legs.angle, turning)
+    for column, signal in enumerate(limits):
+        value, change = (array[:, signal.leg - 1] for array in quantities[signal.name])
+        if signal.name == "spherical joint":
+            least = math.cos(min(signal.limit + _ROUNDING, math.pi))
+            rooms[:, column], rates[:, column] = value - least, change
+        elif signal.side == "lower":
+            rooms[:, column], rates[:, column] = value - signal.limit + _ROUNDING, change
+        else:
+            rooms[:, column], rates[:, column] = signal.limit + _ROUNDING - value, -change
+    return rooms, rates
+
+
+def _cone_cosines(
+    parameters: RPSParameters, pose: Array, rate: Array, angle: Array, angle_rate: Array
+) -> tuple[Array, Array]:
+    """Return the cosines of the angles between legs and rest axes, and their rates, (n, 3 legs).
+
+    The leg is l = -cos(phi) e + sin(phi) z, its joint's rest axis R (cos(r) z - sin(r) e).
+    """
+    r = parameters.spherical_rest_angle
+    rest = math.cos(r) * np.array([0.0, 0.0, 1.0]) - math.sin(r) * RADIAL
+    platform = platform_motion(pose, rate, np.zeros_like(pose), parameters.platform_radius)
+    to_base = np.swapaxes(platform.rotation, -1, -2)  # of row vectors
+    axis = rest @ to_base
+    axis_rate = np.cross(platform.angular_velocity[:, None, :], rest) @ to_base
+    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    upright = np.array([0.0, 0.0, 1.0])
+    leg = -cosine * RADIAL + sine * upright
+    leg_rate = angle_rate[..., None] * (sine * RADIAL + cosine * upright)
+    return (leg * axis).sum(axis=-1), (leg_rate * axis + leg * axis_rate).sum(axis=-1)
+
+
+def _checked_samples(value: Array, times: Array, name: str) -> Array:
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or array.shape != (times.size, 3):
+        raise InputError(
+            f"the trajectory's {name} at {times.size} times has shape {array.shape} and type "
+            f"{array.dtype}; it must be ({times.size}, 3) numbers"
+        )
+    finite = np.isfinite(array).all(axis=-1)
+    if not finite.all():
+        when = times[int(np.argmin(finite))]
+        raise InputError(f"the trajectory's {name} is not finite at {when:.9g} s")
+    return array.astype(np.float64, copy=False)
