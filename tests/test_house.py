@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
+import runpy
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from datetime import date
 from pathlib import Path
 
@@ -78,35 +80,49 @@ def test_the_changelog_keeps_its_form() -> None:
     assert set(kinds) <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
 
 
-#: Each package may import those beside it and those before it, and no other.
+#: A package may import those of its own layer and of those before it. `paper` only the command line
+#: imports; `reproduction` is its old name.
 LAYERS = [
+    {"errors", "validation", "arrays", "files", "config", "moved"},
     {"numerics"},
     {"closed_loop"},
     {"trajectories"},
     {"rps"},
     {"control"},
-    {"paper", "plots"},
+    {"plots"},
     {"viewer"},
     {"panel"},
-    {"cli"},
+    {"paper"},
+    {"cli", "reproduction"},
 ]
+LAYER = {name: number for number, layer in enumerate(LAYERS) for name in layer}
+COUNT = runpy.run_path(str(ROOT / "tools" / "count_code"))
+#: The modules that each module imports, in functions and under TYPE_CHECKING too.
+IMPORTS: dict[str, set[str]] = COUNT["imports"](ROOT / "src")
 
 
-@pytest.mark.parametrize("layer", range(len(LAYERS)))
-def test_dependencies_point_one_way(layer: int) -> None:
-    """Of imports in functions and under TYPE_CHECKING too."""
-    above = set().union(*LAYERS[layer + 1 :])
-    found = []
-    for path in sorted(path for name in LAYERS[layer] for path in (PACKAGE / name).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
-            if isinstance(node, ast.ImportFrom) and node.module:
-                names = [f"{node.module}.{one.name}" for one in node.names]
-            for name in names:
-                parts = name.split(".")
-                if parts[0] == "rps_pin" and len(parts) > 1 and parts[1] in above:
-                    found.append(f"{path.relative_to(PACKAGE)} imports {name}")
+def room(module: str) -> str:
+    """Return the package of a module, or the module beside them; none for rps_pin itself."""
+    return module.partition(".")[2].partition(".")[0]
+
+
+def test_dependencies_point_one_way() -> None:
+    """Every package, and every module beside them, has a layer."""
+    assert {room(name) for name in IMPORTS} == {*LAYER, ""}
+    found = [
+        f"{module} imports {other}"
+        for module, used in IMPORTS.items()
+        for other in used
+        if room(module) and room(other) and LAYER[room(other)] > LAYER[room(module)]
+    ]
     assert not found, "\n".join(found)
+
+
+def test_folders_are_small() -> None:
+    """The commands, and the checks of the paper, are as many as there are."""
+    counts = Counter(path.parent.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py"))
+    large = {str(folder): count for folder, count in counts.items() if count > 14}
+    assert set(large) <= {"cli", "paper"}, large
 
 
 def test_every_package_is_reached_from_the_top() -> None:

@@ -19,7 +19,6 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.paper.workspace_comparison import PaperComparison
 from rps_pin.plots.style import (
     BLACK,
     BLUE,
@@ -269,7 +268,20 @@ def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) 
     return figure
 
 
-def plot_comparison(rows: Sequence[PaperComparison], axes: Axes | None = None) -> Figure:
+class _Reach(Protocol):
+    """The workspace of one base radius: a `rps_pin.paper.PaperComparison`."""
+
+    @property
+    def base_radius(self) -> float: ...
+    @property
+    def x(self) -> tuple[float, float]: ...
+    @property
+    def y(self) -> tuple[float, float]: ...
+    @property
+    def stated_reach(self) -> float: ...
+
+
+def plot_comparison(rows: Sequence[_Reach], axes: Axes | None = None) -> Figure:
     """Draw the reach in x and y over the base radius g beside what the paper states.
 
     Parameters
