@@ -97,7 +97,8 @@ def real_array(
         The last dimensions.
     """
     wanted = f"(..., {', '.join(map(str, ending))})" if ending else "(...)"
-    array = numbers(value, name, f"numbers of shape {wanted}{meaning and f': {meaning}'}")
+    wanted += meaning and f": {meaning}"
+    array = numbers(value, name, f"numbers of shape {wanted}")
     if array.ndim < len(ending) or array.shape[array.ndim - len(ending) :] != ending:
         raise InputError(f"{name} has shape {array.shape}; it must be {wanted}")
     refuse_not_finite(array, name)

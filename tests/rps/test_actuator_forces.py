@@ -494,7 +494,7 @@ def test_what_does_not_fit_is_refused() -> None:
         robot.actuator_forces([[0.4, 0, 0]] * 2, STILL, STILL, wrench=np.zeros((4, 6)))
     with pytest.raises(InputError, match=r"wrench has shape \(3,\)"):
         robot.actuator_forces([0.4, 0, 0], STILL, STILL, wrench=np.zeros(3))
-    with pytest.raises(InputError, match=r"\(2, 3\).*\(4, 3\).*do not go together"):
+    with pytest.raises(InputError, match=r"do not go together.*\(2, 3\).*\(4, 3\)"):
         robot.actuator_forces(np.full((2, 3), 0.1), np.zeros((4, 3)), STILL)
     with pytest.raises(InputError, match=r"ignore.*'raise' or 'mask'"):
         robot.actuator_forces([0.4, 0, 0], STILL, STILL, errors="ignore")

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from rps_pin import RPSParameters, UnreachableError
 from rps_pin.rps.kinematics import legs
-from rps_pin.rps.kinematics.pose import platform_motion, position, rotation
+from rps_pin.rps.kinematics.pose import position, rotation
 from tests import strategies
 from tests.reference import newton_euler as ne
 from tests.strategies import LEG_ANGLES
@@ -58,8 +58,7 @@ def test_motion_is_the_reference_s() -> None:
     for _ in range(20):
         robot = strategies.random_parameters(rng)
         state = strategies.random_motions(rng, robot, 100)
-        moving = platform_motion(*state, robot.platform_radius)
-        found = legs.leg_motion(moving, robot.platform_radius, robot.base_radius)
+        found = legs.leg_motion(*state, robot.platform_radius, robot.base_radius)
         expected = ne.kinematics(robot, *state)
         pairs = {
             "length": expected.leg_lengths,
@@ -77,7 +76,7 @@ def test_motion_is_the_reference_s() -> None:
 def test_rising_level_platform_moves_its_legs_by_geometry() -> None:
     """d^2 = (g - h)^2 + z^2: d' = z z'/d, phi' = (g - h) z'/d^2."""
     state = [np.array(x, dtype=float) for x in ([0.4, 0, 0], [0.3, 0, 0], [0, 0, 0])]
-    found = legs.leg_motion(platform_motion(*state, 0.16), 0.16, 0.46)
+    found = legs.leg_motion(*state, 0.16, 0.46)
     np.testing.assert_allclose(found.length, 0.5, rtol=1e-15)
     np.testing.assert_allclose(found.speed, 0.4 * 0.3 / 0.5, rtol=1e-14)
     np.testing.assert_allclose(found.angle_rate, 0.3 * 0.3 / 0.25, rtol=1e-14)

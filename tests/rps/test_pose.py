@@ -236,7 +236,7 @@ def test_motion_takes_one_shape() -> None:
 
 
 def test_shapes_that_cannot_be_one_are_all_told() -> None:
-    with pytest.raises(InputError, match=r"\(4, 3\), \(5, 3\), \(3,\)"):
+    with pytest.raises(InputError, match=r"pose \(4, 3\), rate \(5, 3\), acceleration \(3,\)"):
         checked_motion(np.zeros((4, 3)), np.zeros((5, 3)), np.zeros(3))
 
 

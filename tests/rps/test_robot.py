@@ -370,7 +370,7 @@ def test_leg_without_length_is_refused(errors: str) -> None:
 def test_poses_that_are_not_finite_are_refused(bad: float, entry: int, errors: str) -> None:
     pose = np.array([0.4, 0.0, 0.0])
     pose[entry] = bad
-    with pytest.raises(InputError, match=rf"pose is not finite: entry \({entry},\)"):
+    with pytest.raises(InputError, match=rf"pose is not finite: entry {entry} is"):
         sokolov().inverse_kinematics(pose, errors=errors)
 
 
@@ -391,7 +391,7 @@ def test_bad_motions_are_named(function: str, name: str) -> None:
 
 
 def test_shapes_that_do_not_go_together_are_refused() -> None:
-    with pytest.raises(InputError, match=r"\(2, 3\).*\(4, 3\).*do not go together"):
+    with pytest.raises(InputError, match=r"do not go together.*\(2, 3\).*\(4, 3\)"):
         sokolov().state(np.full((2, 3), 0.1), np.zeros((4, 3)), np.zeros(3))
 
 

@@ -32,7 +32,7 @@ from rps_pin.paper.lagrange_terms import lagrange_terms
 from rps_pin.paper.lagrange_vectors import times
 from rps_pin.rps.checks import refuse_large_gain
 from rps_pin.rps.kinematics.legs import leg_motion
-from rps_pin.rps.kinematics.pose import checked_motion, platform_motion
+from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.parameters import RPSParameters
 
 
@@ -91,8 +91,7 @@ def lagrange_forces(
         robot's other operation mode.
     """
     motion = checked_motion(pose, rate, acceleration)
-    platform = platform_motion(*motion, parameters.platform_radius)
-    legs = leg_motion(platform, parameters.platform_radius, parameters.base_radius)
+    legs = leg_motion(*motion, parameters.platform_radius, parameters.base_radius)
     terms = lagrange_terms(
         parameters,
         legs.length,

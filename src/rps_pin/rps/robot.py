@@ -375,7 +375,7 @@ class RPSRobot:
     ) -> tuple[PlatformMotion, LegMotion]:
         p = self.parameters
         platform = platform_motion(pose, rate, acceleration, p.platform_radius)
-        legs = leg_kinematics.leg_motion(platform, p.platform_radius, p.base_radius)
+        legs = leg_kinematics.leg_motion(pose, rate, acceleration, p.platform_radius, p.base_radius)
         self._reachable(pose, legs.length, legs.angle, platform.rotation, refuse=True)
         return platform, legs
 

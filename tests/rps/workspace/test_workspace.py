@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.errors import InputError, SingularityError, UnreachableError
 from rps_pin.rps.kinematics.legs import leg_motion
-from rps_pin.rps.kinematics.pose import platform_motion
 from rps_pin.rps.workspace import Reason, Workspace, leg_grid, pose_grid, workspace
 from rps_pin.rps.workspace.jacobian import leg_jacobian
 from rps_pin.rps.workspace.measures import measures
@@ -54,7 +53,7 @@ def test_the_jacobian_is_that_of_the_legs_motion() -> None:
     for j in range(3):
         rate = np.zeros_like(pose)
         rate[:, j] = 1.0
-        legs = leg_motion(platform_motion(pose, rate, np.zeros_like(pose), h), h, g)
+        legs = leg_motion(pose, rate, np.zeros_like(pose), h, g)
         scale = 1.0 if j == 0 else h
         assert np.allclose(found.jacobian[..., j], legs.speed / scale, rtol=0, atol=1e-13)
         assert np.allclose(found.length, legs.length, rtol=1e-14)

@@ -17,17 +17,22 @@ import numpy as np
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import LimitViolation, UnreachableError
-from rps_pin.rps.kinematics.pose import PlatformMotion
+from rps_pin.rps.kernels import legs as kernels
+from rps_pin.rps.kernels import tips as ring
+from rps_pin.rps.kernels.limits import within
+from rps_pin.rps.kinematics.pose import components, tilt_of
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.urdf import LEG_DIRECTIONS
-
-#: Limits are kept to rounding error, m or rad.
-_ROUNDING = 1e-12
 
 #: e_i, shape (3 legs, 3): the radial directions in the base plane, and in the platform.
 RADIAL = np.array([[math.cos(angle), math.sin(angle), 0.0] for angle in LEG_DIRECTIONS])
 RADIAL.setflags(write=False)
+#: t_i = z x e_i, shape (3 legs, 3): the axes of the revolute joints.
+ACROSS = np.stack([-RADIAL[:, 1], RADIAL[:, 0], np.zeros(3)], axis=-1)
+ACROSS.setflags(write=False)
 _UP = np.array([0.0, 0.0, 1.0])
+#: A leg shorter than this part of g has no direction.
+_VANISHING = 1e-9
 
 
 class Legs(NamedTuple):
@@ -61,6 +66,46 @@ def tips(position: Array, rotation: Array, platform_radius: float) -> Array:
     return position[..., None, :] + _turned(rotation, platform_radius * RADIAL)
 
 
+class LegGeometry(NamedTuple):
+    """Lengths and directions of the legs."""
+
+    length: Array
+    """d, shape (..., 3 legs), m."""
+    cosine: Array
+    """cos(phi), shape (..., 3 legs); 1 where the leg has no length."""
+    sine: Array
+    """sin(phi), shape (..., 3 legs); 0 where the leg has no length."""
+    vanishing: Bools
+    """Whether a leg has no length, and so no direction, shape (..., 3 legs)."""
+
+    @property
+    def angle(self) -> Array:
+        """phi, shape (..., 3 legs), rad."""
+        angles: Array = np.arctan2(self.sine, self.cosine)
+        return angles
+
+
+def leg_geometry(radial: Array, height: Array, base_radius: float) -> LegGeometry:
+    """Return the legs of tips at (rho, z_i) in their planes, shape (..., 3 legs) each, m: Eq. 7."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        length, cosine, sine = kernels.leg_geometry(radial, height, base_radius)
+    vanishing: Bools = length < _VANISHING * base_radius
+    if vanishing.any():
+        cosine, sine = np.where(vanishing, 1.0, cosine), np.where(vanishing, 0.0, sine)
+    return LegGeometry(length, cosine, sine, vanishing)
+
+
+def geometry_of_pose(pose: Array, base_radius: float, platform_radius: float) -> LegGeometry:
+    """Return the legs of poses (..., 3): Eq. 1, 4 and 7."""
+    radial, height = ring.tips(components(pose)[0], *tilt_of(pose), platform_radius)
+    return leg_geometry(at_legs(radial), at_legs(height), base_radius)
+
+
+def at_legs(numbers: ring.Ring) -> Array:
+    """Return a ring's number for each leg, shape (..., 3 legs)."""
+    return np.moveaxis(np.asarray(ring.at_legs(numbers)), 0, -1)
+
+
 def leg_angles_and_lengths(tip: Array, base_radius: float) -> tuple[Array, Array]:
     """Return lengths and angles, shape (..., 3) each, from the tips (..., 3 legs, 3): Eq. 7.
 
@@ -69,25 +114,31 @@ def leg_angles_and_lengths(tip: Array, base_radius: float) -> tuple[Array, Array
     UnreachableError
         If a tip lies on its revolute joint, where the leg has no direction.
     """
-    inwards, up = base_radius - _radial(tip), tip[..., 2]
-    length = np.hypot(inwards, up)
-    vanishing = length < 1e-9 * base_radius
+    radial: Array = np.einsum("...ij,ij->...i", tip, RADIAL)
+    legs = leg_geometry(radial, tip[..., 2], base_radius)
+    refuse_vanishing(legs.length, legs.vanishing)
+    return legs.length, legs.angle
+
+
+def refuse_vanishing(length: Array, vanishing: Bools) -> None:
+    """Raise `UnreachableError` if a leg, (..., 3 legs), has no length."""
     if vanishing.any():
         leg = int(np.argwhere(vanishing)[0][-1]) + 1
         raise UnreachableError(
             f"leg {leg} would have length {length[vanishing][0]:.3g} m: its tip lies on its "
             "revolute joint, and it has no direction"
         )
-    return length, np.arctan2(up, inwards)
 
 
-def leg_motion(motion: PlatformMotion, platform_radius: float, base_radius: float) -> LegMotion:
-    """Return the legs' motion that carries the platform's, in closed form.
+def leg_motion(
+    pose: Array, rate: Array, acceleration: Array, platform_radius: float, base_radius: float
+) -> LegMotion:
+    """Return how the legs move with the platform, in closed form.
 
     Parameters
     ----------
-    motion
-        The platform's motion.
+    pose, rate, acceleration
+        Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
     platform_radius, base_radius
         The paper's h and g, m.
 
@@ -96,32 +147,22 @@ def leg_motion(motion: PlatformMotion, platform_radius: float, base_radius: floa
     UnreachableError
         If a leg has no length.
     """
-    arm = platform_radius * RADIAL  # platform axes
-    spin = motion.angular_velocity[..., None, :]
-    spin_rate = motion.angular_acceleration[..., None, :]
-    turning = np.cross(spin, arm)
-    # B' = p' + R (w x b),  B'' = p'' + R (w' x b + w x (w x b))
-    tip = tips(motion.position, motion.rotation, platform_radius)
-    velocity = motion.velocity[..., None, :] + _turned(motion.rotation, turning)
-    acceleration = motion.acceleration[..., None, :] + _turned(
-        motion.rotation, np.cross(spin_rate, arm) + np.cross(spin, turning)
-    )
-
-    d, phi = leg_angles_and_lengths(tip, base_radius)
-    cosine, sine = np.cos(phi), np.sin(phi)
-    inwards, up = -_radial(velocity), velocity[..., 2]
-    speed = cosine * inwards + sine * up
-    angle_rate = (-sine * inwards + cosine * up) / d
-    inwards, up = -_radial(acceleration), acceleration[..., 2]
-    # Polar coordinates: radial d'' - d phi'^2, across d phi'' + 2 d' phi'.
-    return LegMotion(
-        d,
-        phi,
-        speed,
-        angle_rate,
-        cosine * inwards + sine * up + d * angle_rate**2,
-        (-sine * inwards + cosine * up - 2 * speed * angle_rate) / d,
-    )
+    legs = geometry_of_pose(pose, base_radius, platform_radius)
+    refuse_vanishing(legs.length, legs.vanishing)
+    x, y, tilt = tilt_of(pose)
+    (dz, dx, dy), (ddz, ddx, ddy) = components(rate), components(acceleration)
+    h = platform_radius
+    slopes = ring.tip_slopes(x, y, tilt)
+    rates = [at_legs(one) for one in ring.tip_rates(slopes, dz, h * dx, h * dy)]
+    moving = (x, y, dx, dy, ddx, ddy)
+    changes = [at_legs(one) for one in ring.tip_accelerations(moving, ddz, tilt, h)]
+    d, cosine, sine, _ = legs
+    speed = kernels.along_leg(cosine, sine, *rates)
+    angle_rate = kernels.across_leg(cosine, sine, *rates) / d
+    along = kernels.along_leg(cosine, sine, *changes)
+    across = kernels.across_leg(cosine, sine, *changes)
+    accelerations = kernels.leg_acceleration(speed, angle_rate, d, along, across)
+    return LegMotion(d, legs.angle, speed, angle_rate, *accelerations)
 
 
 def rest_axes(rest_angle: float) -> Array:
@@ -151,11 +192,11 @@ def cone_angles(angle: Array, rotation: Array, rest_angle: float = 0.0) -> Array
     rest_angle
         ``RPSParameters.spherical_rest_angle``, rad; at 0 the rest axis is the platform's normal.
     """
-    leg = -np.cos(angle)[..., None] * RADIAL + np.sin(angle)[..., None] * _UP
-    rest = _turned(rotation, rest_axes(rest_angle))
-    along = np.einsum("...ij,...ij->...i", leg, rest)
-    across = np.linalg.norm(np.cross(leg, rest), axis=-1)
-    angles: Array = np.arctan2(across, along)
+    axis = _turned(rotation, rest_axes(rest_angle))
+    out, across = ((axis * way).sum(axis=-1) for way in (RADIAL, ACROSS))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    sharp = kernels.cone_sine(cosine, sine, out, across, axis[..., 2])
+    angles: Array = np.arctan2(sharp, kernels.cone_cosine(cosine, sine, out, axis[..., 2]))
     return angles
 
 
@@ -163,7 +204,7 @@ def within_limits(parameters: RPSParameters, length: Array, angle: Array, cone: 
     """Return for each pose whether every leg keeps its limits, shape (...)."""
     inside = np.ones(length.shape, dtype=bool)
     for _, _, value, lower, upper in _limits(parameters, length, angle, cone):
-        inside &= (value >= lower - _ROUNDING) & (value <= upper + _ROUNDING)
+        inside &= within(value, lower, upper)
     return np.asarray(inside.all(axis=-1))
 
 
@@ -175,7 +216,7 @@ def violations(
         LimitViolation(leg + 1, quantity, float(value[leg]), lower, upper, unit)
         for quantity, unit, value, lower, upper in _limits(parameters, length, angle, cone)
         for leg in range(3)
-        if not lower - _ROUNDING <= value[leg] <= upper + _ROUNDING
+        if not within(value[leg], lower, upper)
     ]
 
 
@@ -193,9 +234,3 @@ def _turned(rotation: Array, vectors: Array) -> Array:
     """Turn row vectors (..., n, 3) from platform to base axes."""
     turned: Array = vectors @ np.swapaxes(rotation, -1, -2)
     return turned
-
-
-def _radial(vectors: Array) -> Array:
-    """Return each leg's vector component along its radial direction, shape (..., 3)."""
-    along: Array = np.einsum("...ij,ij->...i", vectors, RADIAL)
-    return along

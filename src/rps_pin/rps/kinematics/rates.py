@@ -29,23 +29,19 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop.dynamics.kinematics import MAX_CONDITION
-from rps_pin.errors import InputError, SingularityError, UnreachableError
-from rps_pin.rps.kinematics.legs import RADIAL
+from rps_pin.errors import InputError, SingularityError
+from rps_pin.rps.kernels import legs as kernels
+from rps_pin.rps.kernels import tips as ring
+from rps_pin.rps.kinematics.legs import at_legs, leg_geometry, refuse_vanishing
 from rps_pin.rps.kinematics.pose import (
     checked_motion,
     checked_pose,
-    exp_coefficients,
-    exp_slopes,
+    components,
     platform_motion,
+    tilt_of,
 )
 from rps_pin.rps.parameters import RPSParameters
-
-#: t_i, shape (3 legs, 3): the axes of the revolute joints, z x e_i.
-ACROSS = np.stack([-RADIAL[:, 1], RADIAL[:, 0], np.zeros(3)], axis=-1)
-ACROSS.setflags(write=False)
-
-#: A leg shorter than this part of g has no direction (as in `rps_pin.rps.kinematics.legs`).
-_VANISHING = 1e-9
+from rps_pin.validation import one_shape, real_array
 
 Errors = Literal["raise", "mask"]
 
@@ -139,19 +135,11 @@ def tip_jacobians(parameters: RPSParameters, pose: ArrayLike) -> TipJacobians:
         If the pose has the wrong shape or is not finite.
     """
     x = checked_pose(pose)
-    h = parameters.platform_radius
-    e, t, s = _tilt_components(x)
-    a, b, d = exp_coefficients(s)
-    b_s, _, _ = exp_slopes(s)
-    a_s = (d - b) / 2  # dA/ds
-    f = e**2 - 3 * t**2
-    return TipJacobians(
-        h * (1 + b * f / 2),
-        x[..., :1] - h * a * t,
-        # d(rho)/de and d(rho)/dt, then d(z)/de and d(z)/dt; e and t are linear in the tilt.
-        _by_pose(0.0, h * e * (b_s * f + b), h * t * (b_s * f - 3 * b)),
-        _by_pose(1.0, -2 * h * a_s * e * t, -h * (a + 2 * a_s * t**2)),
-    )
+    h, z = parameters.platform_radius, components(x)[0]
+    tilt_x, tilt_y, tilt = tilt_of(x)
+    radial, height = ring.tips(z, tilt_x, tilt_y, tilt, h)
+    slopes = ring.tip_slopes(tilt_x, tilt_y, tilt)
+    return TipJacobians(at_legs(radial), at_legs(height), *_by_pose(slopes, h, by_z=1.0))
 
 
 def tip_jacobian_rates(
@@ -174,28 +162,11 @@ def tip_jacobian_rates(
     InputError
         If an argument has the wrong shape or is not finite.
     """
-    x, dx, _ = checked_motion(pose, rate, np.zeros(3))
-    h = parameters.platform_radius
-    e, t, s = _tilt_components(x)
-    de, dt, _ = _tilt_components(dx)
-    ds = 2 * (e * de + t * dt)
-    _, b, d = exp_coefficients(s)
-    b_s, b_ss, d_s = exp_slopes(s)
-    a_s, a_ss = (d - b) / 2, (d_s - b_s) / 2
-    f, df = e**2 - 3 * t**2, 2 * (e * de - 3 * t * dt)
-    df_b = b_ss * ds * f + b_s * df  # d/dt of B_s f
-    return (
-        _by_pose(
-            0.0,
-            h * (de * (b_s * f + b) + e * (df_b + b_s * ds)),
-            h * (dt * (b_s * f - 3 * b) + t * (df_b - 3 * b_s * ds)),
-        ),
-        _by_pose(
-            0.0,
-            -2 * h * (a_ss * ds * e * t + a_s * (de * t + e * dt)),
-            -h * (a_s * ds + 2 * a_ss * ds * t**2 + 4 * a_s * t * dt),
-        ),
-    )
+    x, dx, _ = checked_motion(pose, rate)
+    tilt_x, tilt_y, tilt = tilt_of(x)
+    _, tilt_x_rate, tilt_y_rate = components(dx)
+    slope_rates = ring.tip_slope_rates(tilt_x, tilt_y, tilt_x_rate, tilt_y_rate, tilt)
+    return _by_pose(slope_rates, parameters.platform_radius, by_z=0.0)
 
 
 def leg_jacobians(parameters: RPSParameters, pose: ArrayLike) -> LegJacobians:
@@ -237,7 +208,7 @@ def leg_jacobian_rates(
     InputError, UnreachableError
         As `leg_jacobians`.
     """
-    x, dx, _ = checked_motion(pose, rate, np.zeros(3))
+    x, dx, _ = checked_motion(pose, rate)
     legs = leg_jacobians(parameters, x)
     return jacobian_rates_of_legs(parameters, x, dx, legs)
 
@@ -248,35 +219,28 @@ def masked_leg_jacobians(parameters: RPSParameters, pose: ArrayLike) -> tuple[Le
     Their angle and their rows of the Jacobians say nothing; they are finite.
     """
     tip = tip_jacobians(parameters, pose)
-    inwards = parameters.base_radius - tip.radial
-    length, angle = np.hypot(inwards, tip.height), np.arctan2(tip.height, inwards)
-    vanishing = length < _VANISHING * parameters.base_radius
-    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
-    lever = np.where(vanishing, parameters.base_radius, length)[..., None]
-    return (
-        LegJacobians(
-            length,
-            angle,
-            -cosine * tip.radial_jacobian + sine * tip.height_jacobian,
-            (sine * tip.radial_jacobian + cosine * tip.height_jacobian) / lever,
-        ),
-        vanishing,
-    )
+    legs = leg_geometry(tip.radial, tip.height, parameters.base_radius)
+    direction = legs.cosine[..., None], legs.sine[..., None]
+    lever = np.where(legs.vanishing, parameters.base_radius, legs.length)[..., None]
+    slopes = tip.radial_jacobian, tip.height_jacobian
+    K = kernels.along_leg(*direction, *slopes)
+    N = kernels.across_leg(*direction, *slopes) / lever
+    return LegJacobians(legs.length, legs.angle, K, N), legs.vanishing
 
 
 def jacobian_rates_of_legs(
     parameters: RPSParameters, pose: Array, rate: Array, legs: LegJacobians
 ) -> LegJacobianRates:
     """Return `leg_jacobian_rates` of poses whose `leg_jacobians` are at hand."""
-    d_radial, d_height = tip_jacobian_rates(parameters, pose, rate)
-    lever = np.maximum(legs.length, _VANISHING * parameters.base_radius)[..., None]
+    changes = tip_jacobian_rates(parameters, pose, rate)
+    lever = np.maximum(legs.length, 1e-9 * parameters.base_radius)[..., None]
     K, N = legs.length_jacobian, legs.angle_jacobian
     speed, turning = _times(K, rate)[..., None], _times(N, rate)[..., None]
     cosine, sine = np.cos(legs.angle)[..., None], np.sin(legs.angle)[..., None]
     return LegJacobianRates(
         # (cos)' = -sin phi', (sin)' = cos phi'; sin d(rho) + cos d(z) = d N.
-        -cosine * d_radial + sine * d_height + turning * lever * N,
-        (sine * d_radial + cosine * d_height - turning * K - speed * N) / lever,
+        kernels.along_leg(cosine, sine, *changes) + turning * lever * N,
+        (kernels.across_leg(cosine, sine, *changes) - turning * K - speed * N) / lever,
     )
 
 
@@ -317,7 +281,7 @@ def pose_rate(
         If K is too near a singular matrix: the gain and its limit are in the message.
     """
     _check_options(errors, max_gain)
-    x, speed = _checked_together(pose=checked_pose(pose), leg_speed=checked_legs(leg_speed))
+    x, speed = one_shape(pose=checked_pose(pose), leg_speed=checked_legs(leg_speed))
     return _solved(parameters, x, lambda _: speed, errors, max_gain)
 
 
@@ -347,7 +311,7 @@ def pose_acceleration(
         As `pose_rate`.
     """
     _check_options(errors, max_gain)
-    x, dx, acceleration = _checked_together(
+    x, dx, acceleration = one_shape(
         pose=checked_pose(pose),
         rate=checked_pose(rate, "rate"),
         leg_acceleration=checked_legs(leg_acceleration, "leg_acceleration"),
@@ -401,20 +365,11 @@ def platform_twist(
 # Inner workings -----------------------------------------------------------------------------------
 
 
-def _tilt_components(pose: Array) -> tuple[Array, Array, Array]:
-    """Return e and t of each leg, shape (..., 3 legs), and s = e^2 + t^2, shape (..., 1)."""
-    tilt = pose[..., 1:]
-    return (
-        tilt @ RADIAL[:, :2].T,
-        tilt @ ACROSS[:, :2].T,
-        (tilt**2).sum(axis=-1, keepdims=True),
-    )
-
-
-def _by_pose(by_z: float, by_e: Array, by_t: Array) -> Array:
-    """Return derivatives with respect to the pose from those to z, e and t, (..., 3 legs, 3)."""
-    by_tilt = by_e[..., None] * RADIAL[:, :2] + by_t[..., None] * ACROSS[:, :2]
-    return np.concatenate([np.full((*by_e.shape, 1), by_z), by_tilt], axis=-1)
+def _by_pose(slopes: ring.Slopes, h: float, by_z: float) -> tuple[Array, Array]:
+    """Return the derivatives of rho and z_i by the pose, (..., 3 legs, 3), from rings of slopes."""
+    rho_x, rho_y, z_x, z_y = (h * at_legs(one) for one in slopes)
+    zero = np.zeros_like(rho_x)
+    return np.stack([zero, rho_x, rho_y], axis=-1), np.stack([zero + by_z, z_x, z_y], axis=-1)
 
 
 def _times(matrix: Array, vector: Array) -> Array:
@@ -457,16 +412,6 @@ def _refuse_singular(values: Array, determined: Bools, limit: float) -> None:
     )
 
 
-def refuse_vanishing(length: Array, vanishing: Bools) -> None:
-    """Raise `UnreachableError` if a leg, (..., 3 legs), has no length."""
-    if vanishing.any():
-        leg = int(np.argwhere(vanishing)[0][-1]) + 1
-        raise UnreachableError(
-            f"leg {leg} would have length {length[vanishing][0]:.3g} m: its tip lies on its "
-            "revolute joint, and it has no direction"
-        )
-
-
 def check_errors_option(errors: str) -> None:
     """Raise `InputError` unless errors is ``"raise"`` or ``"mask"``."""
     if errors not in ("raise", "mask"):
@@ -480,23 +425,5 @@ def _check_options(errors: str, max_gain: float) -> None:
 
 
 def checked_legs(value: ArrayLike, name: str = "leg_speed") -> Array:
-    """Return one number for each leg as a finite float array of shape (..., 3)."""
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers of shape (..., 3)") from None
-    if array.ndim == 0 or array.shape[-1] != 3:
-        raise InputError(f"{name} has shape {array.shape}; it must be (..., 3): legs 1, 2, 3")
-    if not np.isfinite(array).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
-        raise InputError(f"{name} is not finite: entry {where} is {array[where]}")
-    return array
-
-
-def _checked_together(**arrays: Array) -> tuple[Array, ...]:
-    """Return arrays broadcast to one shape, or say by name which do not go together."""
-    try:
-        return tuple(np.broadcast_arrays(*arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise InputError(f"these shapes do not go together: {shapes}") from None
+    """Return one number for each leg as finite numbers of shape (..., 3)."""
+    return real_array(value, name, (3,), "legs 1, 2, 3")

@@ -70,7 +70,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.rps.kinematics.legs import RADIAL
+from rps_pin.rps.kinematics.legs import RADIAL, refuse_vanishing
 from rps_pin.rps.kinematics.pose import checked_pose, rotation
 from rps_pin.rps.kinematics.rates import (
     Errors,
@@ -78,7 +78,6 @@ from rps_pin.rps.kinematics.rates import (
     TipJacobians,
     check_errors_option,
     masked_leg_jacobians,
-    refuse_vanishing,
     tip_jacobians,
 )
 from rps_pin.rps.parameters import RPSParameters
