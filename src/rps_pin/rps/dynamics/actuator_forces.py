@@ -18,9 +18,10 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, SingularityError, UnreachableError
 from rps_pin.rps.dynamics.force_equations import BlockState, ForceTerms, block_state, solved_forces
 from rps_pin.rps.dynamics.loads import checked_wrench
+from rps_pin.rps.kernels import legs, tips
+from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.kinematics.rates import Errors, check_errors_option, masked_leg_jacobians
-from rps_pin.rps.kinematics.tip_rings import Ring
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measures import passive_conditioning
 
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 
 #: Samples worked on at a time: few enough for their arrays to stay in the processor's cache.
 BLOCK = 4096
-#: Of a screen: it must find whatever is beyond a limit, rounding allowed for.
-_SLACK = 1e-12
 
 
 def actuator_forces(
@@ -102,49 +101,42 @@ def forces_of(
             flat[part] = solved.T
             flat_suspect[part] = close
             if limits is not None:
-                flat_suspect[part] |= _beyond_limits(limits, state)
+                flat_suspect[part] |= _beyond_limits(limits, z[1], z[2], state)
     return force, suspect
 
 
 # What is refused ----------------------------------------------------------------------------------
 
 
-def _beyond_limits(p: RPSParameters, state: BlockState) -> Bools | bool:
+def _beyond_limits(p: RPSParameters, x: Array, y: Array, state: BlockState) -> Bools | bool:
     """Return which samples of a block may break a limit of the legs, shape (n,)."""
     beyond: Bools | bool = False
     low, high = p.leg_length_limits
     if low > 0 or math.isfinite(high):
         length = state.length
-        beyond = (length.min(axis=0) < low + _SLACK) | (length.max(axis=0) > high - _SLACK)
+        beyond = (length.min(axis=0) < low + LIMIT_TOLERANCE) | (
+            length.max(axis=0) > high - LIMIT_TOLERANCE
+        )
     low, high = p.leg_angle_limits
     half = (high - low) / 2
     if half < math.pi:
         middle = (low + high) / 2
         # cos(phi - middle) >= cos(half)
         inside = math.cos(middle) * state.cosine + math.sin(middle) * state.sine
-        beyond = beyond | (inside.min(axis=0) < math.cos(half) + _SLACK)
+        beyond = beyond | (inside.min(axis=0) < math.cos(half) + LIMIT_TOLERANCE)
     if p.spherical_cone_limit < math.pi:
-        cosine = _cone_cosines(p, state).min(axis=0)
-        beyond = beyond | (cosine < math.cos(p.spherical_cone_limit) + _SLACK)
+        cosine = _cone_cosines(p, x, y, state).min(axis=0)
+        beyond = beyond | (cosine < math.cos(p.spherical_cone_limit) + LIMIT_TOLERANCE)
     return beyond
 
 
-def _cone_cosines(p: RPSParameters, state: BlockState) -> Array:
-    """Return the cosine of the angle between each leg and its joint's rest axis, shape (3, n).
-
-    With n the platform's normal, u_i = R e_i and r the rest angle: s_i . (cos(r) n - sin(r) u_i).
-    In the leg's plane h u_i is (rho_i - e_i . P, z_i - z), and n is (-(z_i - z) / h, C).
-    """
-    radial, height = state.tips.radial, state.tips.height
-    level = Ring(np.zeros_like(radial.x), 0.5 * radial.x, 0.5 * radial.y)
-    out = (radial.at_legs() - level.at_legs()) / p.platform_radius
-    rise = Ring(np.zeros_like(height.x), height.x, height.y).at_legs() / p.platform_radius
-    cosine, sine = state.cosine, state.sine
-    on_normal = cosine * rise + sine * state.tilt.c
-    if p.spherical_rest_angle == 0:
-        return on_normal
-    on_arm = sine * rise - cosine * out
-    return math.cos(p.spherical_rest_angle) * on_normal - math.sin(p.spherical_rest_angle) * on_arm
+def _cone_cosines(p: RPSParameters, x: Array, y: Array, state: BlockState) -> Array:
+    """Return the cosine of the angle between each leg and its joint's rest axis, shape (3, n)."""
+    rest = math.cos(p.spherical_rest_angle), math.sin(p.spherical_rest_angle)
+    e, t = tips.at_legs((0.0, x, y)), tips.at_legs((0.0, y, -x))
+    out, _, up = legs.rest_axis(e, t, state.tilt, *rest)
+    cosine: Array = legs.cone_cosine(state.cosine, state.sine, out, up)
+    return cosine
 
 
 def _refused(robot: RPSRobot, pose: Array) -> Bools:

@@ -6,23 +6,13 @@ Dry friction reaches 76 % of f at the speed v_s and creeps below it, instead of 
 
 from __future__ import annotations
 
-import numpy as np
 import pinocchio as pin
 
-from rps_pin.arrays import Array
 from rps_pin.closed_loop import JointEffects
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.urdf import LEGS
 
 _KINDS = ("prismatic", "revolute")
-
-
-def friction_force(speed: Array, damping: float, friction: float, friction_speed: float) -> Array:
-    """Return what resists speeds of any shape, N or N m; positive against a positive speed."""
-    force = damping * speed
-    if friction:
-        force += friction * np.tanh(speed / friction_speed)
-    return force
 
 
 def has_friction(p: RPSParameters) -> bool:

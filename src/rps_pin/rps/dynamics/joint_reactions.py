@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.rps.dynamics.friction import friction_force
 from rps_pin.rps.dynamics.loads import checked_wrench
+from rps_pin.rps.kernels.forces import friction_force
 from rps_pin.rps.kinematics.legs import ACROSS, RADIAL, LegMotion
 from rps_pin.rps.kinematics.pose import PlatformMotion, checked_motion
 from rps_pin.rps.parameters import RPSParameters

@@ -17,12 +17,10 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, ParameterError
-from rps_pin.rps.checks import finite_entries
+from rps_pin.validation import finite_number, read_only, real_array
 
 #: Share of the largest principal moment by which the triangle inequality may fail: rounding.
 _ROUNDING = 1e-9
-
-_LIKE_NONE = np.zeros((3, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,20 +50,17 @@ class Payload:
     inertia: Array | Sequence[Sequence[float]] | None = None
 
     def __post_init__(self) -> None:
-        mass = float(finite_entries(self.mass, (), "payload mass"))
+        mass = finite_number(self.mass, "payload mass", "kg")
         if not mass > 0:
             raise ParameterError("payload mass", mass, "must be positive, in kg")
+        inertia = np.zeros((3, 3)) if self.inertia is None else self.inertia
         object.__setattr__(self, "mass", mass)
-        self._set("centre", self.centre, (3,))
-        self._set("inertia", _LIKE_NONE if self.inertia is None else self.inertia, (3, 3))
+        for name, value, shape in (("centre", self.centre, (3,)), ("inertia", inertia, (3, 3))):
+            array = real_array(value, f"payload {name}")
+            if array.shape != shape:
+                raise InputError(f"payload {name} has shape {array.shape}; it must be {shape}")
+            object.__setattr__(self, name, read_only(array))
         _check_inertia(np.asarray(self.inertia))
-
-    def _set(self, name: str, value: ArrayLike, shape: tuple[int, ...]) -> None:
-        array = finite_entries(value, shape, f"payload {name}")
-        if array.shape != shape:
-            raise InputError(f"payload {name} has shape {array.shape}; it must be {shape}")
-        array.setflags(write=False)
-        object.__setattr__(self, name, array)
 
     @property
     def first_moment(self) -> Array:
@@ -101,7 +96,7 @@ def checked_wrench(value: ArrayLike, batch: tuple[int, ...]) -> Array:
     InputError
         If it is not finite, or its shape does not fit.
     """
-    wrench = finite_entries(value, (6,), "wrench")
+    wrench = real_array(value, "wrench", (6,), "force and moment")
     try:
         return np.broadcast_to(wrench, (*batch, 6))
     except ValueError:

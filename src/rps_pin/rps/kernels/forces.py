@@ -6,6 +6,8 @@ with K = d(length)/dx. F of K' F = needed is found by cofactors; so is x' of K x
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
 from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number
@@ -15,7 +17,7 @@ from rps_pin.rps.kernels.tips import Slopes, Three
 
 __all__ = ["friction_force"]
 #: Rows of a 3 x 3 matrix: K by legs, columns z, h tilt_x and h tilt_y.
-Rows = tuple[Three, Three, Three]
+Rows = Sequence[Three]
 
 
 @kernel

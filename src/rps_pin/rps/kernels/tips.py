@@ -13,22 +13,26 @@ two rings. Their derivatives are rings too. Slopes are by (h tilt_x, h tilt_y), 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rps_pin.numerics.compiled import kernel, kernel_for_floats
 from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions
 
 Ring = tuple[Number, Number, Number]
-Three = tuple[Number, Number, Number]
+#: A number of each leg: a triple, or the rows of an array.
+Three = Sequence[Number] | NDArray[Any]
 #: Of rho by h tilt_x and h tilt_y, then of z_i by them.
 Slopes = tuple[Ring, Ring, Ring, Ring]
 
 _HALF_ROOT_3 = math.sqrt(3.0) / 2.0
 
 
-def _of_floats(ring: Ring) -> Three:
+def _of_floats(ring: Ring) -> Ring:
     mean, x, y = ring
     between, apart = mean - 0.5 * x, _HALF_ROOT_3 * y
     return mean + x, between + apart, between - apart
@@ -37,13 +41,19 @@ def _of_floats(ring: Ring) -> Three:
 @kernel_for_floats(_of_floats)
 def at_legs(ring: Ring) -> Three:
     """Return the numbers of legs 1, 2, 3; arrays are the rows of one array."""
-    if isinstance(ring[1], np.ndarray):
-        return np.stack(_of_floats(ring))  # type: ignore[return-value]
-    return _of_floats(ring)
+    mean, x, y = ring
+    if not isinstance(x, np.ndarray):
+        return _of_floats(ring)
+    between, apart = mean - 0.5 * x, _HALF_ROOT_3 * y
+    legs: NDArray[Any] = np.empty((3, *between.shape), between.dtype)
+    np.add(mean, x, out=legs[0])
+    np.add(between, apart, out=legs[1])
+    np.subtract(between, apart, out=legs[2])
+    return legs
 
 
 @kernel
-def resultant(legs: Three) -> Three:
+def resultant(legs: Three) -> Ring:
     """Return the sum of three numbers, and their sum along e_i: x and y."""
     both = legs[1] + legs[2]
     return legs[0] + both, legs[0] - 0.5 * both, _HALF_ROOT_3 * (legs[1] - legs[2])
@@ -141,7 +151,7 @@ def tip_slope_rates(x: Number, y: Number, dx: Number, dy: Number, tilt: TiltFunc
 
 
 @kernel
-def speed_form(slopes: Slopes) -> Three:
+def speed_form(slopes: Slopes) -> Ring:
     """Return the tips' squared speeds summed, as a quadratic form of the tilt's rate.
 
     (xx, xy, yy) of h tilt_x and h tilt_y; of z it is 3, apart from the tilt. The sum over the legs
