@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from rps_pin.cli.console import RobotOption, load_robot
 from rps_pin.cli.motion_report import (
@@ -19,14 +18,13 @@ from rps_pin.cli.motion_report import (
     write_motion,
 )
 from rps_pin.errors import InputError
-from rps_pin.paper.three_ways import force_differences
 from rps_pin.rps.dynamics.loads import Payload
-from rps_pin.rps.dynamics.motion_run import MotionRun, MotionSummary, run_motion, summarise
+from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion, summarise
 from rps_pin.rps.dynamics.sizing import size_actuators
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, SizingSheet
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.trajectories.path import Trajectory
+from rps_pin.trajectories.path import Trajectory, end_states
 
 Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
@@ -103,7 +101,6 @@ def dynamics_command(
     run = run_motion(machine, path, rate, wrench=wrench, progress=sample_progress(console))
     sheet = size_actuators(run.time, run.force, run.speed, run.length, limits)
     summary = summarise(run, machine)
-    ways = force_differences(machine, run, wrench)
     folder = output or Path(f"{trajectory.stem}-dynamics")
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
@@ -112,7 +109,7 @@ def dynamics_command(
         answer = {
             "robot": machine.parameters.name,
             "trajectory": str(trajectory),
-            "differences": ways,
+            **dict(zip(("starts", "ends"), end_states(path), strict=True)),
             **summary.as_dict(),
             "sizing": sheet.as_dict(),
             "files": [str(file) for file in files],
@@ -121,7 +118,7 @@ def dynamics_command(
     else:
         console.print(f"3-RPS [bold]{machine.parameters.name}[/], {trajectory}", highlight=False)
         console.print(sheet.table())
-        console.print(_accuracy_table(summary, ways))
+        console.print(run_table(summary, path))
         print_exceeded(console, summary)
         print_files(console, files)
 
@@ -184,12 +181,3 @@ def _write(
     with whole_file(sizing) as scratch:
         scratch.write_text(json.dumps(sheet.as_dict(), indent=2) + "\n", "utf-8")
     return [*files, sizing]
-
-
-def _accuracy_table(summary: MotionSummary, ways: dict[str, float]) -> Table:
-    table = run_table(summary)
-    for name, difference in ways.items():
-        table.add_row(
-            f"{name} beside the constraint models", f"{difference:.2g} of the largest force"
-        )
-    return table

@@ -116,6 +116,6 @@ def _print_tables(
         highlight=False,
     )
     console.print(actuator_table(summary.actuators))
-    console.print(run_table(summary))
+    console.print(run_table(summary, path))
     print_exceeded(console, summary)
     print_files(console, files)

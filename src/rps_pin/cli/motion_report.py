@@ -13,6 +13,7 @@ from rps_pin.cli.layer_options import chosen_layers
 from rps_pin.rps.dynamics.motion_csv import write_csv
 from rps_pin.rps.dynamics.motion_run import ActuatorSummary, MotionRun, MotionSummary
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.trajectories.path import Trajectory, end_states
 
 
 def sample_progress(console: Console) -> Callable[[Iterable[int]], Iterable[int]]:
@@ -72,11 +73,13 @@ def actuator_table(actuators: tuple[ActuatorSummary, ...]) -> Table:
     return table
 
 
-def run_table(summary: MotionSummary) -> Table:
-    """Return duration, accuracy, and how near the motion comes to a singularity."""
+def run_table(summary: MotionSummary, path: Trajectory) -> Table:
+    """Return duration, rates at the ends, accuracy, and the smallest distance to a singularity."""
+    starts, ends = end_states(path)
     z, tilt_x, tilt_y = summary.minimum_pose
     table = Table(show_header=False)
     table.add_row("duration", f"{summary.duration:.6g} s ({summary.samples} samples)")
+    table.add_row("starts, ends", starts if starts == ends else f"{starts}, {ends}")
     table.add_row("largest loop gap", f"{summary.loop_gap_max:.2g} m")
     table.add_row("largest KKT residual", f"{summary.residual_max:.2g} of the largest force")
     table.add_row(
