@@ -1,4 +1,4 @@
-"""From a slider to the scene: how many updates a second the live panel makes.
+"""Time of an update of the live panel: from a slider's new value to the scene and the readings.
 
     .venv/bin/python -m pytest benchmarks/bench_panel.py --benchmark-only
 
@@ -13,15 +13,24 @@ from typing import Any
 import pytest
 
 from rps_pin import RPSRobot
-from rps_pin.panel import NotebookPanel, RPSPanel
+from rps_pin.panel import BrowserPanel, RPSPanel
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 
 @pytest.mark.parametrize("group", ["pose", "lengths"])
-def bench_a_slider_in_a_notebook(benchmark: Any, group: str) -> None:
+@pytest.mark.parametrize("layers", [(), ("forces", "limits", "singularity")])
+def bench_a_slider_of_the_panel(benchmark: Any, group: str, layers: tuple[str, ...]) -> None:
     panel = RPSPanel(RPSRobot.from_preset("micro"))
-    with NotebookPanel(panel) as face:
-        slider = face._sliders[group][0]
-        values = itertools.cycle([218.0 + k for k in range(12)])
-        benchmark(lambda: setattr(slider, "value", next(values)))
+    with BrowserPanel(panel, layers=layers) as face:
+        heights = itertools.cycle([[218.0 + k, 0.0, 0.0] for k in range(12)])
+        lengths = itertools.cycle([[218.0 + k, 223.0, 223.0] for k in range(12)])
+
+        def move() -> None:
+            """Set the first slider, and wait until the readings say so."""
+            before = face.text
+            face.move(group, next(heights if group == "pose" else lengths))
+            while face.text == before:
+                pass
+
+        benchmark(move)

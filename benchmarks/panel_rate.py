@@ -1,4 +1,4 @@
-"""How many times a second a panel's page shows new readings, in a headless Chromium.
+"""Rate at which a panel's page shows new readings, in a headless Chromium.
 
     .venv/bin/python -m benchmarks.panel_rate
 
@@ -54,8 +54,7 @@ def measured() -> list[str]:
 def by_program(face: BrowserPanel, page: Any) -> float:
     """Return the rate at which the page shows what is set here."""
     heights = itertools.cycle([218.0 + 0.1 * k for k in range(120)])
-    slider = face._sliders["pose"][0]
-    return rate(page, lambda: setattr(slider, "value", next(heights)))
+    return rate(page, lambda: face.move("pose", [next(heights), 0.0, 0.0]))
 
 
 def by_key(page: Any) -> float:

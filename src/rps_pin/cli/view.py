@@ -94,7 +94,7 @@ def view_command(
     - `rps-pin view --interactive --mechanism delta`
     """
     if interactive:
-        _interact(robot, pose, mechanism, port)
+        _interact(robot, pose, mechanism, port, layers)
         return
     if mechanism is not None:
         raise InputError("--mechanism goes with --interactive; see rps-pin simulate for its motion")
@@ -128,11 +128,16 @@ def view_command(
 
 
 def _interact(
-    robot: str, pose: tuple[float, float, float] | None, mechanism: Path | None, port: int | None
+    robot: str,
+    pose: tuple[float, float, float] | None,
+    mechanism: Path | None,
+    port: int | None,
+    layers: str | None,
 ) -> None:
     """Serve a panel until Ctrl-C."""
     from rps_pin.closed_loop.visuals import visual_model
     from rps_pin.panel import BrowserPanel, MechanismPanel, Panel, RPSPanel
+    from rps_pin.viewer import fitting_layers
 
     panel: Panel
     if mechanism is None:
@@ -143,7 +148,8 @@ def _interact(
         loaded = load_mechanism(file)
         shapes = visual_model(file, loaded.model) if file.suffix != ".xml" else None
         panel, title = MechanismPanel(loaded, visual=shapes), loaded.name
-    with BrowserPanel(panel, port=port, title=title) as page:
+    shown, at_hand = chosen_layers(layers or "none", fitting_layers(panel.mechanism))
+    with BrowserPanel(panel, port=port, title=title, layers=shown, hidden=at_hand) as page:
         typer.echo(f"Open {page.url} in a browser on this machine. Ctrl-C ends.")
         with contextlib.suppress(KeyboardInterrupt):
             threading.Event().wait()

@@ -14,7 +14,7 @@ from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import InputError, RPSPinError
-from rps_pin.panel.sliders import Slider, asked_of, told
+from rps_pin.panel.panel import Slider, quantity, slider_values
 
 _MM, _DEGREE = 1e3, 180.0 / math.pi
 
@@ -68,7 +68,7 @@ class MechanismPanel:
     def move(self, group: str, values: Any) -> bool:
         """Close the loops round the joints' coordinates; return whether that could be done."""
         try:
-            asked = asked_of(self.groups, group, values)
+            asked = slider_values(self.groups, group, values)
             wanted = dict(zip(self.mechanism.actuated, asked.tolist(), strict=True))
             closed = self.mechanism.complete(wanted, self._q, within_limits=False)
         except RPSPinError as error:
@@ -80,7 +80,7 @@ class MechanismPanel:
     def readings(self) -> list[tuple[str, str]]:
         """Return the joints, the forces that hold the weight, conditioning and gap."""
         rows = [
-            (name, told(value, _DEGREE, "degrees") if angular else told(value, _MM, "mm"))
+            (name, quantity(value, _DEGREE, "degrees") if angular else quantity(value, _MM, "mm"))
             for name, value, angular in zip(
                 self.mechanism.actuated, self.values(), self._angular, strict=True
             )
@@ -89,7 +89,7 @@ class MechanismPanel:
             rows.append(("holds", self._held))
         else:
             rows += [
-                (f"holds: {name}", told(tau, 1.0, "N m" if angular else "N"))
+                (f"holds: {name}", quantity(tau, 1.0, "N m" if angular else "N"))
                 for name, tau, angular in zip(
                     self.mechanism.actuated, self._held, self._angular, strict=True
                 )

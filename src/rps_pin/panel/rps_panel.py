@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, RPSPinError
-from rps_pin.panel.sliders import Slider, asked_of, told
+from rps_pin.panel.panel import Slider, quantity, slider_values
 from rps_pin.rps.kinematics.legs import cone_angles, violations
 from rps_pin.rps.kinematics.pose import checked_pose
 from rps_pin.rps.parameters import RPSParameters
@@ -63,7 +63,7 @@ class RPSPanel:
     def move(self, group: str, values: Any) -> bool:
         """Go to a pose, or to lengths; return whether that could be done."""
         try:
-            asked = asked_of(self.groups, group, values)
+            asked = slider_values(self.groups, group, values)
             if group == "lengths":
                 asked = self._free.forward_kinematics(asked, near=self.pose)
             self._take(asked)
@@ -76,12 +76,12 @@ class RPSPanel:
         """Return pose, lengths, angles, forces that hold the weight, and the distances."""
         measure = singularity_measures(self.robot.parameters, self.pose, errors="mask")
         return [
-            ("height", told(self.pose[0], _MM, "mm")),
-            ("tilt about x, y", told(self.pose[1:], _DEGREE, "degrees")),
-            ("centre sideways, x, y", told(self.position[:2], 1e6, "um", 1)),
-            ("leg lengths", told(self.length, _MM, "mm")),
-            ("leg angles", told(self.angle, _DEGREE, "degrees", 2)),
-            ("forces that hold it", told(self.force, 1.0, "N")),
+            ("height", quantity(self.pose[0], _MM, "mm")),
+            ("tilt about x, y", quantity(self.pose[1:], _DEGREE, "degrees")),
+            ("centre sideways, x, y", quantity(self.position[:2], 1e6, "um", 1)),
+            ("leg lengths", quantity(self.length, _MM, "mm")),
+            ("leg angles", quantity(self.angle, _DEGREE, "degrees", 2)),
+            ("forces that hold it", quantity(self.force, 1.0, "N")),
             ("distance to type II", f"{float(measure.type_ii):.4f} (0 singular, 1 best)"),
         ]
 

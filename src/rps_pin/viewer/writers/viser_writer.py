@@ -191,7 +191,7 @@ def _mesh(shape: Shape) -> trimesh.Trimesh:
         case Cylinder():
             half = shape.length / 2.0
             outline = [[0.0, -half], [shape.radius, -half], [shape.upper_radius, half], [0.0, half]]
-            mesh = trimesh.creation.revolve(outline, sections=32)
+            mesh = trimesh.creation.revolve(outline, sections=48)
         case TriangleMesh():
             mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
         case _:

@@ -1,0 +1,164 @@
+"""Panel in the browser: sliders, readings and the robot in viser's page, on this machine only."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+import threading
+from collections.abc import Sequence
+from typing import Any, Self
+
+from rps_pin.errors import RPSPinError
+from rps_pin.panel.panel import Panel
+from rps_pin.viewer import Layer, View
+from rps_pin.viewer.writers.viser_writer import ViserWriter
+
+HOST = "127.0.0.1"
+_STYLE = "font-size: 85%; line-height: 1.3; margin: 0 0.8em 0.8em"
+
+
+class BrowserPanel:
+    """A panel on a page of its own, served while a ``with`` block lasts.
+
+    Parameters
+    ----------
+    panel
+        An `RPSPanel` or a `MechanismPanel`.
+    port
+        The port to serve on. Default: a free one from 8080 on.
+    title
+        Plain text, above the sliders.
+    layers, hidden
+        Layers as for `rps_pin.viewer.View`, with a switch for each below the readings; those in
+        `hidden` are switched off at first. Forces are those that hold the weight.
+
+    Attributes
+    ----------
+    url : str
+        Address to open in a browser on this machine.
+    view : View
+        The robot with its layers.
+
+    Raises
+    ------
+    RPSPinError
+        If viser is not installed; says how to install it.
+    InputError
+        If a layer is unknown or does not fit the mechanism.
+    """
+
+    def __init__(
+        self,
+        panel: Panel,
+        *,
+        port: int | None = None,
+        title: str = "Robot",
+        layers: Sequence[str | Layer] = (),
+        hidden: Sequence[str | Layer] = (),
+    ) -> None:
+        try:
+            import viser  # noqa: PLC0415
+        except ImportError:
+            raise RPSPinError("the panel needs viser: pip install 'rps-pin[panel]'") from None
+        self._panel, self._lock, self._following = panel, threading.RLock(), False
+        with contextlib.redirect_stdout(io.StringIO()):  # viser prints the address
+            self._server: Any = viser.ViserServer(host=HOST, port=port or 8080, verbose=False)
+        try:
+            # A page can ask viser for a tunnel to the internet: not from here.
+            self._server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
+            self._server.gui.configure_theme(
+                control_layout="collapsible", show_logo=False, show_share_button=False
+            )
+            self.url = f"http://{HOST}:{self._server.get_port()}"
+            self._server.gui.add_markdown(f"## {title}")
+            self._sliders = {
+                group: [self._slider(group, k) for k in range(len(sliders))]
+                for group, sliders in panel.groups.items()
+            }
+            self._text = self._server.gui.add_html("")
+            self.view = View(
+                ViserWriter(self._server),
+                getattr(panel, "robot", panel.mechanism),
+                panel.configuration,
+                visual=panel.visual_model(),
+                layers=layers,
+                hidden=hidden,
+            )
+            self._update()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """End the server."""
+        self._server.stop()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def text(self) -> str:
+        """The readings, as HTML."""
+        return str(self._text.content)
+
+    def move(self, group: str, shown: Sequence[float]) -> None:
+        """Set the sliders of a group, in the units they show, as a user of the page does."""
+        for slider, value in zip(self._sliders[group], shown, strict=True):
+            slider.value = value
+
+    def shown(self, group: str) -> list[float]:
+        """Return where the sliders of a group are, in the units they show."""
+        return [float(slider.value) for slider in self._sliders[group]]
+
+    def _slider(self, group: str, number: int) -> Any:
+        slider = self._panel.groups[group][number]
+        now = slider.scale * float(self._panel.values(group)[number])
+        handle = self._server.gui.add_slider(
+            slider.name,
+            min=min(slider.low, now),
+            max=max(slider.high, now),
+            step=slider.step,
+            initial_value=now,
+        )
+        handle.on_update(lambda _: self._moved(group))
+        return handle
+
+    def _moved(self, group: str) -> None:
+        """Follow the sliders of a group."""
+        with self._lock:
+            if self._following:  # set here, not by a user
+                return
+            pairs = zip(self._sliders[group], self._panel.groups[group], strict=True)
+            self._panel.move(group, [handle.value / slider.scale for handle, slider in pairs])
+            self.view.display(self._panel.configuration)
+            self._update(moved=group)
+
+    def _update(self, moved: str | None = None) -> None:
+        """Show the readings, and put the sliders of all other groups where the panel is."""
+        self._text.content = f'<div style="{_STYLE}">{_as_html(self._panel)}</div>'
+        self._following = True
+        try:
+            for group in self._panel.groups.keys() - {moved}:
+                sliders, values = self._panel.groups[group], self._panel.values(group).tolist()
+                for handle, slider, value in zip(
+                    self._sliders[group], sliders, values, strict=True
+                ):
+                    handle.value = min(max(slider.scale * value, handle.min), handle.max)
+        finally:
+            self._following = False
+
+
+def _as_html(panel: Panel) -> str:
+    """Return broken limits or refusals as a line, and the readings as a table."""
+    words = "<br>".join(map(html.escape, panel.trouble))
+    colour = "#b00000" if words else "#006000"
+    rows = "".join(
+        f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
+        for name, value in panel.readings()
+    )
+    line = f'<p style="color:{colour}; margin: 0.5em 0">{words or "within all limits"}</p>'
+    return f"{line}<table>{rows}</table>"
