@@ -39,9 +39,9 @@ from rps_pin import LoopClosure, RPSRobot
 from rps_pin.control import ComputedTorque, Gains, RealTimeRobot, Status
 from rps_pin.control.estimator.constrained_forces import ConstrainedForces
 from rps_pin.control.estimator.effective_inertia import TaskSpaceInertia
-from rps_pin.control.estimator.place import place_of
-from rps_pin.control.estimator.scalar_rates import leg_gains
-from rps_pin.control.estimator.scalar_state import state_at
+from rps_pin.control.estimator.leg_geometry import leg_geometry
+from rps_pin.control.estimator.leg_jacobian import leg_jacobian
+from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.loop.force_limits import ForceLimits
 from rps_pin.rps.kinematics.rates import leg_jacobians
 
@@ -75,7 +75,7 @@ def stages(robot: RPSRobot) -> dict[str, Callable[[int], object]]:
     loop = RealTimeRobot(robot, pose[0], period=PERIOD)
     states = [robot.state(*row) for row in targets]
     triples = [tuple(tuple(one.tolist()) for one in row) for row in targets]
-    places = [place_of(row[0], p.base_radius, p.platform_radius) for row in triples]
+    poses = [leg_geometry(row[0], p.base_radius, p.platform_radius) for row in triples]
     solve, peer = ConstrainedForces(robot).solve_state, plain(robot)
 
     def controller(force_limit: float | None = None, **settings: str) -> ComputedTorque:
@@ -87,10 +87,10 @@ def stages(robot: RPSRobot) -> dict[str, Callable[[int], object]]:
         "clock alone": lambda i: None,
         "the same sum each tick: the machine's tail": lambda i: sum(SAME_WORK),
         "direct kinematics: estimate": lambda i: loop.estimate(length[i]),
-        "state completion": lambda i: state_at(places[i], *triples[i][1:], p.platform_radius),
+        "state completion": lambda i: robot_state(poses[i], *triples[i][1:], p.platform_radius),
         "inverse dynamics, state given": lambda i: solve(*states[i]),
         "inverse dynamics, from a pose": lambda i: loop.inverse_dynamics(*targets[i]),
-        "QP: force limits": limited(robot, places),
+        "QP: force limits": limited(robot, poses),
         "whole tick, computed torque": lambda i: by_pose.tick(length[i], targets[i]),
         "the same in actuator space": lambda i: by_legs.tick(length[i], targets[i]),
         "the same, always saturated": lambda i: weak.tick(length[i], targets[i]),
@@ -100,11 +100,11 @@ def stages(robot: RPSRobot) -> dict[str, Callable[[int], object]]:
     }
 
 
-def limited(robot: RPSRobot, places: list) -> Callable[[int], object]:
+def limited(robot: RPSRobot, poses: list) -> Callable[[int], object]:
     """Return what limits forces that are half as much again as the actuators allow."""
     reduced, limits = TaskSpaceInertia(robot), ForceLimits((4.0, 4.0, 4.0))
     h = robot.parameters.platform_radius
-    cases = [(reduced.of(one), leg_gains(one.pose, one.way, one.coefficient, h)) for one in places]
+    cases = [(reduced.of(one), leg_jacobian(one, h)) for one in poses]
     path = (0.01, 0.1, 0.1)
     return lambda i: limits.nearest((6.0, -3.0 + 0.006 * i, 1.0), *cases[i], path)
 

@@ -28,8 +28,8 @@ from benchmarks.latency import GAINS, PERIOD, machine, motion
 from rps_pin import RPSRobot
 from rps_pin.control import ComputedTorque
 from rps_pin.control.estimator.loop_arguments import three_floats
-from rps_pin.control.estimator.reading import reading_of
-from rps_pin.control.estimator.scalar_state import state_at
+from rps_pin.control.estimator.robot_state import robot_state
+from rps_pin.control.estimator.state_estimate import state_estimate
 from rps_pin.rps.kinematics.tracking import follow
 
 _CALLS, _REPEATS = 2000, 15
@@ -47,12 +47,12 @@ def parts() -> dict[str, Callable[[], object]]:
     for i in range(_HALF_WAY):
         controller.tick(lengths[i], targets[i])
     loop, reading = controller.estimate, lengths[_HALF_WAY]
-    place, rate, speed, _ = loop.state
+    geometry, rate, speed, _ = loop.state
     d = three_floats(reading)
     assert d is not None
-    turned, _, _ = follow(place.length, place.way, d, g, h, 1e6, 20)
+    turned, _, _ = follow(geometry.length, geometry.direction, d, g, h, 1e6, 20)
     wanted = (1.0, 2.0, 3.0)
-    state = state_at(place, rate, wanted, h)
+    state = robot_state(geometry, rate, wanted, h)
     goal = controller._setpoints.current
     motions = itertools.cycle(
         list(
@@ -68,18 +68,18 @@ def parts() -> dict[str, Callable[[], object]]:
         "numbers out of NumPy arrays (4 times)": lambda: [three_floats(reading) for _ in range(4)],
         "speed filter": lambda: loop._filter.after(d, PERIOD),
         "direct kinematics, Newton's method": lambda: follow(
-            place.length, place.way, d, g, h, 1e6, 20
+            geometry.length, geometry.direction, d, g, h, 1e6, 20
         ),
-        "pose, rates, twist, gains": lambda: reading_of(d, turned, speed, g, h),
+        "pose, rates, twist, Jacobian": lambda: state_estimate(d, turned, speed, g, h),
         "limits, answers written": lambda: (
-            loop._limits.violated(place),
+            loop._limits.violated(geometry),
             loop._limits.too_fast(speed),
         ),
         "target: legs, limits, singularity": lambda: controller._setpoints._allowed(
             goal.geometry.pose
         ),
         "the law": lambda: controller._pid(errors, rate, rate, PERIOD),
-        "state completion": lambda: state_at(place, rate, wanted, h),
+        "state completion": lambda: robot_state(geometry, rate, wanted, h),
         "inverse dynamics (Pinocchio, LU)": lambda: loop.dynamics.solve(state),
         "force limits, forces written": lambda: (
             controller._limits.within(wanted),

@@ -8,8 +8,12 @@ import pytest
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.control.estimator.constrained_forces import ConstrainedForces
-from rps_pin.control.estimator.place import place_of, turning_determinant
-from rps_pin.control.estimator.scalar_state import RobotState, state_at
+from rps_pin.control.estimator.leg_geometry import (
+    LegGeometry,
+    closure_determinant,
+    leg_geometry,
+)
+from rps_pin.control.estimator.robot_state import leg_motion, robot_state
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.kinematics import leg_equations as eq
 from tests import strategies
@@ -23,22 +27,15 @@ FRICTION = {
 }
 
 
-def scalar_state(robot: RPSRobot, motion: strategies.Motion) -> RobotState:
+Three = tuple[float, float, float]
+
+
+def in_floats(robot: RPSRobot, motion: strategies.Motion) -> tuple[LegGeometry, Three, Three]:
     p = robot.parameters
     x, dx, ddx = (tuple(one.tolist()) for one in motion)
-    place = place_of(x, p.base_radius, p.platform_radius)
-    assert place is not None
-    return state_at(place, dx, ddx, p.platform_radius)
-
-
-def flat(state: RobotState) -> tuple[strategies.Array, ...]:
-    angle, length = state.place.angle, state.place.length
-    at = [value for pair in zip(angle, length, strict=True) for value in pair]
-    return (
-        np.array(at + list(state.placement)),
-        np.array([value for leg in state.legs for value in leg[:2]] + list(state.velocity)),
-        np.array([value for leg in state.legs for value in leg[2:]] + list(state.acceleration)),
-    )
+    geometry = leg_geometry(x, p.base_radius, p.platform_radius)
+    assert geometry is not None
+    return geometry, dx, ddx
 
 
 def robots() -> list[RPSRobot]:
@@ -64,15 +61,18 @@ def test_state_and_forces_are_the_robot_s(robot: RPSRobot) -> None:
     solver = ConstrainedForces(robot)
     checked = 0
     for motion in zip(*strategies.random_motions(rng, p, 250), strict=True):
-        state = scalar_state(robot, motion)
+        geometry, *derivatives = in_floats(robot, motion)
+        state = robot_state(geometry, *derivatives, p.platform_radius)
         expected = robot.state(*motion)
-        for found, array in zip(flat(state), expected, strict=True):
+        for found, array in zip(np.split(state, [13, 25]), expected, strict=True):
             np.testing.assert_allclose(found, array, rtol=0, atol=1e-12 * np.abs(array).max())
+        legs = leg_motion(geometry, *derivatives, p.platform_radius)
+        assert legs == (state[14:19:2], state[26:31:2])
         length, angle = expected[0][[1, 3, 5]], expected[0][[0, 2, 4]]
         determinant = eq.determinant(length, angle, p.base_radius, p.platform_radius)
-        turning = turning_determinant(state.place, p.base_radius, p.platform_radius)
-        assert turning == pytest.approx(float(determinant), abs=1e-12)
-        if abs(turning) < 0.05:
+        closure = closure_determinant(geometry, p.base_radius, p.platform_radius)
+        assert closure == pytest.approx(float(determinant), abs=1e-12)
+        if abs(closure) < 0.05:
             continue
         solved = solver.solve(state)
         answer = robot.inverse_dynamics(*expected)
@@ -92,7 +92,7 @@ def test_virtual_power_of_the_forces_is_that_of_the_tree() -> None:
     data = robot.mechanism.model.createData()
     pose, rate, acceleration = strategies.random_motions(rng, p, 100)
     for motion in zip(pose, rate, acceleration, strict=True):
-        solved = solver.solve(scalar_state(robot, motion))
+        solved = solver.solve(robot_state(*in_floats(robot, motion), p.platform_radius))
         assert solved is not None
         q, v, a = robot.state(*motion)
         force = pin.rnea(robot.mechanism.model, data, q, v, a)
@@ -104,4 +104,4 @@ def test_virtual_power_of_the_forces_is_that_of_the_tree() -> None:
 
 def test_leg_without_length_has_no_state() -> None:
     """Radii alike, height 0: every tip stands on its revolute joint."""
-    assert place_of((0.0, 0.0, 0.0), 0.3, 0.3) is None
+    assert leg_geometry((0.0, 0.0, 0.0), 0.3, 0.3) is None

@@ -9,7 +9,7 @@ import pytest
 from rps_pin import InputError, RPSParameters, RPSRobot, SingularityError
 from rps_pin.control import effective_inertia
 from rps_pin.control.estimator.effective_inertia import TaskSpaceInertia
-from rps_pin.control.estimator.place import place_of
+from rps_pin.control.estimator.leg_geometry import leg_geometry
 from rps_pin.rps.dynamics.loads import Payload
 from tests import strategies
 
@@ -25,9 +25,9 @@ def test_energy_of_any_motion_is_that_of_the_tree() -> None:
             q, v, _ = robot.state(pose, rate, 0 * none)
             energy = pin.computeKineticEnergy(robot.mechanism.model, data, q, v)
             z, tilt_x, tilt_y = pose.tolist()
-            place = place_of((z, tilt_x, tilt_y), p.base_radius, p.platform_radius)
-            assert place is not None
-            mass = reduced.of(place)
+            geometry = leg_geometry((z, tilt_x, tilt_y), p.base_radius, p.platform_radius)
+            assert geometry is not None
+            mass = reduced.of(geometry)
             np.testing.assert_allclose(mass, mass.T, rtol=0, atol=1e-12 * np.abs(mass).max())
             assert rate @ mass @ rate / 2 == pytest.approx(energy, rel=1e-11)
 

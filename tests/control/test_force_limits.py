@@ -11,40 +11,40 @@ from scipy.optimize import lsq_linear
 
 from rps_pin import RPSRobot
 from rps_pin.control.estimator.effective_inertia import TaskSpaceInertia
-from rps_pin.control.estimator.place import place_of
-from rps_pin.control.estimator.scalar_rates import LegGains, leg_gains
+from rps_pin.control.estimator.leg_geometry import leg_geometry
+from rps_pin.control.estimator.leg_jacobian import LegJacobian, leg_jacobian
 from rps_pin.control.loop.force_limits import ForceLimits
 from tests import strategies
 
 Array = NDArray[np.float64]
 
 
-def places(count: int, seed: int) -> list[tuple[Array, LegGains]]:
+def cases(count: int, seed: int) -> list[tuple[Array, LegJacobian]]:
     rng = np.random.default_rng(seed)
     found = []
     while len(found) < count:
         p = strategies.random_parameters(rng)
         reduced = TaskSpaceInertia(RPSRobot(p))
         for x, y, z in strategies.random_motions(rng, p, 20)[0].tolist():
-            place = place_of((x, y, z), p.base_radius, p.platform_radius)
-            assert place is not None
-            gains = leg_gains(place.pose, place.way, place.coefficient, p.platform_radius)
-            if abs(gains.determinant) > 0.05:
-                found.append((reduced.of(place), gains))
+            geometry = leg_geometry((x, y, z), p.base_radius, p.platform_radius)
+            assert geometry is not None
+            jacobian = leg_jacobian(geometry, p.platform_radius)
+            if abs(jacobian.determinant) > 0.05:
+                found.append((reduced.of(geometry), jacobian))
     return found
 
 
-def cost_matrix(mass: Array, gains: LegGains) -> Array:
+def cost_matrix(mass: Array, jacobian: LegJacobian) -> Array:
     """A matrix whose squared norm is what is to be least: M^(1/2) times the acceleration missed."""
     root = np.linalg.cholesky(mass).T
-    return root @ np.linalg.inv(mass) @ np.array(gains.K).T
+    return root @ np.linalg.inv(mass) @ np.array(jacobian.K).T
 
 
 @pytest.mark.parametrize("size", [1.01, 3.0, 100.0, 1e6])
 def test_forces_are_the_optimum(size: float) -> None:
     rng = np.random.default_rng(1)
     moved = 0
-    for mass, gains in places(300, 2):
+    for mass, jacobian in cases(300, 2):
         limit = rng.uniform(1.0, 50.0, 3)
         wanted = limit * rng.uniform(-size, size, 3)
         path = rng.normal(size=3) * rng.integers(0, 2)
@@ -52,18 +52,18 @@ def test_forces_are_the_optimum(size: float) -> None:
         f1, f2, f3 = wanted.tolist()
         x1, x2, x3 = path.tolist()
         limits = ForceLimits((l1, l2, l3))
-        found = limits.nearest((f1, f2, f3), mass, gains, (x1, x2, x3))
+        found = limits.nearest((f1, f2, f3), mass, jacobian, (x1, x2, x3))
         assert found.solved
         force = np.array(found.force)
         assert (np.abs(force) <= limit).all()
-        matrix = cost_matrix(mass, gains)
+        matrix = cost_matrix(mass, jacobian)
         best = lsq_linear(
             matrix * limit, matrix @ wanted, (-np.ones(3), np.ones(3)), method="bvls", tol=1e-14
         )
         cost = float(np.sum((matrix @ (force - wanted)) ** 2)) / 2
         scale = max(best.cost, float(np.sum((matrix * limit) ** 2)))
         assert cost - best.cost <= 1e-7 * scale
-        missing = np.linalg.solve(mass, np.array(gains.K).T @ (force - wanted))
+        missing = np.linalg.solve(mass, np.array(jacobian.K).T @ (force - wanted))
         np.testing.assert_allclose(
             found.acceleration_error, missing, rtol=0, atol=1e-9 * np.abs(missing).max()
         )
@@ -80,11 +80,11 @@ def test_one_problem_for_many_ticks_gives_what_a_new_one_gives() -> None:
     """Warm starts, among them good ones that are not the solution, change nothing."""
     rng = np.random.default_rng(3)
     kept = ForceLimits((10.0, 10.0, 10.0))
-    for mass, gains in places(200, 4):
+    for mass, jacobian in cases(200, 4):
         f1, f2, f3 = rng.uniform(-40, 40, 3).tolist()
-        found = kept.nearest((f1, f2, f3), mass, gains, (0.1, 0.0, 0.2))
-        new = ForceLimits((10.0, 10.0, 10.0)).nearest((f1, f2, f3), mass, gains, (0.1, 0.0, 0.2))
-        matrix = cost_matrix(mass, gains)
+        found = kept.nearest((f1, f2, f3), mass, jacobian, (0.1, 0.0, 0.2))
+        new = ForceLimits((10.0, 10.0, 10.0)).nearest((f1, f2, f3), mass, jacobian, (0.1, 0.0, 0.2))
+        matrix = cost_matrix(mass, jacobian)
         gap = matrix @ (np.array(found.force) - np.array(new.force))
         assert np.abs(gap).max() <= 1e-5 * np.abs(matrix).max() * 10
 

@@ -20,12 +20,13 @@ from rps_pin.control import (
     PDControl,
     effective_inertia,
 )
-from rps_pin.control.estimator import exponential_map, place, reading, scalar_rates, scalar_state
+from rps_pin.control.estimator import leg_geometry, leg_jacobian, robot_state, state_estimate
+from rps_pin.control.loop import limits
 from rps_pin.numerics.compiled import COMPILES
 from rps_pin.rps.kinematics import tracking as scalar_tracking
 
 pytestmark = pytest.mark.skipif(not COMPILES, reason="Numba is not installed, or switched off")
-MODULES = [exponential_map, place, reading, scalar_rates, scalar_state, scalar_tracking]
+MODULES = [leg_geometry, leg_jacobian, robot_state, state_estimate, limits, scalar_tracking]
 RNG = np.random.default_rng(11)
 ROBOT = RPSRobot.from_preset("micro")
 G, H = ROBOT.parameters.base_radius, ROBOT.parameters.platform_radius
@@ -68,19 +69,18 @@ def interpreted(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 def answers(f: dict[str, Any], numbers: list[Any]) -> list[float]:
     """Return what the functions say of a pose, a step of the lengths, and rates."""
     pose, step, rate, acceleration = numbers
-    at = f["place_of"](pose, G, H)
+    at = f["leg_geometry"](pose, G, H)
     goal = tuple(d + s for d, s in zip(at.length, step, strict=True))
-    followed = f["follow"](at.length, at.way, goal, G, H, 1e4, 50)
-    gains = f["leg_gains"](pose, at.way, at.coefficient, H)
+    followed = f["follow"](at.length, at.direction, goal, G, H, 1e4, 50)
+    jacobian = f["leg_jacobian"](at, H)
     return flat(
         (
-            *(at, followed, f["pose_of"](goal, followed.way, G, H), gains),
-            *(f["turning_determinant"](at, G, H), f["state_at"](at, rate, acceleration, H)),
-            *(f["pose_rate"](gains, rate), f["leg_speed"](gains, rate)),
-            *(f["force_of_wrench"](gains, rate), f["wrench_of_force"](gains, rate)),
-            f["platform_twist"](pose, rate, at.coefficient, H),
+            *(at, followed, f["pose_of"](goal, followed.way, G, H), jacobian),
+            *(f["closure_determinant"](at, G, H), f["robot_state"](at, rate, acceleration, H)),
+            *(f["pose_rate"](jacobian, rate), f["leg_speed"](jacobian, rate)),
+            *(f["force_of_wrench"](jacobian, rate), f["wrench_of_force"](jacobian, rate)),
             f["leg_motion"](at, rate, acceleration, H),
-            f["reading_of"](goal, followed.way, rate, G, H),
+            f["state_estimate"](goal, followed.way, rate, G, H),
         )
     )
 
@@ -95,7 +95,12 @@ def test_compiled_is_interpreted(interpreted: dict[str, Any]) -> None:
 
 
 def test_there_are_compiled_functions() -> None:
-    assert {f.py_func.__name__ for f in COMPILED} >= {"follow", "pose_of", "state_at", "leg_gains"}
+    assert {f.py_func.__name__ for f in COMPILED} >= {
+        "follow",
+        "pose_of",
+        "robot_state",
+        "leg_jacobian",
+    }
 
 
 def controllers(start: Any) -> Iterator[Controller]:

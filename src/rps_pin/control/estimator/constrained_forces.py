@@ -20,7 +20,7 @@ from pinocchio import computeJointJacobians, getConstraintsJacobian, rnea
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import LoopClosure
-from rps_pin.control.estimator.scalar_state import RobotState
+from rps_pin.control.estimator.robot_state import RobotState
 from rps_pin.rps.dynamics.friction import has_friction
 from rps_pin.rps.robot import RPSRobot
 
@@ -73,19 +73,7 @@ class ConstrainedForces:
         Reactions are those of `RPSRobot.inverse_dynamics`: the force of each leg on the platform,
         in base axes.
         """
-        (phi1, phi2, phi3), (d1, d2, d3) = state.place.angle, state.place.length
-        (w1, s1, dw1, ds1), (w2, s2, dw2, ds2), (w3, s3, dw3, ds3) = state.legs
-        # The tree's order: revolute and prismatic joint of each leg, then the platform.
-        _STATE.pack_into(
-            self._memory,
-            0,
-            *(phi1, d1, phi2, d2, phi3, d3),
-            *state.placement,
-            *(w1, s1, w2, s2, w3, s3),
-            *state.velocity,
-            *(dw1, ds1, dw2, ds2, dw3, ds3),
-            *state.acceleration,
-        )
+        _STATE.pack_into(self._memory, 0, *state)
         return self.solve_state(self._q, self._v, self._a)
 
     def solve_state(self, q: Array, v: Array, a: Array) -> list[float] | None:

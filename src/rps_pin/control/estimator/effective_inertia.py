@@ -17,9 +17,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.control.estimator.place import Place, place_of
-from rps_pin.control.estimator.scalar_rates import leg_gains
-from rps_pin.control.estimator.scalar_state import state_at
+from rps_pin.control.estimator.leg_geometry import LegGeometry, leg_geometry
+from rps_pin.control.estimator.leg_jacobian import leg_jacobian
+from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.errors import SingularityError, UnreachableError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import choice, real_vector
@@ -48,16 +48,13 @@ class TaskSpaceInertia:
         self._basis, self._q = numbers[:36].reshape(12, 3, order="F"), numbers[36:]
         self._half = np.triu(np.ones((12, 12)), 1) + np.eye(12) / 2
 
-    def of(self, geometry: Place) -> Array:
+    def of(self, geometry: LegGeometry) -> Array:
         """Return M_x in a pose, shape (3, 3): kg, kg m and kg m^2."""
         numbers: list[float] = []
         for unit in _UNITS:
-            state = state_at(geometry, unit, _ZERO, self._h)
-            (w1, s1, _, _), (w2, s2, _, _), (w3, s3, _, _) = state.legs
-            numbers += (w1, s1, w2, s2, w3, s3, *state.velocity)
-        (phi1, phi2, phi3), (d1, d2, d3) = geometry.angle, geometry.length
-        numbers += (phi1, d1, phi2, d2, phi3, d3, *state.placement)
-        _NUMBERS.pack_into(self._memory, 0, *numbers)
+            state = robot_state(geometry, unit, _ZERO, self._h)
+            numbers += state[13:25]
+        _NUMBERS.pack_into(self._memory, 0, *numbers, *state[:13])
         # crba fills the upper triangle only: M = U + U', U with half of the diagonal.
         upper = pin.crba(self._model, self._data, self._q) * self._half
         reduced: Array = self._basis.T @ upper @ self._basis
@@ -92,13 +89,13 @@ def effective_inertia(robot: RPSRobot, pose: ArrayLike, *, space: str = "actuato
     choice(space, "space", ("actuator", "task"))
     p = robot.parameters
     z, tilt_x, tilt_y = real_vector(pose, 3, "pose").tolist()
-    geometry = place_of((z, tilt_x, tilt_y), p.base_radius, p.platform_radius)
+    geometry = leg_geometry((z, tilt_x, tilt_y), p.base_radius, p.platform_radius)
     if geometry is None:
         raise UnreachableError("a leg has no length in the pose", ())
     mass = TaskSpaceInertia(robot).of(geometry)
     if space == "task":
         return mass.diagonal().copy()
-    jacobian = leg_gains(geometry.pose, geometry.way, geometry.coefficient, p.platform_radius)
+    jacobian = leg_jacobian(geometry, p.platform_radius)
     if abs(jacobian.determinant) < 1e-8:
         raise SingularityError(
             f"the pose is singular: determinant {jacobian.determinant:.3g}",

@@ -7,13 +7,17 @@ import math
 from numpy.typing import ArrayLike
 
 from rps_pin.control.estimator.constrained_forces import ConstrainedForces
+from rps_pin.control.estimator.leg_geometry import (
+    LARGEST_TILT_SQUARED,
+    LegGeometry,
+    closure_determinant,
+    leg_geometry,
+)
+from rps_pin.control.estimator.leg_jacobian import LeastSingularValue
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, three_floats
 from rps_pin.control.estimator.output_arrays import Answers
-from rps_pin.control.estimator.place import place_of, turning_determinant
-from rps_pin.control.estimator.reading import reading_of
-from rps_pin.control.estimator.scalar_rates import LeastGain
-from rps_pin.control.estimator.scalar_state import RobotState, state_at
-from rps_pin.control.estimator.state_estimate import StateEstimate
+from rps_pin.control.estimator.robot_state import robot_state
+from rps_pin.control.estimator.state_estimate import state_estimate
 from rps_pin.control.estimator.warm_up import warm_up
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
@@ -30,8 +34,6 @@ _NEAR_SINGULAR, _BEYOND_LIMIT = 8, 16
 _LARGEST_LENGTH = 1e6
 #: Below this determinant of Eq. 8 half of the forces' digits are lost.
 _NO_FORCES = 1e-8
-#: (tilt_x, tilt_y) are coordinates below a whole turn; see `rps_pin.rps.singularity.measures`.
-_LARGEST_TILT_SQUARED = (2 * math.pi * (1 - 1e-6)) ** 2
 
 
 class RealTimeRobot:
@@ -106,7 +108,7 @@ class RealTimeRobot:
         self._g, self._h = float(p.base_radius), float(p.platform_radius)
         self._largest = _LARGEST_LENGTH * (self._g + self._h)
         self._limits = RobotLimits(p)
-        self.dynamics, self._singular_value = ConstrainedForces(robot), LeastGain()
+        self.dynamics, self._singular_value = ConstrainedForces(robot), LeastSingularValue()
         self._period = positive_number(period, "period", "s")
         self._filter = SpeedFilter(_positive(cut_off, "cut_off"))
         self._near = positive_number(near_singular, "near_singular")
@@ -114,7 +116,7 @@ class RealTimeRobot:
         self._most = int(positive_number(most_steps, "most_steps"))
         self.answers = Answers.new() if answers is None else answers.checked()
         self.reset(near)
-        warm_up(self.state.geometry, self.state.jacobian, self._g, self._h)
+        warm_up(self.state, self._g, self._h)
 
     def reset(self, near: ArrayLike) -> None:
         """Start again from a pose, at rest and without forces. Raises as the constructor does."""
@@ -167,7 +169,7 @@ class RealTimeRobot:
         if speeds is None:
             return self._keep(_BAD_INPUT)
         way, _, self._fraction = follow(
-            last, self.state.geometry.way, d, self._g, self._h, CONDITION_LIMIT, self._most
+            last, self.state.geometry.direction, d, self._g, self._h, CONDITION_LIMIT, self._most
         )
         if self._fraction < 1.0:
             return self._keep(_NOT_CONVERGED)
@@ -188,13 +190,13 @@ class RealTimeRobot:
         self._pose = x
         if x is None or dx is None or ddx is None:
             return self._keep_forces(_BAD_INPUT)
-        if not (x[1] * x[1] + x[2] * x[2] < _LARGEST_TILT_SQUARED and abs(x[0]) < self._largest):
+        if not (x[1] * x[1] + x[2] * x[2] < LARGEST_TILT_SQUARED and abs(x[0]) < self._largest):
             return self._keep_forces(_BAD_INPUT)
-        geometry = place_of(x, self._g, self._h)
+        geometry = leg_geometry(x, self._g, self._h)
         if geometry is None:
             return self._keep_forces(_NOT_CONVERGED | _BEYOND_LIMIT)
         number = _BEYOND_LIMIT if self._limits.violated(geometry) else 0
-        return self._solve(state_at(geometry, dx, ddx, self._h), number)
+        return self._solve(geometry, dx, ddx, number)
 
     def forces_for(self, acceleration: Numbers) -> Status:
         """Write the forces that give the estimated motion an acceleration to `answers`.
@@ -212,7 +214,7 @@ class RealTimeRobot:
         ddx = three_floats(acceleration)
         if ddx is None:
             return self._keep_forces(_BAD_INPUT)
-        return self._solve(state_at(geometry, rate, ddx, self._h), self._geometry_flags)
+        return self._solve(geometry, rate, ddx, self._geometry_flags)
 
     # On demand ------------------------------------------------------------------------------------
 
@@ -281,7 +283,7 @@ class RealTimeRobot:
                 f"{self._near:.3g} in size is required"
             )
         if status & Status.BEYOND_LIMIT and pose:
-            geometry = place_of(pose, self._g, self._h)
+            geometry = leg_geometry(pose, self._g, self._h)
             if geometry is None:
                 return "; ".join([*messages, "the length of a leg is zero"])
             messages += self._limits.messages(geometry)
@@ -293,17 +295,18 @@ class RealTimeRobot:
 
     def _accept(self, d: Triple, way: Way, speed: Triple) -> Status:
         """Set the state of a followed reading, unless its rates are not finite."""
-        reading = reading_of(d, way, speed, self._g, self._h)
-        if reading is None:
+        found = state_estimate(d, way, speed, self._g, self._h)
+        if found is None:
             return self._keep(_NOT_CONVERGED | _NEAR_SINGULAR)
-        geometry, rate, twist, jacobian = reading
+        state, twist = found
         if not math.isfinite(sum(twist)):  # the rate is in it
             return self._keep(_BAD_INPUT)
+        self.state = state
+        geometry, rate, _, jacobian = state
         self._type_ii, self.determinant = None, jacobian.determinant
         number = self._geometry_flags = _BEYOND_LIMIT if self._limits.violated(geometry) else 0
         if self._limits.too_fast(speed):
             number = _BEYOND_LIMIT
-        self.state = StateEstimate(geometry, rate, speed, jacobian)
         # No singular value of M is above 1, so none is below the determinant's absolute value.
         if not abs(jacobian.determinant) >= self._near and self.type_ii < self._near:
             number |= _NEAR_SINGULAR
@@ -319,14 +322,16 @@ class RealTimeRobot:
         self.status = status = STATUSES[number]
         return status
 
-    def _solve(self, state: RobotState, number: int) -> Status:
+    def _solve(
+        self, geometry: LegGeometry, rate: Triple, acceleration: Triple, number: int
+    ) -> Status:
         """Write the forces of a motion to the results, if they are determined."""
-        determinant = turning_determinant(state.place, self._g, self._h)
+        determinant = closure_determinant(geometry, self._g, self._h)
         if not abs(determinant) >= self._near:
             number |= _NEAR_SINGULAR
             if not abs(determinant) >= _NO_FORCES:
                 return self._keep_forces(number & ~_BEYOND_LIMIT | _NOT_CONVERGED)
-        solved = self.dynamics.solve(state)
+        solved = self.dynamics.solve(robot_state(geometry, rate, acceleration, self._h))
         if solved is None:  # rates so large that forces overflow
             return self._keep_forces(_BAD_INPUT)
         forces = solved[9:]

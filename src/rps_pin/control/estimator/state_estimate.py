@@ -1,22 +1,54 @@
-"""The state estimate of a control loop, in floats."""
+"""State estimate of a control loop from leg lengths, directions and speeds.
+
+Compositions of `rps_pin.rps.kernels` on floats, compiled as a whole.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-from rps_pin.control.estimator.place import Place
-from rps_pin.control.estimator.scalar_rates import LegGains
-from rps_pin.rps.kinematics.tracking import Triple
+from rps_pin.control.estimator.leg_geometry import LegGeometry
+from rps_pin.control.estimator.leg_jacobian import LegJacobian, leg_jacobian, pose_rate
+from rps_pin.numerics.compiled import compiled
+from rps_pin.rps.kernels.platform import angular_velocity
+from rps_pin.rps.kernels.tilt_functions import tilt_functions
+from rps_pin.rps.kernels.tips import tip_rates, tip_slopes
+from rps_pin.rps.kinematics.tracking import Triple, Way, pose_of
+
+#: Velocity of the platform's centre and angular velocity, base axes.
+Twist = tuple[float, float, float, float, float, float]
 
 
 class StateEstimate(NamedTuple):
     """The motion of the robot by its last good reading."""
 
-    geometry: Place
-    """Pose and legs."""
+    geometry: LegGeometry
     rate: Triple
     """Of the pose, m/s, rad/s."""
     speed: Triple
     """Of the legs, m/s."""
-    jacobian: LegGains
-    """Of the leg lengths by the pose."""
+    jacobian: LegJacobian
+
+
+@compiled
+def state_estimate(
+    d: Triple, direction: Way, speed: Triple, g: float, h: float
+) -> tuple[StateEstimate, Twist] | None:
+    """Return the state and the platform's twist; None where speeds give no rate (type II)."""
+    pose = pose_of(d, direction, g, h)
+    _, x, y = pose
+    tilt = tilt_functions(x * x + y * y)
+    c1, c2, c3, s1, s2, s3 = direction
+    angle = (math.atan2(s1, c1), math.atan2(s2, c2), math.atan2(s3, c3))
+    geometry = LegGeometry(pose, d, angle, direction, tilt)
+    jacobian = leg_jacobian(geometry, h)
+    if jacobian.determinant == 0.0:
+        return None
+    rate = pose_rate(jacobian, speed)
+    dz, dx, dy = rate
+    (_, vx, vy), _ = tip_rates(tip_slopes(x, y, tilt), dz, h * dx, h * dy)
+    w_x, w_y, w_z = angular_velocity(x, y, dx, dy, tilt)
+    # The centre is half of the tips' horizontal vector; base axes turn the sign of w_z.
+    twist = (0.5 * vx, 0.5 * vy, dz, w_x, w_y, -w_z)
+    return StateEstimate(geometry, rate, speed, jacobian), twist

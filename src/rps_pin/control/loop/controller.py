@@ -28,11 +28,15 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.control.estimator.effective_inertia import TaskSpaceInertia
+from rps_pin.control.estimator.leg_geometry import (
+    LegGeometry,
+    closure_determinant,
+    leg_geometry,
+)
+from rps_pin.control.estimator.leg_jacobian import leg_jacobian
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time
-from rps_pin.control.estimator.place import Place, place_of, turning_determinant
 from rps_pin.control.estimator.real_time_robot import RealTimeRobot
-from rps_pin.control.estimator.scalar_rates import leg_gains
-from rps_pin.control.estimator.scalar_state import state_at
+from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.loop.filters import SetpointRateFilter
 from rps_pin.control.loop.force_limits import ForceLimits
@@ -173,7 +177,7 @@ class Controller(ABC):
         """Start again at rest in a pose. Raises as the constructor does."""
         self.estimate.reset(near)
         geometry = self.estimate.state.geometry
-        determinant = turning_determinant(geometry, self._g, self._h)
+        determinant = closure_determinant(geometry, self._g, self._h)
         nearest = min(abs(determinant), self.estimate.type_ii)
         if nearest < self._near:
             raise SingularityError(
@@ -295,10 +299,9 @@ class Controller(ABC):
             p3 * e3 + d3 * (w3 - v3) + i3,
         )
 
-    def _solve(self, geometry: Place, rate: Triple, acceleration: Triple) -> Triple | None:
+    def _solve(self, geometry: LegGeometry, rate: Triple, acceleration: Triple) -> Triple | None:
         """Return the actuator forces of a motion, None if they are not determined."""
-        state = state_at(geometry, rate, acceleration, self._h)
-        solved = self.estimate.dynamics.solve(state)
+        solved = self.estimate.dynamics.solve(robot_state(geometry, rate, acceleration, self._h))
         return None if solved is None else (solved[9], solved[10], solved[11])
 
     def _limited(self, force: Triple, state: StateEstimate, elapsed: float) -> Triple:
@@ -320,15 +323,14 @@ class Controller(ABC):
         """Return the state after a time at the last rate."""
         (z, wx, wy), (dz, dwx, dwy) = state.geometry.pose, state.rate
         pose = (z + time * dz, wx + time * dwx, wy + time * dwy)
-        geometry = place_of(pose, self._g, self._h)
+        geometry = leg_geometry(pose, self._g, self._h)
         if geometry is None:
             return None
-        jacobian = leg_gains(pose, geometry.way, geometry.coefficient, self._h)
-        return StateEstimate(geometry, state.rate, state.speed, jacobian)
+        return StateEstimate(geometry, state.rate, state.speed, leg_jacobian(geometry, self._h))
 
     def _near_singular(self, state: StateEstimate) -> bool:
         """Return whether a determinant, 1 at most, is below the limit for stopping."""
-        determinant = turning_determinant(state.geometry, self._g, self._h)
+        determinant = closure_determinant(state.geometry, self._g, self._h)
         return not (abs(state.jacobian.determinant) > self._stop < abs(determinant))
 
     def _weight(self) -> Triple:

@@ -27,7 +27,7 @@ import numpy as np
 import proxsuite
 
 from rps_pin.arrays import Array
-from rps_pin.control.estimator.scalar_rates import LegGains
+from rps_pin.control.estimator.leg_jacobian import LegJacobian
 from rps_pin.rps.kinematics.tracking import Triple
 
 #: Of ProxQP, with variables scaled by the limits.
@@ -90,7 +90,7 @@ class ForceLimits:
         return one, two, three
 
     def nearest(
-        self, wanted: Triple, mass: Array, jacobian: LegGains, rate: Triple
+        self, wanted: Triple, mass: Array, jacobian: LegJacobian, rate: Triple
     ) -> LimitedForces:
         """Return the limited forces nearest in effect to finite forces beyond the limits.
 

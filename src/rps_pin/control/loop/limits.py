@@ -6,15 +6,19 @@ import math
 
 import numpy as np
 
-from rps_pin.control.estimator.place import Place
+from rps_pin.control.estimator.leg_geometry import LegGeometry
+from rps_pin.numerics.compiled import compiled
+from rps_pin.rps.kernels.legs import cone_cosine, rest_axis
+from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE, within
 from rps_pin.rps.kinematics.legs import RADIAL, cone_angles, violations
 from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.parameters import RPSParameters
 
-#: Limits are kept to rounding error, m or rad (as in `rps_pin.rps.kinematics.legs`).
-_ROUNDING = 1e-12
-(_E1, _E2, _E3) = ((float(x), float(y)) for x, y, _ in RADIAL)
+_E = tuple((x, y) for x, y, _ in RADIAL.tolist())
+#: Least and greatest length, least and greatest angle, cosine of the cone's limit, cosine and sine
+#: of the rest angle.
+_Bounds = tuple[float, float, float, float, float, float, float]
 
 
 class RobotLimits:
@@ -27,47 +31,17 @@ class RobotLimits:
     """
 
     def __init__(self, parameters: RPSParameters) -> None:
-        self._parameters = parameters
-        low, high = parameters.leg_length_limits
-        self._shortest, self._longest = low - _ROUNDING, high + _ROUNDING
-        low, high = parameters.leg_angle_limits
-        self._least_angle, self._greatest_angle = low - _ROUNDING, high + _ROUNDING
-        self._greatest_speed = parameters.actuator_speed_limit
-        self._greatest_force = parameters.actuator_force_limit
-        self._cones = parameters.spherical_cone_limit < math.pi
-        self._least_cosine = math.cos(min(parameters.spherical_cone_limit + _ROUNDING, math.pi))
-        rest = parameters.spherical_rest_angle
-        self._along, self._across = math.cos(rest), math.sin(rest)
+        self._parameters = p = parameters
+        self._greatest_speed = p.actuator_speed_limit
+        self._greatest_force = p.actuator_force_limit
+        cone, rest = p.spherical_cone_limit, p.spherical_rest_angle
+        least_cosine = math.cos(cone + LIMIT_TOLERANCE) if cone < math.pi else -2.0
+        lengths, angles = p.leg_length_limits, p.leg_angle_limits
+        self._bounds = (*lengths, *angles, least_cosine, math.cos(rest), math.sin(rest))
 
-    def violated(self, geometry: Place) -> bool:
+    def violated(self, geometry: LegGeometry) -> bool:
         """Return whether a leg's length, angle or ball joint is beyond its limits."""
-        _, (d1, d2, d3), (phi1, phi2, phi3), _, _ = geometry
-        low, high = self._shortest, self._longest
-        if not (low <= d1 <= high and low <= d2 <= high and low <= d3 <= high):
-            return True
-        low, high = self._least_angle, self._greatest_angle
-        if not (low <= phi1 <= high and low <= phi2 <= high and low <= phi3 <= high):
-            return True
-        return self._cones and self._cone_violated(geometry)
-
-    def _cone_violated(self, geometry: Place) -> bool:
-        """Return whether a leg leaves its ball joint's cone.
-
-        With e and t of `rps_pin.rps.kinematics.rates` and the leg's direction l = -cos(phi) e_i +
-        sin(phi) z, l . n = C sin(phi) - A t cos(phi) and l . R e_i = -(C + B e^2) cos(phi) - A t
-        sin(phi).
-        """
-        (_, wx, wy), _, _, way, coefficient = geometry
-        a, b, c = coefficient[:3]
-        c1, c2, c3, s1, s2, s3 = way
-        along, across, least = self._along, self._across, self._least_cosine
-        for ex, ey, cosine, sine in ((*_E1, c1, s1), (*_E2, c2, s2), (*_E3, c3, s3)):
-            e, at = wx * ex + wy * ey, a * (wy * ex - wx * ey)
-            normal, radial = c * sine - at * cosine, -(c + b * e * e) * cosine - at * sine
-            # The rest axis is cos(r) n - sin(r) R e_i.
-            if along * normal - across * radial < least:
-                return True
-        return False
+        return not _kept(geometry, self._bounds)
 
     def too_fast(self, speed: Triple) -> bool:
         """Return whether an actuator is beyond its speed limit."""
@@ -77,7 +51,7 @@ class RobotLimits:
         """Return whether an actuator is beyond its force limit."""
         return max(force) > self._greatest_force or min(force) < -self._greatest_force
 
-    def messages(self, geometry: Place) -> list[str]:
+    def messages(self, geometry: LegGeometry) -> list[str]:
         """Return a sentence for each violated limit of length, angle or ball joint."""
         p = self._parameters
         length, angle = np.array(geometry.length), np.array(geometry.angle)
@@ -86,14 +60,32 @@ class RobotLimits:
 
     def speed_messages(self, speed: Triple) -> list[str]:
         """Return a sentence for each actuator beyond its speed limit."""
-        return _beyond("speed", speed, self._greatest_speed, "m/s")
+        return _messages("speed", speed, self._greatest_speed, "m/s")
 
     def force_messages(self, force: Triple) -> list[str]:
         """Return a sentence for each actuator beyond its force limit."""
-        return _beyond("force", force, self._greatest_force, "N")
+        return _messages("force", force, self._greatest_force, "N")
 
 
-def _beyond(quantity: str, values: Triple, limit: float, unit: str) -> list[str]:
+@compiled
+def _kept(geometry: LegGeometry, bounds: _Bounds) -> bool:
+    """Return whether every leg keeps its limits, to rounding."""
+    shortest, longest, least, greatest, least_cosine, cos_r, sin_r = bounds
+    _, x, y = geometry.pose
+    for leg in range(3):
+        if not within(geometry.length[leg], shortest, longest):
+            return False
+        if not within(geometry.angle[leg], least, greatest):
+            return False
+        e_x, e_y = _E[leg]
+        axis = rest_axis(x * e_x + y * e_y, y * e_x - x * e_y, geometry.tilt, cos_r, sin_r)
+        cosine, sine = geometry.direction[leg], geometry.direction[leg + 3]
+        if cone_cosine(cosine, sine, axis[0], axis[2]) < least_cosine:
+            return False
+    return True
+
+
+def _messages(quantity: str, values: Triple, limit: float, unit: str) -> list[str]:
     return [
         f"leg {leg}: {quantity} is {value:.6g} {unit}; its limit is {limit:.6g} {unit}"
         for leg, value in enumerate(values, start=1)

@@ -24,8 +24,8 @@ from typing import Any, Literal, get_args
 
 from numpy.typing import ArrayLike
 
-from rps_pin.control.estimator.scalar_rates import force_of_wrench, wrench_of_force
-from rps_pin.control.estimator.scalar_state import leg_motion
+from rps_pin.control.estimator.leg_jacobian import force_of_wrench, wrench_of_force
+from rps_pin.control.estimator.robot_state import leg_motion
 from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.loop.controller import Controller, Space
 from rps_pin.control.loop.gains import Gains

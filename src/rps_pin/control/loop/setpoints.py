@@ -12,21 +12,24 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from rps_pin.control.estimator.leg_geometry import (
+    LARGEST_TILT_SQUARED,
+    LegGeometry,
+    closure_determinant,
+    leg_geometry,
+)
 from rps_pin.control.estimator.loop_arguments import three_floats
-from rps_pin.control.estimator.place import Place, place_of, turning_determinant
 from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.rejoining import Rejoining, rejoining_time
 from rps_pin.rps.kinematics.tracking import Triple
 
 _ZERO = (0.0, 0.0, 0.0)
-#: (tilt_x, tilt_y) are coordinates below a whole turn; see `rps_pin.rps.singularity.measures`.
-LARGEST_TILT_SQUARED = (2 * math.pi * (1 - 1e-6)) ** 2
 
 
 class Setpoint(NamedTuple):
     """A desired motion at one time, checked."""
 
-    geometry: Place
+    geometry: LegGeometry
     rate: Triple
     acceleration: Triple
 
@@ -60,10 +63,10 @@ class Setpoints:
         self._limits, self._g, self._h = limits, g, h
         self._near, self._largest, self._speed_limit = near_singular, largest, speed_limit
 
-    def reset(self, geometry: Place) -> None:
+    def reset(self, geometry: LegGeometry) -> None:
         """Start at rest in a pose, the setpoint until there is a target."""
         self.current = self._target = Setpoint(geometry, _ZERO, _ZERO)
-        self._side = math.copysign(1.0, turning_determinant(geometry, self._g, self._h))
+        self._side = math.copysign(1.0, closure_determinant(geometry, self._g, self._h))
         self._held = False
         self._refused: Triple | None = None
         self._rejoining: Rejoining | None = None
@@ -133,11 +136,11 @@ class Setpoints:
             rejoining_time(distance, self._speed_limit),
         )
 
-    def _allowed(self, pose: Triple) -> Place | None:
+    def _allowed(self, pose: Triple) -> LegGeometry | None:
         """Return the leg geometry of a pose, None if the pose is not allowed."""
         if not self._in_range(pose):
             return None
-        geometry = place_of(pose, self._g, self._h)
+        geometry = leg_geometry(pose, self._g, self._h)
         if geometry is None or self._limits.violated(geometry):
             return None
         return geometry if self._determinant(geometry) >= self._near else None
@@ -146,9 +149,9 @@ class Setpoints:
         z, wx, wy = pose
         return wx * wx + wy * wy < LARGEST_TILT_SQUARED and abs(z) < self._largest
 
-    def _determinant(self, geometry: Place) -> float:
+    def _determinant(self, geometry: LegGeometry) -> float:
         """Return Eq. 8's determinant, positive on the side of the start."""
-        return self._side * turning_determinant(geometry, self._g, self._h)
+        return self._side * closure_determinant(geometry, self._g, self._h)
 
     def messages(self) -> list[str]:
         """Return why the setpoint is not the last target."""
@@ -162,7 +165,7 @@ class Setpoints:
         target = "the target (" + ", ".join(f"{value:.6g}" for value in x) + ") m, rad, rad"
         if not self._in_range(x):
             return [f"{target} is out of range"]
-        geometry = place_of(x, self._g, self._h)
+        geometry = leg_geometry(x, self._g, self._h)
         if geometry is None:
             return [f"{target} makes the length of a leg zero"]
         found = [f"at {target}, {one}" for one in self._limits.messages(geometry)]

@@ -1,0 +1,67 @@
+"""Leg geometry of a pose: lengths, angles and directions, and the determinant of Eq. 8.
+
+Compositions of `rps_pin.rps.kernels` on floats, compiled as a whole.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from rps_pin.numerics.compiled import compiled
+from rps_pin.rps.kernels import leg_equations, legs
+from rps_pin.rps.kernels.tilt_functions import TiltFunctions, tilt_functions
+from rps_pin.rps.kernels.tips import at_legs, tips
+from rps_pin.rps.kinematics.tracking import Triple, Way
+
+#: (tilt_x, tilt_y) are coordinates below a whole turn; see `rps_pin.rps.singularity.measures`.
+LARGEST_TILT_SQUARED = (2 * math.pi * (1 - 1e-6)) ** 2
+
+
+class LegGeometry(NamedTuple):
+    """A pose and its legs."""
+
+    pose: Triple
+    """(z, tilt_x, tilt_y)."""
+    length: Triple
+    """d, m."""
+    angle: Triple
+    """phi, rad."""
+    direction: Way
+    """Cosines, then sines of phi."""
+    tilt: TiltFunctions
+    """Coefficients of the rotation and their derivatives."""
+
+
+@compiled
+def leg_geometry(pose: Triple, g: float, h: float) -> LegGeometry | None:
+    """Return the leg geometry; None if a leg has no length, or the tilt is a whole turn or more."""
+    z, x, y = pose
+    square = x * x + y * y
+    if not square < LARGEST_TILT_SQUARED:
+        return None
+    tilt = tilt_functions(square)
+    radial, height = tips(z, x, y, tilt, h)
+    (r1, r2, r3), (z1, z2, z3) = at_legs(radial), at_legs(height)
+    in1, in2, in3, least = g - r1, g - r2, g - r3, 1e-18 * g * g
+    if in1 * in1 + z1 * z1 < least or in2 * in2 + z2 * z2 < least or in3 * in3 + z3 * z3 < least:
+        return None
+    d1, c1, s1 = legs.leg_geometry(r1, z1, g)
+    d2, c2, s2 = legs.leg_geometry(r2, z2, g)
+    d3, c3, s3 = legs.leg_geometry(r3, z3, g)
+    angle = (math.atan2(s1, c1), math.atan2(s2, c2), math.atan2(s3, c3))
+    return LegGeometry(pose, (d1, d2, d3), angle, (c1, c2, c3, s1, s2, s3), tilt)
+
+
+@compiled
+def closure_determinant(geometry: LegGeometry, g: float, h: float) -> float:
+    """Return Eq. 8's determinant without unit, -1 to 1: `leg_equations.determinant`.
+
+    It is 0 at type II and constraint singularities.
+    """
+    d, (c1, c2, c3, s1, s2, s3) = geometry.length, geometry.direction
+    w = (d[0] * c1, d[1] * c2, d[2] * c3)
+    z = (d[0] * s1, d[1] * s2, d[2] * s3)
+    determinant = leg_equations.determinant(leg_equations.slopes(w, z, g))
+    unitless: float = determinant / leg_equations.determinant_scale(d, h)
+    return unitless

@@ -1,0 +1,64 @@
+"""Jacobian of the legs ajacobiant the library's arrays and the ball joints' speeds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rps_pin.control.estimator.leg_geometry import leg_geometry
+from rps_pin.control.estimator.leg_jacobian import (
+    LeastSingularValue,
+    force_of_wrench,
+    leg_jacobian,
+    leg_speed,
+    pose_rate,
+    wrench_of_force,
+)
+from rps_pin.control.estimator.state_estimate import state_estimate
+from rps_pin.rps.kinematics import rates
+from rps_pin.rps.kinematics.legs import RADIAL
+from rps_pin.rps.kinematics.pose import rotation
+from rps_pin.rps.singularity.measures import singularity_measures
+from tests import strategies
+
+
+@pytest.mark.parametrize("largest_tilt", [0.0, 1e-9, 1.0, 3.1])
+def test_singular_values_rates_and_twists_are_the_library_s(largest_tilt: float) -> None:
+    rng, least = np.random.default_rng(0), LeastSingularValue()
+    for _ in range(10):
+        p = strategies.random_parameters(rng)
+        g, h = p.base_radius, p.platform_radius
+        poses, speeds, _ = strategies.random_motions(rng, p, 40, largest_tilt)
+        measures = singularity_measures(p, poses)
+        legs = rates.leg_jacobians(p, poses)
+        twists = rates.platform_twist(p, poses, speeds).total
+        for i, row in enumerate(poses):
+            pose = (float(row[0]), float(row[1]), float(row[2]))
+            rate = (float(speeds[i, 0]), float(speeds[i, 1]), float(speeds[i, 2]))
+            geometry = leg_geometry(pose, g, h)
+            assert geometry is not None
+            jacobian = leg_jacobian(geometry, h)
+            assert least.of(jacobian) == pytest.approx(measures.type_ii[i], abs=1e-13)
+            assert jacobian.determinant == pytest.approx(measures.determinant[i], abs=1e-13)
+            np.testing.assert_allclose(jacobian.K, legs.length_jacobian[i], rtol=0, atol=1e-13)
+            if measures.type_ii[i] > 0.05:
+                d1, d2, d3 = (legs.length_jacobian[i] @ speeds[i]).tolist()
+                back = pose_rate(jacobian, (d1, d2, d3))
+                np.testing.assert_allclose(back, rate, rtol=0, atol=1e-10 * np.abs(rate).max())
+                state = state_estimate(geometry.length, geometry.direction, (d1, d2, d3), g, h)
+                assert state is not None
+                scale = np.abs(twists[i]).max()
+                np.testing.assert_allclose(state[1], twists[i], rtol=0, atol=1e-9 * scale)
+            arms = h * RADIAL @ rotation(row).T
+            balls = twists[i, :3] + np.cross(twists[i, 3:], arms)  # v + w x r
+            if measures.type_ii[i] > 1e-4:  # K = M L', and |L' x'|^2 is the sum of squared speeds
+                found = np.linalg.solve(jacobian.M, np.array(jacobian.K) @ rate)
+                squares = (balls**2).sum()
+                assert found @ found == pytest.approx(squares, rel=1e-12 / measures.type_ii[i])
+            force = rng.normal(size=3)
+            f1, f2, f3 = force.tolist()
+            power = np.dot(wrench_of_force(jacobian, (f1, f2, f3)), rate)  # K'f . x' = f . K x'
+            assert power == pytest.approx(force @ leg_speed(jacobian, rate), abs=1e-10)
+            if measures.type_ii[i] > 0.05:
+                again = force_of_wrench(jacobian, wrench_of_force(jacobian, (f1, f2, f3)))
+                np.testing.assert_allclose(again, force, rtol=0, atol=1e-10)
