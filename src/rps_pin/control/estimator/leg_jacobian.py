@@ -22,59 +22,58 @@ from rps_pin.rps.kinematics.tracking import Triple
 
 #: A 3 x 3 matrix, row by row.
 Rows = tuple[Triple, Triple, Triple]
+_SQRT3 = math.sqrt(3.0)
 _NINE = struct.Struct("9d")
 
 
 class LegJacobian(NamedTuple):
-    """K, and M whose singular values are the distances to singularities."""
+    """K = d(length)/d(pose), and what measures its distance to a singularity."""
 
     K: Rows
     """d' = K pose', by legs: 1, m/rad, m/rad."""
-    M: Rows
-    """K L^-T, where |L' pose'|^2 is the sum of the ball joints' squared speeds."""
+    cofactors: Rows
+    """Of K: its inverse is their transpose over its determinant."""
+    by_legs: float
+    """Determinant of K, m^2/rad^2."""
+    L: Triple
+    """l_xx, l_yx, l_yy, m/rad, of the lower L whose |L' pose'|^2 is the sum of the ball joints'
+    squared speeds; its other entries are l_zz^2 = 3 and 0."""
     determinant: float
-    """Of M, -1 to 1: `SingularityMeasures.determinant`."""
+    """Of M = K L^-T, -1 to 1: `SingularityMeasures.determinant`."""
 
 
 @compiled
 def leg_jacobian(geometry: LegGeometry, h: float) -> LegJacobian:
     """Return the Jacobian in a pose."""
     (_, x, y), (c1, c2, c3, s1, s2, s3) = geometry.pose, geometry.direction
-    slopes = tip_slopes(x, y, geometry.tilt)
+    slopes = tip_slopes(x, y, geometry.tilt)  # by h tilt
     (rx1, rx2, rx3), (ry1, ry2, ry3) = at_legs(slopes[0]), at_legs(slopes[1])
     (zx1, zx2, zx3), (zy1, zy2, zy3) = at_legs(slopes[2]), at_legs(slopes[3])
-    # By h tilt, in which all columns are without unit.
-    kx1, ky1 = along_leg(c1, s1, rx1, zx1), along_leg(c1, s1, ry1, zy1)
-    kx2, ky2 = along_leg(c2, s2, rx2, zx2), along_leg(c2, s2, ry2, zy2)
-    kx3, ky3 = along_leg(c3, s3, rx3, zx3), along_leg(c3, s3, ry3, zy3)
-    xx, xy, yy = speed_form(slopes)
-    l_x = math.sqrt(xx)
-    l_xy = xy / l_x
-    l_y, l_z = math.sqrt(yy - l_xy * l_xy), math.sqrt(3.0)
-    mx1, mx2, mx3 = kx1 / l_x, kx2 / l_x, kx3 / l_x
-    M = (
-        (s1 / l_z, mx1, (ky1 - l_xy * mx1) / l_y),
-        (s2 / l_z, mx2, (ky2 - l_xy * mx2) / l_y),
-        (s3 / l_z, mx3, (ky3 - l_xy * mx3) / l_y),
+    K = (
+        (s1, h * along_leg(c1, s1, rx1, zx1), h * along_leg(c1, s1, ry1, zy1)),
+        (s2, h * along_leg(c2, s2, rx2, zx2), h * along_leg(c2, s2, ry2, zy2)),
+        (s3, h * along_leg(c3, s3, rx3, zx3), h * along_leg(c3, s3, ry3, zy3)),
     )
-    K = ((s1, h * kx1, h * ky1), (s2, h * kx2, h * ky2), (s3, h * kx3, h * ky3))
-    return LegJacobian(K, M, cofactors(M)[1])
+    xx, xy, yy = speed_form(slopes)
+    l_xx = math.sqrt(xx)
+    l_yx = xy / l_xx
+    L = (h * l_xx, h * l_yx, h * math.sqrt(yy - l_yx * l_yx))
+    inverse, by_legs = cofactors(K)
+    return LegJacobian(K, inverse, by_legs, L, by_legs / (_SQRT3 * L[0] * L[2]))
 
 
 @compiled
 def pose_rate(jacobian: LegJacobian, speed: Triple) -> Triple:
     """Return pose' of K pose' = d'. The determinant must not be zero."""
-    adjugate, det = cofactors(jacobian.K)
-    a, b, c = column_products(adjugate, speed)
-    return a / det, b / det, c / det
+    a, b, c = column_products(jacobian.cofactors, speed)
+    return a / jacobian.by_legs, b / jacobian.by_legs, c / jacobian.by_legs
 
 
 @compiled
 def force_of_wrench(jacobian: LegJacobian, wrench: Triple) -> Triple:
     """Return f of K' f = wrench on the pose. The determinant must not be zero."""
-    adjugate, det = cofactors(jacobian.K)
-    a, b, c = row_products(adjugate, wrench)
-    return a / det, b / det, c / det
+    a, b, c = row_products(jacobian.cofactors, wrench)
+    return a / jacobian.by_legs, b / jacobian.by_legs, c / jacobian.by_legs
 
 
 @compiled
@@ -90,7 +89,7 @@ def leg_speed(jacobian: LegJacobian, rate: Triple) -> Triple:
 
 
 class LeastSingularValue:
-    """M's least singular value by one-sided Jacobi rotations (eigenpy), memory allocated once."""
+    """The least singular value of M by Jacobi rotations (eigenpy), with memory allocated once."""
 
     def __init__(self) -> None:
         self._memory = bytearray(_NINE.size)
@@ -99,8 +98,12 @@ class LeastSingularValue:
 
     def of(self, jacobian: LegJacobian) -> float:
         """Return the distance to a type II singularity, `SingularityMeasures.type_ii`."""
-        first, second, third = jacobian.M
-        _NINE.pack_into(self._memory, 0, *first, *second, *third)
+        l_xx, l_yx, l_yy = jacobian.L
+        rows: list[float] = []
+        for k_z, k_x, k_y in jacobian.K:  # K L^-T: forwards through L
+            m_x = k_x / l_xx
+            rows += (k_z / _SQRT3, m_x, (k_y - l_yx * m_x) / l_yy)
+        _NINE.pack_into(self._memory, 0, *rows)
         self._svd.compute(self._matrix)
         least: float = self._svd.singularValues().item(2)
         return least
