@@ -100,7 +100,7 @@ def tilt_couple(x: Number, y: Number, tilt: TiltFunctions, moment: Vector) -> tu
 
 
 @kernel
-def cofactors(rows: Rows) -> tuple[Rows, Number]:
+def cofactors(rows: Rows) -> tuple[tuple[Vector, Vector, Vector], Number]:
     """Return the cofactors of a 3 x 3 matrix, row by row, and its determinant.
 
     With C the cofactors: the inverse is C' / det.
@@ -118,7 +118,7 @@ def cofactors(rows: Rows) -> tuple[Rows, Number]:
 
 
 @kernel
-def row_products(rows: Rows, vector: Three) -> Three:
+def row_products(rows: Rows, vector: Three) -> Vector:
     """Return M v: of K, the legs' speeds of a pose's rate."""
     first, second, third = rows
     x, y, z = vector
@@ -130,7 +130,7 @@ def row_products(rows: Rows, vector: Three) -> Three:
 
 
 @kernel
-def column_products(rows: Rows, vector: Three) -> Three:
+def column_products(rows: Rows, vector: Three) -> Vector:
     """Return M' v: of K, the wrench on the pose of actuator forces."""
     first, second, third = rows
     x, y, z = vector
