@@ -1,8 +1,8 @@
-"""How the cost grows with the number of loops: chains of n four-bars, each driving the next.
+"""Time of dynamics over the number of loops: chains of n four-bars, each driving the next.
 
 Run with ``make bench``. Bar i's rocker is the crank of bar i + 1; one joint is driven. The loops
-are closed in two ways: by two rows each, none redundant (a point on a line across the plane), and
-by points, of whose three rows one is redundant in the plane.
+have one of two closures: `point_on_line` across the plane, two rows each and none redundant; or
+`spherical`, three rows each, one of them redundant in the plane. Peers have the same rows.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from benchmarks.peers import ConstraintDynamics, PlainPinocchio
+from benchmarks.peers import ConstraintDynamics, LoopConstrainedABA, PlainPinocchio
 from rps_pin import ClosedLoopModel, LoopClosure
 
 Array = NDArray[np.float64]
@@ -56,16 +56,21 @@ def state(mechanism: ClosedLoopModel) -> tuple[Array, Array, Array]:
     return q, v, mechanism.acceleration(q, v, [2.0])
 
 
+#: The rows that a closure of each kind keeps of a spherical one, in the plane x, z.
+ROWS = {"point_on_line": [0, 2], "spherical": [0, 1, 2]}
+
+
 @pytest.mark.benchmark(warmup=True, min_rounds=20, max_time=0.3, warmup_iterations=50)
 @pytest.mark.parametrize("loops", LOOPS)
-@pytest.mark.parametrize("kind", ["point_on_line", "spherical"])
-@pytest.mark.parametrize("role", ["ours", "plain Pinocchio and lstsq"])
+@pytest.mark.parametrize("kind", list(ROWS))
+@pytest.mark.parametrize("role", ["ours", "plain Pinocchio and NumPy"])
 def bench_inverse(benchmark: BenchmarkFixture, loops: int, kind: str, role: str) -> None:
+    """Redundant rows need least squares; without them a linear solver is enough."""
     mechanism = chain(loops, kind)
     motion = state(mechanism)
-    plain = PlainPinocchio(chain(loops, "spherical"))
+    plain = PlainPinocchio(chain(loops, "spherical"), ROWS[kind])
 
-    def peer() -> Array:
+    def by_least_squares() -> Array:
         force = pin.rnea(plain.model, plain.data, *motion)
         jacobian = plain.jacobian(motion[0])
         multipliers = np.linalg.lstsq(
@@ -73,6 +78,9 @@ def bench_inverse(benchmark: BenchmarkFixture, loops: int, kind: str, role: str)
         )[0]
         tau: Array = force[plain.actuated] - jacobian[:, plain.actuated].T @ multipliers
         return tau
+
+    def peer() -> Array:
+        return plain.inverse_dynamics(*motion) if kind == "point_on_line" else by_least_squares()
 
     np.testing.assert_allclose(mechanism.inverse_dynamics(*motion).tau, peer(), rtol=1e-7)
     benchmark.group = f"{loops} four-bars, inverse dynamics, {kind} closures"
@@ -83,19 +91,30 @@ def bench_inverse(benchmark: BenchmarkFixture, loops: int, kind: str, role: str)
         benchmark(peer)
 
 
+#: Peers of forward dynamics by kind: Pinocchio's own algorithms have no point_on_line closure.
+FORWARD_PEERS = {
+    "point_on_line": {"plain Pinocchio and NumPy": PlainPinocchio},
+    "spherical": {"pin.constraintDynamics": ConstraintDynamics, "pin.lcaba": LoopConstrainedABA},
+}
+
+
 @pytest.mark.benchmark(warmup=True, min_rounds=20, max_time=0.3, warmup_iterations=50)
 @pytest.mark.parametrize("loops", LOOPS)
-@pytest.mark.parametrize("kind", ["point_on_line", "spherical"])
-@pytest.mark.parametrize("role", ["ours", "pin.constraintDynamics"])
+@pytest.mark.parametrize(
+    ("kind", "role"),
+    [(kind, role) for kind, peers in FORWARD_PEERS.items() for role in ["ours", *peers]],
+)
 def bench_forward(benchmark: BenchmarkFixture, loops: int, kind: str, role: str) -> None:
     mechanism = chain(loops, kind)
     q, v, a = state(mechanism)
     tau = mechanism.inverse_dynamics(q, v, a).tau
-    peer = ConstraintDynamics(chain(loops, "spherical"))
-    np.testing.assert_allclose(peer.forward_dynamics(q, v, tau), a, rtol=1e-5, atol=1e-5)
     benchmark.group = f"{loops} four-bars, forward dynamics, {kind} closures"
     benchmark.extra_info["role"] = role
     if role == "ours":
         benchmark(mechanism.forward_dynamics, q, v, tau)
-    else:
-        benchmark(peer.forward_dynamics, q, v, tau)
+        return
+    peer_type = FORWARD_PEERS[kind][role]
+    others = {"rows": ROWS[kind]} if peer_type is PlainPinocchio else {}
+    peer = peer_type(chain(loops, "spherical"), **others)
+    np.testing.assert_allclose(peer.forward_dynamics(q, v, tau), a, rtol=1e-5, atol=1e-5)
+    benchmark(peer.forward_dynamics, q, v, tau)

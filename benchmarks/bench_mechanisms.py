@@ -1,8 +1,8 @@
-"""A call of each operation for the 3-RPS, the Delta and the Stewart platform, beside its peers.
+"""Time of each operation for the 3-RPS, the Delta and the Stewart platform, and of the peers.
 
-Run with ``make bench``. The Delta is that with rods of mass, so that Pinocchio's constraint models
-and MuJoCo can hold it, too. Where MuJoCo stands beside forward dynamics it solves a softer problem:
-its loops give way.
+Run with ``make bench``. The Delta is the one whose rods have mass, since Pinocchio's
+`constraintDynamics` and MuJoCo need it. MuJoCo's forward dynamics solves a different problem: its
+closures are soft.
 """
 
 from __future__ import annotations
@@ -16,7 +16,13 @@ import pytest
 from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from benchmarks.peers import URDF, ConstraintDynamics, Mujoco, PlainPinocchio
+from benchmarks.peers import (
+    URDF,
+    ConstraintDynamics,
+    LoopConstrainedABA,
+    Mujoco,
+    PlainPinocchio,
+)
 from rps_pin import ClosedLoopModel
 
 Array = NDArray[np.float64]
@@ -83,24 +89,27 @@ def bench_inverse(benchmark: BenchmarkFixture, case: Case, role: str) -> None:
 
 @pytest.mark.benchmark(warmup=True, min_rounds=200, max_time=0.4, warmup_iterations=200)
 @pytest.mark.parametrize(
-    "role", ["ours", "plain Pinocchio and NumPy", "pin.constraintDynamics", "mj_forward"]
+    "role",
+    ["ours", "plain Pinocchio and NumPy", "pin.constraintDynamics", "pin.lcaba", "mj_forward"],
 )
 def bench_forward(benchmark: BenchmarkFixture, case: Case, role: str) -> None:
     q, v, tau = case.q, case.v, case.tau
     peers = {
         "plain Pinocchio and NumPy": PlainPinocchio,
         "pin.constraintDynamics": ConstraintDynamics,
+        "pin.lcaba": LoopConstrainedABA,
     }
     if role in peers:
         peer = peers[role](case.mechanism)
         found = peer.forward_dynamics(q, v, tau)
         if not np.isfinite(found).all():
-            pytest.skip("constraintDynamics returns NaN where links are massless")
+            pytest.skip(f"{role} returns NaN where links are massless")
         np.testing.assert_allclose(found, case.a, rtol=1e-6, atol=1e-6)
     calls = {
         "ours": lambda: case.mechanism.forward_dynamics(q, v, tau),
         "plain Pinocchio and NumPy": lambda: peer.forward_dynamics(q, v, tau),
         "pin.constraintDynamics": lambda: peer.forward_dynamics(q, v, tau),
+        "pin.lcaba": lambda: peer.forward_dynamics(q, v, tau),
         "mj_forward": case.mujoco().forward_dynamics,
     }
     measured(benchmark, f"{name_of(case)}, forward dynamics", role, calls[role])
@@ -124,7 +133,7 @@ OPERATIONS: dict[str, Callable[[Case], object]] = {
 @pytest.mark.parametrize("operation", list(OPERATIONS))
 @pytest.mark.parametrize("role", ["ours", "one plain inverse dynamics"])
 def bench_others(benchmark: BenchmarkFixture, case: Case, operation: str, role: str) -> None:
-    """What has no peer is compared with one call of inverse dynamics, written plainly."""
+    """Operations without a peer are compared with one inverse dynamics in plain Pinocchio."""
     plain = PlainPinocchio(case.mechanism)
     calls = {
         "ours": lambda: OPERATIONS[operation](case),
