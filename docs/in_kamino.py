@@ -46,36 +46,42 @@ def main() -> None:
         if joint["kind"] != "spherical":
             frames["axis"] = wp.vec3(*joint["axis"])
         joints.append(add[joint["kind"]](bodies[joint["parent"]], bodies[joint["child"]], **frames))
-    builder.add_articulation([j for j, one in zip(joints, task["joints"]) if one["tree"]])
+    builder.add_articulation(
+        [j for j, one in zip(joints, task["joints"], strict=True) if one["tree"]]
+    )
     model = builder.finalize(skip_validation_joints=True)
     solver = newton.solvers.SolverKamino(model=model)
     now, then, control = model.state(), model.state(), model.control()
-    forces = np.zeros((len(task["bodies"]), 6), np.float32)  # force and moment at the centre, world
     names = list(task["bodies"])
-    for joint in task["joints"]:
-        for body, sign in ((joint["child"], 1.0), (joint["parent"], -1.0)):
-            if "force" in joint:
-                force = sign * joint["force"] * np.array(joint["axis"])
-                arm = np.array(joint["point"]) - task["bodies"][body]["centre"]
-                forces[names.index(body)] += [*force, *np.cross(arm, force)]
-    gap = moved = 0.0
-    for _ in range(task["ticks"]):
-        now.body_f.assign(forces)
-        solver.step(now, then, control, None, task["step"])
-        now, then = then, now
-    placed = now.body_q.numpy().astype(float)
 
     def point(body: str, start: list[float]) -> np.ndarray:
         """Where a point of a body is now that was at `start` at the start, m."""
-        first = task["bodies"][body]
-        local = np.array(first["rotation"]).T @ (np.array(start) - first["centre"])
-        x, y, z, *turn = placed[names.index(body)]
-        return np.array([x, y, z]) + matrix(turn) @ local
+        return placed[names.index(body), :3] + turned(body, np.subtract(start, centre_of(body)))
 
-    for joint in task["joints"]:
-        if joint["kind"] == "spherical":
-            pair = (point(joint[side], joint["point"]) for side in ("parent", "child"))
-            gap = max(gap, float(np.linalg.norm(np.subtract(*pair))))
+    def turned(body: str, vector: np.ndarray) -> np.ndarray:
+        """How a vector of a body stands now that was `vector` at the start."""
+        start = np.array(task["bodies"][body]["rotation"])
+        return matrix(placed[names.index(body), 3:]) @ start.T @ vector
+
+    def centre_of(body: str) -> np.ndarray:
+        return np.array(task["bodies"][body]["centre"])
+
+    for _ in range(task["ticks"]):
+        placed = now.body_q.numpy().astype(float)
+        wrenches = np.zeros((len(names), 6), np.float32)  # force, moment at the centre; world axes
+        for joint in task["joints"]:
+            for body, sign in ((joint["child"], 1.0), (joint["parent"], -1.0)):
+                if "force" in joint:  # along the axis, which turns with the leg
+                    force = sign * joint["force"] * turned(body, np.array(joint["axis"]))
+                    arm = turned(body, np.subtract(joint["point"], centre_of(body)))
+                    wrenches[names.index(body)] += [*force, *np.cross(arm, force)]
+        now.body_f.assign(wrenches)
+        solver.step(now, then, control, None, task["step"])
+        now, then = then, now
+    placed = now.body_q.numpy().astype(float)
+    balls = [joint for joint in task["joints"] if joint["kind"] == "spherical"]
+    pairs = ([point(one[side], one["point"]) for side in ("parent", "child")] for one in balls)
+    gap = max(float(np.linalg.norm(np.subtract(*pair))) for pair in pairs)
     centre = task["bodies"]["platform"]["centre"]
     moved = float(np.linalg.norm(point("platform", centre) - centre))
     print(json.dumps({"gap": gap, "moved": moved}))
@@ -86,11 +92,11 @@ def transform(position: list[float], rotation: list[list[float]]) -> wp.transfor
     return wp.transform(wp.vec3(*position), wp.quat_from_matrix(wp.mat33(np.ravel(rotation))))
 
 
-def matrix(quaternion: list[float]) -> np.ndarray:
+def matrix(quaternion: np.ndarray) -> np.ndarray:
     """Return the rotation matrix of a quaternion (x, y, z, w)."""
-    *xyz, w = quaternion
-    x = np.cross(np.eye(3), xyz)  # minus the cross-product matrix
-    return np.eye(3) - 2 * w * x + 2 * x @ x
+    *xyz, w = quaternion / np.linalg.norm(quaternion)
+    cross = np.cross(np.eye(3), xyz)
+    return np.eye(3) + 2 * w * cross + 2 * cross @ cross
 
 
 if __name__ == "__main__":
