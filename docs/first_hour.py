@@ -1,4 +1,4 @@
-"""Make a newcomer's mistakes, and write what they are told into docs/first_hour.md.
+"""Make frequent mistakes and write their error messages into docs/first_hour.md.
 
     .venv/bin/python docs/first_hour.py
 
@@ -29,7 +29,7 @@ ROOT = PAGE.parent.parent
 
 
 class Edit(NamedTuple):
-    """Something written wrong in a file that was right."""
+    """A wrong line in a file."""
 
     file: str
     right: str
@@ -37,7 +37,7 @@ class Edit(NamedTuple):
 
 
 class Mistake(NamedTuple):
-    """What somebody does."""
+    """A mistake: a command or a line of Python, and a wrong line in a file."""
 
     title: str
     typed: str
@@ -50,70 +50,78 @@ IK = "rps-pin ik --robot mine.yaml --pose 0.22 0 0"
 DESCRIBE = "rps-pin describe four_bar.yaml"
 
 ROBOT = (
-    Mistake("The file is not there", "rps-pin ik --robot my.yaml --pose 0.22 0 0"),
-    Mistake("A preset misspelt", "rps-pin helix --robot mirco"),
-    Mistake("A command misspelt", "rps-pin hleix"),
-    Mistake("A key misspelt", IK, Edit(MINE, "base_radius: 0.12", "base_radus: 0.12")),
-    Mistake("A key left out", IK, Edit(MINE, "base_radius: 0.12\n", "")),
-    Mistake("A unit written out", IK, Edit(MINE, "base_radius: 0.12", "base_radius: 0.12 m")),
-    Mistake("A decimal comma", IK, Edit(MINE, "base_radius: 0.12", "base_radius: 0,12")),
+    Mistake("Missing file", "rps-pin ik --robot my.yaml --pose 0.22 0 0"),
+    Mistake("Misspelt preset", "rps-pin helix --robot mirco"),
+    Mistake("Misspelt command", "rps-pin hleix"),
+    Mistake("Misspelt key", IK, Edit(MINE, "base_radius: 0.12", "base_radus: 0.12")),
+    Mistake("Missing key", IK, Edit(MINE, "base_radius: 0.12\n", "")),
+    Mistake("Number with a unit", IK, Edit(MINE, "base_radius: 0.12", "base_radius: 0.12 m")),
+    Mistake("Decimal comma", IK, Edit(MINE, "base_radius: 0.12", "base_radius: 0,12")),
     Mistake(
-        "Millimetres",
+        "Millimetres instead of metres",
         "rps-pin helix --robot mine.yaml",
         Edit(MINE, "base_radius: 0.12\n", "base_radius: 120\n"),
     ),
-    Mistake("kg mm^2", IK, Edit(MINE, "leg_inertia: 0.00065625\n", "leg_inertia: 656.25\n")),
     Mistake(
-        "A sign in an inertia", IK, Edit(MINE, "- [0.00432, 0.0, 0.0]", "- [-0.00432, 0.0, 0.0]")
+        "kg mm^2 instead of kg m^2",
+        IK,
+        Edit(MINE, "leg_inertia: 0.00065625\n", "leg_inertia: 656.25\n"),
     ),
     Mistake(
-        "An inertia of no body", IK, Edit(MINE, "- [0.0, 0.0, 0.00864]", "- [0.0, 0.0, 0.0864]")
+        "Negative moment of inertia",
+        IK,
+        Edit(MINE, "- [0.00432, 0.0, 0.0]", "- [-0.00432, 0.0, 0.0]"),
     ),
-    Mistake("A colon forgotten", IK, Edit(MINE, "base_radius: 0.12", "base_radius 0.12")),
-    Mistake("A pose out of reach", "rps-pin ik --robot micro --pose 0.22 0.3 0"),
-    Mistake("Lengths in millimetres", "rps-pin fk --robot micro --lengths 223 223 223"),
-    Mistake("A pose of two numbers", "rps-pin ik --robot micro --pose 0.22 0.3"),
-    Mistake("A trajectory without units", "rps-pin dynamics path.csv --robot micro"),
+    Mistake(
+        "Inertia that no rigid body has",
+        IK,
+        Edit(MINE, "- [0.0, 0.0, 0.00864]", "- [0.0, 0.0, 0.0864]"),
+    ),
+    Mistake("Missing colon", IK, Edit(MINE, "base_radius: 0.12", "base_radius 0.12")),
+    Mistake("Pose out of reach", "rps-pin ik --robot micro --pose 0.22 0.3 0"),
+    Mistake("Leg lengths in millimetres", "rps-pin fk --robot micro --lengths 223 223 223"),
+    Mistake("Pose of two numbers", "rps-pin ik --robot micro --pose 0.22 0.3"),
+    Mistake("CSV column without a unit", "rps-pin dynamics path.csv --robot micro"),
 )
 OWN_MECHANISM = (
-    Mistake("A URDF where a description belongs", "rps-pin describe four_bar.urdf"),
+    Mistake("URDF instead of a mechanism file", "rps-pin describe four_bar.urdf"),
     Mistake(
-        "Of another name", DESCRIBE, Edit(MECHANISM, "urdf: four_bar.urdf", "urdf: fuor_bar.urdf")
+        "Misspelt URDF file",
+        DESCRIBE,
+        Edit(MECHANISM, "urdf: four_bar.urdf", "urdf: fuor_bar.urdf"),
     ),
     Mistake(
-        "A frame misspelt", DESCRIBE, Edit(MECHANISM, "frame_b: rocker_tip", "frame_b: rocker_top")
+        "Misspelt frame", DESCRIBE, Edit(MECHANISM, "frame_b: rocker_tip", "frame_b: rocker_top")
     ),
-    Mistake("No such kind", DESCRIBE, Edit(MECHANISM, "kind: revolute", "kind: hinge")),
+    Mistake("Unknown kind of closure", DESCRIBE, Edit(MECHANISM, "kind: revolute", "kind: hinge")),
     Mistake(
-        "The link for its joint",
+        "Link instead of a joint",
         DESCRIBE,
         Edit(MECHANISM, "actuated: [crank_joint]", "actuated: [crank]"),
     ),
-    Mistake("A wrong axis", DESCRIBE, Edit(MECHANISM, "axis: [0, 1, 0]", "axis: [1, 0, 0]")),
+    Mistake("Wrong axis", DESCRIBE, Edit(MECHANISM, "axis: [0, 1, 0]", "axis: [1, 0, 0]")),
     Mistake(
-        "In the URDF: a parent", DESCRIBE, Edit(TREE, 'parent link="crank"', 'parent link="crnak"')
+        "URDF: misspelt parent", DESCRIBE, Edit(TREE, 'parent link="crank"', 'parent link="crnak"')
     ),
-    Mistake("In the URDF: a tag", DESCRIBE, Edit(TREE, "</link>", "</lnik>")),
-    Mistake("In the URDF: an attribute", DESCRIBE, Edit(TREE, 'ixx="0.004"', 'ixxx="0.004"')),
-    Mistake("In the URDF: a mass", DESCRIBE, Edit(TREE, 'mass value="1.1"', 'mass value="-1.1"')),
+    Mistake("URDF: misspelt tag", DESCRIBE, Edit(TREE, "</link>", "</lnik>")),
+    Mistake("URDF: misspelt attribute", DESCRIBE, Edit(TREE, 'ixx="0.004"', 'ixxx="0.004"')),
+    Mistake("URDF: negative mass", DESCRIBE, Edit(TREE, 'mass value="1.1"', 'mass value="-1.1"')),
 )
 PYTHON = (
-    Mistake("A name instead of parameters", 'RPSRobot("micro")'),
-    Mistake("Three numbers instead of a pose", "micro.inverse_kinematics([0.22, 0.1])"),
+    Mistake("Name instead of parameters", 'RPSRobot("micro")'),
+    Mistake("Array of two numbers", "micro.inverse_kinematics([0.22, 0.1])"),
+    Mistake("Pose instead of a configuration", "micro.inverse_dynamics(pose, rate, acceleration)"),
     Mistake(
-        "A pose instead of a configuration", "micro.inverse_dynamics(pose, rate, acceleration)"
-    ),
-    Mistake(
-        "A pair instead of a closure",
+        "Pair instead of a closure",
         'ClosedLoopModel.from_urdf("four_bar.urdf", [("a", "b")], [])',
     ),
-    Mistake("A time after the end", "path.sample(7.0)"),
+    Mistake("Time after the end", "path.sample(7.0)"),
 )
 PARTS = {"robot": ROBOT, "mechanism": OWN_MECHANISM, "python": PYTHON}
 
 
 def main() -> None:
-    """Write the page's messages anew."""
+    """Write the messages of the page."""
     text = PAGE.read_text("utf-8")
     for name, mistakes in PARTS.items():
         start, end = f"<!-- made by docs/first_hour.py: {name} -->\n", "<!-- end -->"
@@ -124,7 +132,7 @@ def main() -> None:
 
 
 def told(mistakes: tuple[Mistake, ...]) -> str:
-    """Return mistakes and what is said to them, as Markdown."""
+    """Return mistakes and their messages as Markdown."""
     parts = []
     for mistake in mistakes:
         edit = mistake.edit
@@ -138,7 +146,7 @@ def told(mistakes: tuple[Mistake, ...]) -> str:
 
 
 def answer(mistake: Mistake) -> str:
-    """Make a mistake; return what is said, and fail if nothing is or it is a traceback."""
+    """Make a mistake and return its message; fail if there is none or it is a traceback."""
     with right_files() as folder:
         edit = mistake.edit
         if edit:
@@ -154,7 +162,7 @@ def answer(mistake: Mistake) -> str:
 
 @contextlib.contextmanager
 def right_files() -> Iterator[Path]:
-    """Work in a folder with a robot, a mechanism and a trajectory; all but that one are right."""
+    """Change to a folder with a correct robot and mechanism, and a CSV file without units."""
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
         folder = Path(name)
         RPSParameters.from_preset("micro").to_yaml(MINE)
@@ -165,7 +173,7 @@ def right_files() -> Iterator[Path]:
 
 
 def of_command(line: str) -> str:
-    """Return what a command that fails writes to standard error."""
+    """Return the standard error of a command."""
     screen = {"COLUMNS": "90", "TERM": "dumb"}
     said = io.StringIO()
     with (
@@ -188,7 +196,7 @@ def of_command(line: str) -> str:
 
 
 def of_python(line: str) -> str:
-    """Return the error of a line of Python."""
+    """Return the error message of a line of Python."""
     micro = rps_pin.RPSRobot.from_preset("micro")
     names = {name: getattr(rps_pin, name) for name in ("RPSRobot", "ClosedLoopModel")}
     still = np.zeros(3)
@@ -202,7 +210,7 @@ def of_python(line: str) -> str:
 
 
 def folded(text: str) -> str:
-    """Return lines broken at blanks where they are too long for a page."""
+    """Return text with long lines broken at blanks."""
     lines = []
     for line in text.strip().splitlines():
         now = ""

@@ -1,4 +1,4 @@
-"""Draw every figure of rps_pin.plots: docs/gallery.md and its pictures.
+"""Draw the figures of rps_pin.plots: docs/gallery.md and its pictures.
 
 .venv/bin/python docs/gallery.py
 """
@@ -25,7 +25,7 @@ DPI = 72
 
 
 def figures() -> dict[str, tuple[str, Callable[[], Figure]]]:
-    """Return what each function shows, and a call that draws it, by its name."""
+    """Return the title and a call of each function, by its name."""
     sokolov, micro = RPSRobot.from_preset("sokolov"), RPSRobot.from_preset("micro")
     path = helix(sokolov, radius=0.75e-3, pitch=0.5e-3, height=0.4)
     run = run_motion(sokolov, path, sample_rate=200.0)
@@ -42,12 +42,12 @@ def figures() -> dict[str, tuple[str, Callable[[], Figure]]]:
     heights = np.linspace(0.15, 0.6, 61)
     modes = micro.assembly_modes([0.225] * 3)
     return {
-        "plot_path": ("where the centre goes", lambda: plots.plot_path(run)),
+        "plot_path": ("path of the platform's centre", lambda: plots.plot_path(run)),
         "plot_lengths": ("leg lengths over time", lambda: plots.plot_lengths(run)),
         "plot_forces": ("actuator forces over time", lambda: plots.plot_forces(run)),
         "plot_length_phase": ("speed over length", lambda: plots.plot_length_phase(run)),
         "plot_force_causes": (
-            "what the forces come from",
+            "actuator forces by cause",
             lambda: plots.plot_force_causes(time, force_causes(loaded, *task.sample(time))),
         ),
         "plot_sizing": (
@@ -55,46 +55,55 @@ def figures() -> dict[str, tuple[str, Callable[[], Figure]]]:
             lambda: plots.plot_sizing(size_trajectory(loaded, task, limits=limits)),
         ),
         "plot_assembly_modes": (
-            "every way to assemble the robot",
+            "assembly modes of given leg lengths",
             lambda: plots.plot_assembly_modes(micro.parameters, modes),
         ),
         "plot_theoretical": (
             "the theoretical workspace",
             lambda: plots.plot_theoretical(micro.parameters),
         ),
-        "plot_effective": ("the effective one within it", lambda: plots.plot_effective(space)),
-        "plot_space": ("its boundary in space", lambda: plots.plot_space(space)),
-        "plot_views": ("its points from three sides", lambda: plots.plot_views(space)),
+        "plot_effective": (
+            "the effective workspace within it",
+            lambda: plots.plot_effective(space),
+        ),
+        "plot_space": ("boundary of the workspace in space", lambda: plots.plot_space(space)),
+        "plot_views": (
+            "positions of the workspace in three planes",
+            lambda: plots.plot_views(space),
+        ),
         "plot_reasons": (
-            "which tilts are free, and what is in the way of others",
+            "reachable tilts, and the reasons why others are not",
             lambda: plots.plot_reasons(slices, 0.225),
         ),
         "plot_comparison": (
-            "the reach over the base radius, beside what the paper states",
+            "extent of the workspace over the base radius, with the paper's values",
             lambda: plots.plot_comparison(paper_comparison(points=11)),
         ),
         "plot_tilt_conditioning": (
-            "how far tilts are from a singularity",
+            "singularity measure over the tilt",
             lambda: plots.plot_tilt_conditioning(sokolov.parameters, 0.4),
         ),
         "plot_height_conditioning": (
-            "the same over height and tilt",
+            "singularity measure over height and tilt",
             lambda: plots.plot_height_conditioning(sokolov.parameters, heights),
         ),
-        "plot_tracking": ("a controller's errors", lambda: plots.plot_tracking(controlled)),
+        "plot_tracking": (
+            "tracking errors of a controller",
+            lambda: plots.plot_tracking(controlled),
+        ),
         "plot_loop_forces": (
-            "a controller's forces, and what it said",
+            "forces and status of a controller",
             lambda: plots.plot_loop_forces(controlled),
         ),
         "plot_simulation": (
-            "a simulated mechanism",
+            "simulation of a mechanism",
             lambda: plots.plot_simulation(falling, four_bar),
         ),
     }
 
 
 def loop(robot: RPSRobot) -> LoopRun:
-    """Return a controlled motion through encoders, from rest."""
+    """Return a controlled motion with encoders."""
     path = circle(height=0.223, tilt=0.05, duration=0.5)
     start = path.sample(0.0).pose
     controller = ComputedTorque(robot, start, Gains.placed(15.0, integral=0.2))
@@ -109,8 +118,8 @@ def main() -> None:
         "<!-- made by docs/gallery.py -->",
         "# Gallery",
         "",
-        "Every figure of `rps_pin.plots`. Each takes axes of your own (`axes=`), or, drawn in",
-        "space, a figure (`figure=`). `docs/gallery.py` has the calls.",
+        "The figures of `rps_pin.plots`. Most take existing axes (`axes=`); those in 3D take",
+        "an existing figure (`figure=`). `docs/gallery.py` contains the calls.",
     ]
     for name, (shows, draw) in figures().items():
         draw().savefig(IMAGES / f"{name}.png", dpi=DPI)
