@@ -20,11 +20,11 @@ from rps_pin.paper.comparison import (
     dense_times,
     distance,
     force_range,
-    forces_of,
     path_result,
     relabelled,
 )
 from rps_pin.paper.compute import Reproduction
+from rps_pin.paper.force_parts import combined
 from rps_pin.paper.interpretations import PathInterpretation
 from rps_pin.paper.paper_data import THIS_STUDY, ForceRange
 from rps_pin.paper.paper_helix import PaperHelix
@@ -166,8 +166,10 @@ def test_comparisons_are_sorted_and_their_forces_can_be_had(found: Reproduction)
     assert len(rows) == 24 * len(regular)
     assert (np.diff([row.distance for row in rows]) >= -1e-9).all()
     for row in rows[::40]:
-        times, force = forces_of(found.paths, row)
-        assert force.shape == (times.size, 3)
+        result = next(one for one in regular if one.interpretation == row.path)
+        assert result.parts is not None
+        force = combined(result.parts, row.body)
+        assert force.shape == (result.times.size, 3)
         assert force_range(force) == row.forces
         assert row.distance == distance(row.forces)
         assert row.distance_relabelled == distance(row.relabelled)

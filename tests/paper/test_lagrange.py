@@ -356,7 +356,7 @@ def test_poses_that_do_not_determine_the_multipliers_are_refused(pose: list[floa
 
 def test_bad_input_is_refused_by_name() -> None:
     p = sokolov()
-    with pytest.raises(InputError, match="'eq_12'; the equations to choose from: eq_14, eq_19"):
+    with pytest.raises(InputError, match="as_printed = 'eq_12': it must be 'eq_14' or 'eq_19'"):
         lagrange_forces(p, LEVEL, STILL, STILL, as_printed=["eq_12"])
     with pytest.raises(InputError, match="rate is not finite"):
         lagrange_forces(p, LEVEL, [0, np.nan, 0], STILL)

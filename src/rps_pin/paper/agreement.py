@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array
+from rps_pin.paper.interpretations import BRANCHES
 from rps_pin.paper.lagrange import lagrange_forces
+from rps_pin.paper.paper_helix import regular_helix
 from rps_pin.paper.virtual_work import virtual_work_forces
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.measures import singularity_measures
-from rps_pin.trajectories.helix import helix
 
 Progress = Callable[[Iterable[int]], Iterable[int]]
 
@@ -86,9 +87,9 @@ def random_agreement(
 def helix_agreement(samples: int = 500) -> dict[str, Agreement]:
     """Return the agreement along the helix of Table 1, z_0 = 0.4 m, by branch."""
     robot = RPSRobot.from_preset("sokolov")
-    found = {}
-    for branch in ("+", "-"):
-        path = helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4, branch=branch)
+    found: dict[str, Agreement] = {}
+    for branch in BRANCHES:
+        path = regular_helix(robot, branch)
         times = np.linspace(0.0, path.duration, samples)
         found[branch] = _agreement(robot, *path.sample(times))
     return found

@@ -205,11 +205,3 @@ def compare(paths: Iterable[PathResult]) -> list[Comparison]:
                 )
             )
     return sorted(rows, key=lambda row: round(row.distance, 9))
-
-
-def forces_of(paths: Iterable[PathResult], row: Comparison) -> tuple[Array, Array]:
-    """Return times (n,), s, and forces (n, 3), N, of an interpretation that was compared."""
-    for result in paths:
-        if result.interpretation == row.path and result.parts is not None:
-            return result.times, combined(result.parts, row.body)
-    raise InputError(f"no path was computed for {row.path}")

@@ -14,12 +14,11 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.paper import paper_data as paper
 from rps_pin.paper.lagrange_terms import constraints, energies
-from rps_pin.paper.paper_helix import corrected_turn
+from rps_pin.paper.paper_helix import corrected_turn, regular_helix
 from rps_pin.rps.kinematics.assembly_modes import eliminant
 from rps_pin.rps.kinematics.legs import RADIAL, LegMotion
 from rps_pin.rps.kinematics.pose import PlatformMotion
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.trajectories.helix import helix
 
 SEED = 17
 _STATES = 1000
@@ -59,20 +58,8 @@ def _kinematics(
     d, phi = legs.length, legs.angle
     found = robot.inverse_kinematics(pose)
     inwards = g - d * np.cos(phi)
-    eq_7 = np.stack(
-        [
-            np.stack([inwards[:, 0], 0 * inwards[:, 0], d[:, 0] * np.sin(phi[:, 0])], axis=-1),
-            np.stack(
-                [-inwards[:, 1] / 2, _ROOT_3 / 2 * inwards[:, 1], d[:, 1] * np.sin(phi[:, 1])],
-                axis=-1,
-            ),
-            np.stack(
-                [-inwards[:, 2] / 2, -_ROOT_3 / 2 * inwards[:, 2], d[:, 2] * np.sin(phi[:, 2])],
-                axis=-1,
-            ),
-        ],
-        axis=1,
-    )
+    x, y = np.array([1, -1 / 2, -1 / 2]), np.array([0, _ROOT_3 / 2, -_ROOT_3 / 2])
+    eq_7 = np.stack([inwards * x, inwards * y, d * np.sin(phi)], axis=-1)
     open_angle = phi + 0.3  # not closed: Eq. 8 is tried where it is not zero, too
     return {
         1: _largest(eq_1 - eq_2) / h,
@@ -147,7 +134,7 @@ def _energies(robot: RPSRobot, platform: PlatformMotion, legs: LegMotion) -> dic
 
 def _helix(robot: RPSRobot) -> dict[int | str, float]:
     radius, pitch, height = paper.HELIX_RADIUS * 1e-3, paper.HELIX_PITCH * 1e-3, 0.4
-    path = helix(robot, radius=radius, pitch=pitch, height=height)
+    path = regular_helix(robot)
     times = np.linspace(0.0, path.duration, _STATES)
     phi = corrected_turn(times)[0]
     x, y, z = robot.platform_placement(path.sample(times).pose)[0].T

@@ -38,7 +38,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError
 from rps_pin.paper.lagrange_vectors import (
     MovingVectors,
     leg_vectors,
@@ -47,9 +46,10 @@ from rps_pin.paper.lagrange_vectors import (
     times,
     tip_vectors,
 )
-from rps_pin.rps.checks import finite_entries
-from rps_pin.rps.kinematics import leg_equations
+from rps_pin.rps.kernels import leg_equations
+from rps_pin.rps.kinematics.leg_equations import checked_lengths
 from rps_pin.rps.parameters import RPSParameters
+from rps_pin.validation import choice, one_shape, real_array
 
 #: The equations that can be taken as printed.
 PRINTED = ("eq_14", "eq_19")
@@ -111,7 +111,7 @@ def lagrange_terms(
         no such printed equation.
     """
     d, phi, dd, dphi = _checked(length, angle, speed, angle_rate)
-    printed = checked_equations(as_printed)
+    printed = _printed(as_printed)
     rate = np.concatenate([dd, dphi], axis=-1)
     tips = tip_vectors(parameters.base_radius, d, phi, dd, dphi)
     r = platform_vectors(tips, parameters.platform_radius, rate)
@@ -135,7 +135,7 @@ def energies(
 ) -> Energies:
     """Return the energies of Eq. 13, 16, 19 and 21. Arguments and errors as `lagrange_terms`."""
     d, phi, dd, dphi = _checked(length, angle, speed, angle_rate)
-    printed = checked_equations(as_printed)
+    printed = _printed(as_printed)
     rate = np.concatenate([dd, dphi], axis=-1)
     tips = tip_vectors(parameters.base_radius, d, phi, dd, dphi)
     r = platform_vectors(tips, parameters.platform_radius, rate)
@@ -166,65 +166,48 @@ def constraints(parameters: RPSParameters, length: ArrayLike, angle: ArrayLike) 
     InputError
         If an argument is not finite, a length not positive, or shapes do not go together.
     """
-    d, phi, _, _ = _checked(length, angle, np.zeros(3), np.zeros(3))
+    d, phi, _, _ = _checked(length, angle)
     g, h = parameters.base_radius, parameters.platform_radius
-    d = np.moveaxis(d, -1, 0)
-    w, z = d * np.cos(np.moveaxis(phi, -1, 0)), d * np.sin(np.moveaxis(phi, -1, 0))
-    return np.stack(leg_equations.left_sides(w, z, g, leg_equations.constants(d, g, h)), axis=-1)
-
-
-def checked_equations(as_printed: Collection[str]) -> frozenset[str]:
-    """Return the equations to take as printed.
-
-    Raises
-    ------
-    InputError
-        If there is no such choice; the message lists those there are.
-    """
-    names = (as_printed,) if isinstance(as_printed, str) else tuple(as_printed)
-    for name in names:
-        if name not in PRINTED:
-            raise InputError(
-                f"as_printed has {name!r}; the equations to choose from: {', '.join(PRINTED)}"
-            )
-    return frozenset(names)
+    d, phi = np.moveaxis(d, -1, 0), np.moveaxis(phi, -1, 0)
+    constant = leg_equations.constants(d, g, h)
+    return np.stack(
+        [*leg_equations.residuals(d * np.cos(phi), d * np.sin(phi), g, constant)], axis=-1
+    )
 
 
 # Inner workings -----------------------------------------------------------------------------------
 
 
+def _printed(as_printed: Collection[str]) -> frozenset[str]:
+    names = (as_printed,) if isinstance(as_printed, str) else as_printed
+    return frozenset(choice(name, "as_printed", PRINTED) for name in names)
+
+
 def _checked(
-    length: ArrayLike, angle: ArrayLike, speed: ArrayLike, angle_rate: ArrayLike
+    length: ArrayLike, angle: ArrayLike, speed: ArrayLike = (0, 0, 0), rate: ArrayLike = (0, 0, 0)
 ) -> tuple[Array, ...]:
-    arrays = (
-        leg_equations.checked_lengths(length),
-        finite_entries(angle, (3,), "angle"),
-        finite_entries(speed, (3,), "speed"),
-        finite_entries(angle_rate, (3,), "angle_rate"),
+    return one_shape(
+        length=checked_lengths(length),
+        angle=real_array(angle, "angle", (3,)),
+        speed=real_array(speed, "speed", (3,)),
+        angle_rate=real_array(rate, "angle_rate", (3,)),
     )
-    try:
-        return tuple(np.broadcast_arrays(*arrays))
-    except ValueError:
-        shapes = ", ".join(str(array.shape) for array in arrays)
-        raise InputError(
-            f"length, angle, speed and angle_rate have shapes {shapes}, which do not go together"
-        ) from None
 
 
 def _constraint_jacobian(parameters: RPSParameters, length: Array, angle: Array) -> Array:
     """Return A = df/dx of Eq. 8, shape (..., 3, 6), of d (m) and phi (rad), shape (..., 3)."""
     g = parameters.base_radius
-    cosine, sine = np.cos(np.moveaxis(angle, -1, 0)), np.sin(np.moveaxis(angle, -1, 0))
-    d = np.moveaxis(length, -1, 0)
+    d, phi = np.moveaxis(length, -1, 0), np.moveaxis(angle, -1, 0)
+    cosine, sine = np.cos(phi), np.sin(phi)
     w, z = d * cosine, d * sine
     rho = g - w
-    matrix = np.zeros((*length.shape, 6))
     by_angles = leg_equations.slopes(w, z, g)
-    for row, ((i, j), slopes) in enumerate(zip(leg_equations.PAIRS, by_angles, strict=True)):
+    matrix = np.zeros((*length.shape, 6))
+    for row, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
         # f_ij = rho_i^2 + rho_i rho_j + rho_j^2 + (z_i - z_j)^2 - 3 h^2, drho_i/dd_i = -cos(phi_i)
         matrix[..., row, i] = -(2 * rho[i] + rho[j]) * cosine[i] + 2 * (z[i] - z[j]) * sine[i]
         matrix[..., row, j] = -(2 * rho[j] + rho[i]) * cosine[j] - 2 * (z[i] - z[j]) * sine[j]
-        matrix[..., row, 3 + i], matrix[..., row, 3 + j] = slopes
+        matrix[..., row, 3 + i], matrix[..., row, 3 + j] = by_angles[2 * row : 2 * row + 2]
     return matrix
 
 

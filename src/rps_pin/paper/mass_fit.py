@@ -72,11 +72,9 @@ class MovedFit(NamedTuple):
     """The platform's mass that brings a moved path nearest to a column of Table 2."""
 
     moved: str
-    """``"z_0"``, ``"r_h"`` or ``"p_h"``."""
     by: float
-    """m."""
     platform_mass: float
-    """Kg; not a number if the path crosses a singularity."""
+    """Kg; NaN if the path crosses a singularity."""
     distance: float
     """Likewise."""
 

@@ -10,18 +10,11 @@ from typing import Any
 import numpy as np
 
 from rps_pin.arrays import Array
+from rps_pin.paper import agreement, interpretations, misprints, tables
 from rps_pin.paper import paper_data as paper
-from rps_pin.paper import tables
-from rps_pin.paper.agreement import NEAREST
 from rps_pin.paper.comparison import Comparison
 from rps_pin.paper.compute import EQUAL_LENGTH, ColumnFits, Reproduction
-from rps_pin.paper.interpretations import (
-    DISC_MASS,
-    ROD_MASS,
-    STANDARD_GRAVITY,
-    PathInterpretation,
-)
-from rps_pin.paper.misprints import STATES
+from rps_pin.paper.interpretations import STANDARD_GRAVITY, PathInterpretation
 from rps_pin.rps.parameters import RPSParameters
 
 _QUICK_NOTE = """**This is a quick run**: coarser grids, and a part of the interpretations only.
@@ -86,20 +79,24 @@ def summary_lines(found: Reproduction) -> list[tuple[str, str]]:
         "forces of Table 1 from z_0 = 0.4 m": "{clean_forces} N",
         "interpretations of Table 1": "{interpretation_count:,} on {path_count} paths",
         "closest to Table 2": "{best_path}; distance {best.distance_relabelled:.3f}",
-        "the same with the platform's mass fitted": "within {this.fits[0].distance:.1%} at "
-        "{this.fits[0].platform_mass:.1f} kg; Sokolov: {sokolov.fits[0].distance:.1%} at "
-        "{sokolov.fits[0].platform_mass:.1f} kg",
+        "the same with the platform's mass fitted": "within "
+        "{found.fits[This study].fits[0].distance:.1%} at "
+        "{found.fits[This study].fits[0].platform_mass:.1f} kg; Sokolov: "
+        "{found.fits[Sokolov].fits[0].distance:.1%} at "
+        "{found.fits[Sokolov].fits[0].platform_mass:.1f} kg",
     }
     values, formatter = _values(found), _PageFormatter()
     return [(name, formatter.vformat(text, (), values)) for name, text in lines.items()]
 
 
 class _PageFormatter(Formatter):
-    """Formats fields; the spec ``error`` gives a bound, and percents have a space."""
+    """Formats fields; ``error`` gives a bound, ``list`` joins, percents have a space."""
 
     def format_field(self, value: Any, format_spec: str) -> Any:
         if format_spec == "error":
             return tables.error(value)
+        if format_spec == "list":
+            return ", ".join(value)
         text = super().format_field(value, format_spec)
         return f"{text[:-1]} %" if format_spec.endswith("%") else text
 
@@ -110,12 +107,11 @@ def _values(found: Reproduction) -> dict[str, Any]:
     return {
         "found": found,
         "paper": paper,
-        "checks": found.checks,
-        "misprints": found.misprints,
-        "balances": found.balances,
+        "choices": interpretations,
+        "misprints": misprints,
+        "agreement": agreement,
+        "masses": tables.masses(),
         "best": best,
-        "this": found.fits["This study"],
-        "sokolov": found.fits["Sokolov"],
         "tables": _tables(found, best),
         **_of_equations(found),
         **_of_statements(found),
@@ -125,12 +121,11 @@ def _values(found: Reproduction) -> dict[str, Any]:
 
 def _tables(found: Reproduction, best: Comparison) -> dict[str, str]:
     whole = (
-        *(tables.reach, tables.helix_ranges, tables.agreement, tables.probes, tables.sampled),
-        *(tables.crossings, tables.paths, tables.fits, tables.moved),
+        *(tables.reach, tables.helix_ranges, tables.probes, tables.sampled, tables.crossings),
+        *(tables.paths, tables.fits, tables.moved),
     )
     return {
         **{table.__name__: table(found) for table in whole},
-        "grid": tables.grid(),
         "closest": tables.closest(found, relabelled=False),
         "closest_relabelled": tables.closest(found, relabelled=True),
         "differences": tables.differences(best),
@@ -145,10 +140,8 @@ def _of_equations(found: Reproduction) -> dict[str, Any]:
         "status": status,
         "corrected": corrected,
         "reproduced": len(status) - corrected,
-        "misprint_states": STATES,
         "solutions": 2 * found.degree,
         "most_solutions": max(found.counts),
-        "nearest_limit": NEAREST,
     }
 
 
@@ -165,8 +158,6 @@ def _of_statements(found: Reproduction) -> dict[str, Any]:
         "modes_above": above,
         "modes_below": modes - above,
         "equal_length": 1e3 * EQUAL_LENGTH,
-        "cylinder_error": found.cylinder[0],
-        "cylinder_reach": found.cylinder[1],
         "points": _points(),
         "step": (high - low) / (paper.STATED_POINTS - 1),
         "greatest_g": 1e3 * found.greatest_base_radius,
@@ -179,9 +170,7 @@ def _of_statements(found: Reproduction) -> dict[str, Any]:
         "table_1": table_1,
         "inertia": np.diag(table_1.platform_inertia),
         "inertia_excess": zz - xx - yy,
-        "disc_mass": DISC_MASS,
         "disc_radius": math.sqrt(2 * zz / paper.PLATFORM_MASS),
-        "rod_mass": ROD_MASS,
         "gyration": math.sqrt(paper.LEG_INERTIA / paper.LEG_MASS),
         "longest_leg": max(run.length.max() for run in found.runs.values()),
         "sokolov_ratio_low": ratio.min(),

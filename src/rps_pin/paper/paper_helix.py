@@ -15,13 +15,15 @@ from rps_pin.errors import InputError
 from rps_pin.paper.paper_data import (
     BRAKE_START,
     END,
+    HELIX_HEIGHT,
     HELIX_PITCH,
     HELIX_RADIUS,
     PRINTED_TIMES,
     RAMP_END,
     ROOT,
 )
-from rps_pin.trajectories.helix import Branch
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.trajectories.helix import Branch, HelixPath, helix
 from rps_pin.trajectories.path import PathSample, Trajectory, checked_times
 
 #: An equation corrected, or as the paper prints it.
@@ -104,6 +106,17 @@ class PaperHelix:
             _pose(self._climb * dphi, dw),
             _pose(self._climb * ddphi, ddw),
         )
+
+
+def regular_helix(robot: RPSRobot, branch: Branch = "+") -> HelixPath:
+    """Return Table 1's helix with z_0 = 0.4 m instead of 0.4 mm: it meets no singularity."""
+    return helix(
+        robot,
+        radius=1e-3 * HELIX_RADIUS,
+        pitch=1e-3 * HELIX_PITCH,
+        height=HELIX_HEIGHT,
+        branch=branch,
+    )
 
 
 class PartOfPath:

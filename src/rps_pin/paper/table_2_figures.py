@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rps_pin.paper import paper_data as paper
@@ -15,28 +16,24 @@ from rps_pin.plots.style import LEG_COLOURS, STYLE
 
 _SIZE = (6.4, 3.8)
 _BLACK, _GREY = "#000000", "#999999"
+_DISTANCE, _FORCE = "distance to the singularity (1)", "largest $|F_i|$ (N)"
 
 
 def plot_approach(found: Approach) -> Figure:
     """Draw the largest force over the distance to the singularity, both logarithmic."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=_SIZE, layout="constrained")
-        axes = figure.add_subplot()
+        axes = _axes("Into the first crossing of $z_0$ = 0.4 mm", _DISTANCE, _FORCE)
         axes.loglog(found.distance, found.force, ".", color=LEG_COLOURS[0], label="computed")
         line = found.force[-1] * found.distance[-1] / found.distance
         axes.loglog(found.distance, line, "--", color=_BLACK, lw=1, label="slope -1")
-        axes.set_xlabel("distance to the singularity (1)")
-        axes.set_ylabel("largest $|F_i|$ (N)")
-        axes.set_title("Into the first crossing of $z_0$ = 0.4 mm", loc="left")
-        axes.legend(frameon=False)
-    return figure
+        return _with_legend(axes)
 
 
 def plot_probes(probes: list[Probe]) -> Figure:
     """Draw the largest force over the smallest distance of paths that do not cross."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=_SIZE, layout="constrained")
-        axes = figure.add_subplot()
+        title = "$r_h$ = 75 mm, $p_h$ = 50 mm, Table 1's masses"
+        axes = _axes(title, "smallest distance to a singularity (1)", _FORCE)
         for branch, colour, mark in zip("+-", LEG_COLOURS, "os", strict=False):
             kept = [(p, p.forces) for p in probes if p.branch == branch and p.forces is not None]
             largest = [np.abs(forces.numbers()).max() for _, forces in kept]
@@ -44,29 +41,21 @@ def plot_probes(probes: list[Probe]) -> Figure:
             axes.loglog(nearest, largest, mark, color=colour, label=f"branch {branch}")
         table = float(np.abs(paper.THIS_STUDY.numbers()).max())
         axes.axhline(table, color=_BLACK, lw=1, ls=":", label="Table 2's largest")
-        axes.set_xlabel("smallest distance to a singularity (1)")
-        axes.set_ylabel("largest $|F_i|$ (N)")
-        axes.set_title("$r_h$ = 75 mm, $p_h$ = 50 mm, Table 1's masses", loc="left")
-        axes.legend(frameon=False)
-    return figure
+        return _with_legend(axes)
 
 
 def plot_interpretations(found: Reproduction) -> Figure:
-    """Draw every interpretation that has forces: its distance to Table 2 over its largest force."""
+    """Draw every interpretation that has forces: its distance to Table 2, its largest force."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=_SIZE, layout="constrained")
-        axes = figure.add_subplot()
+        title = "Every interpretation that has forces, legs in any order"
+        axes = _axes(title, _FORCE, "distance to Table 2 (1)")
         for form, colour, mark in zip(("corrected", "printed"), LEG_COLOURS, ".x", strict=False):
             kept = [row for row in found.comparisons if row.path.eq_29 == form]
             largest = [float(np.abs(row.forces.numbers()).max()) for row in kept]
             distance = [row.distance_relabelled for row in kept]
             axes.loglog(largest, distance, mark, ms=4, color=colour, label=f"Eq. 29 {form}")
         axes.axhline(1.0, color=_BLACK, lw=1, ls=":", label="no forces at all")
-        axes.set_xlabel("largest $|F_i|$ (N)")
-        axes.set_ylabel("distance to Table 2 (1)")
-        axes.set_title("Every interpretation that has forces, legs in any order", loc="left")
-        axes.legend(frameon=False)
-    return figure
+        return _with_legend(axes)
 
 
 def plot_table_2(found: Reproduction) -> Figure:
@@ -119,4 +108,18 @@ def plot_fit(found: Reproduction) -> Figure:
             axes.set_title(f"{column}: m = {fit.platform_mass:.1f} kg", loc="left")
         figure.axes[0].set_ylabel("force (N); dotted: Table 2")
         figure.axes[0].legend(loc="lower right", frameon=False, ncols=3)
+    return figure
+
+
+def _axes(title: str, x: str, y: str) -> Axes:
+    axes = Figure(figsize=_SIZE, layout="constrained").add_subplot()
+    axes.set(xlabel=x, ylabel=y)
+    axes.set_title(title, loc="left")
+    return axes
+
+
+def _with_legend(axes: Axes) -> Figure:
+    axes.legend(frameon=False)
+    figure = axes.get_figure(root=True)
+    assert figure is not None  # `_axes` made it
     return figure

@@ -10,11 +10,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from rps_pin.paper import interpretations
-from rps_pin.paper.agreement import Agreement
 from rps_pin.paper.comparison import OUT_OF_REACH, SINGULAR, Comparison, PathResult, distance
 from rps_pin.paper.compute import COLUMNS, Reproduction
-from rps_pin.paper.interpretations import PathInterpretation
+from rps_pin.paper.interpretations import BODIES, PathInterpretation
 from rps_pin.paper.paper_data import ForceRange
 
 #: Head of the columns that `forces` fills.
@@ -81,49 +79,11 @@ def helix_ranges(found: Reproduction) -> str:
     )
 
 
-def agreement(found: Reproduction) -> str:
-    """Return how well the ways to the forces agree."""
-    columns: dict[str, Agreement] = {
-        f"{found.random.drawn} random states": found.random,
-        **{f"helix, branch {branch}": one for branch, one in found.helix.items()},
-    }
-    quantities = {
-        "loop gap (m)": "gap",
-        "rate at which loops open (m/s)": "rate",
-        "its acceleration (m/s²)": "acceleration",
-        "KKT residual, of the largest force": "residual",
-        "Lagrange beside the constraint models": "lagrange",
-        "virtual work beside the constraint models": "virtual_work",
-        "Lagrange beside virtual work": "lagrange_virtual_work",
-    }
-    return markdown(
-        ["largest", *columns],
-        [
-            [text, *(error(getattr(one, name)) for one in columns.values())]
-            for text, name in quantities.items()
-        ],
-    )
-
-
-def grid() -> str:
-    """Return what each choice of the grid can be."""
-    masses = "; ".join(
-        f"{name} (m = {b.platform_mass:.2f} kg, m_leg = {b.leg_mass:.2f} kg)"
-        for name, b in interpretations.BODIES.items()
-    )
-    return markdown(
-        ["choice", "values"],
-        [
-            ["z_0 = 0.4 in", ", ".join(interpretations.UNITS)],
-            ["r_h = 0.75, p_h = 0.5 in", ", ".join(interpretations.UNITS)],
-            ["460 and 230 mm are", ", ".join(interpretations.RADII)],
-            ["branch (sign of β)", ", ".join(interpretations.BRANCHES)],
-            ["Eq. 5", ", ".join(interpretations.FORMS)],
-            ["Eq. 29", ", ".join(interpretations.FORMS)],
-            ["masses and Eq. 16", masses],
-            ["gravity and Eq. 19", ", ".join(interpretations.GRAVITIES)],
-            ["Eq. 14", ", ".join(interpretations.EQ_14)],
-        ],
+def masses() -> str:
+    """Return the masses of each choice of the bodies."""
+    return "; ".join(
+        f"{name} (m = {one.platform_mass:.2f} kg, m_leg = {one.leg_mass:.2f} kg)"
+        for name, one in BODIES.items()
     )
 
 

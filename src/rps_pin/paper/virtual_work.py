@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.kinematics import MAX_CONDITION
+from rps_pin.paper.lagrange_vectors import times
 from rps_pin.rps.checks import refuse_large_gain
 from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.kinematics.pose import checked_motion, platform_motion
@@ -86,9 +87,8 @@ def virtual_work_forces(
     SingularityError
         At a parallel singularity, where forces are infinite: says the gain and its limit.
     """
-    x, dx, ddx = checked_motion(pose, rate, acceleration)
-    legs = leg_jacobians(parameters, x)
-    needed = _pose_forces(parameters, x, dx, ddx, legs).total
+    needed = pose_forces(parameters, pose, rate, acceleration).total
+    legs = leg_jacobians(parameters, np.asarray(pose, dtype=np.float64))
     # Tilts made lengths by h, on both sides.
     units = np.array([1.0, *2 * [1 / parameters.platform_radius]])
     scaled = legs.length_jacobian * units
@@ -123,18 +123,13 @@ def pose_forces(
         If a leg has no length.
     """
     x, dx, ddx = checked_motion(pose, rate, acceleration)
-    return _pose_forces(parameters, x, dx, ddx, leg_jacobians(parameters, x))
-
-
-# Inner workings -----------------------------------------------------------------------------------
-
-
-def _pose_forces(
-    parameters: RPSParameters, x: Array, dx: Array, ddx: Array, legs: LegJacobians
-) -> PoseForces:
+    legs = leg_jacobians(parameters, x)
     return PoseForces(
         _platform_force(parameters, x, dx, ddx), *_leg_forces(parameters, x, dx, ddx, legs)
     )
+
+
+# Inner workings -----------------------------------------------------------------------------------
 
 
 def _platform_force(parameters: RPSParameters, x: Array, dx: Array, ddx: Array) -> Array:
@@ -147,7 +142,7 @@ def _platform_force(parameters: RPSParameters, x: Array, dx: Array, ddx: Array) 
     # Velocities are linear in the rate: those of unit rates are the partial velocities.
     at, still = np.broadcast_arrays(x[..., None, :], np.zeros((3, 3)))
     unit = platform_motion(at, np.broadcast_to(np.eye(3), at.shape), still, h)
-    return _times(unit.velocity, force) + _times(unit.angular_velocity, moment)
+    return times(unit.velocity, force) + times(unit.angular_velocity, moment)
 
 
 def _leg_forces(
@@ -157,9 +152,9 @@ def _leg_forces(
     p = parameters
     K, N = legs.length_jacobian, legs.angle_jacobian
     change = jacobian_rates_of_legs(p, x, dx, legs)
-    speed, turning = _times(K, dx), _times(N, dx)
-    speed_rate = _times(K, ddx) + _times(change.length_jacobian, dx)
-    turning_rate = _times(N, ddx) + _times(change.angle_jacobian, dx)
+    speed, turning = times(K, dx), times(N, dx)
+    speed_rate = times(K, ddx) + times(change.length_jacobian, dx)
+    turning_rate = times(N, ddx) + times(change.angle_jacobian, dx)
     cosine, sine = np.cos(legs.angle), np.sin(legs.angle)
     inwards, up = -(RADIAL @ p.gravity), p.gravity[2]
     # s = -cos(phi) e + sin(phi) z and t = sin(phi) e + cos(phi) z
@@ -175,11 +170,6 @@ def _leg_forces(
     rod_moment = lever * across + p.rod_inertia * turning_rate
     to_angle, to_length = np.swapaxes(N, -1, -2), np.swapaxes(K, -1, -2)
     return (
-        _times(to_angle, cylinder_moment),
-        _times(to_length, along) + _times(to_angle, rod_moment),
+        times(to_angle, cylinder_moment),
+        times(to_length, along) + times(to_angle, rod_moment),
     )
-
-
-def _times(matrix: Array, vector: Array) -> Array:
-    product: Array = np.einsum("...ij,...j->...i", matrix, vector)
-    return product

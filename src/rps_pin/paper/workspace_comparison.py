@@ -80,7 +80,7 @@ def paper_comparison(
     given = RPSParameters.from_preset("micro") if parameters is None else parameters_of(parameters)
     if len(base_radii) == 0:
         raise InputError("base_radii is empty: at least one is needed")
-    free = given.replace(leg_angle_limits=(-math.pi, math.pi), spherical_cone_limit=math.pi)
+    free = with_length_limits_only(given)
     return tuple(_row(free.replace(base_radius=float(g)), points) for g in base_radii)
 
 
@@ -107,6 +107,11 @@ def greatest_base_radius() -> float:
         return paper_comparison(micro, [base_radius], points=2)[0].reach - (STATED_REACH)
 
     return float(brentq(beyond, micro.platform_radius, 1.5 * micro.platform_radius, xtol=1e-9))
+
+
+def with_length_limits_only(parameters: RPSParameters) -> RPSParameters:
+    """Return a robot as in Section 3: only the legs' lengths are limited."""
+    return parameters.replace(leg_angle_limits=(-math.pi, math.pi), spherical_cone_limit=math.pi)
 
 
 def _row(parameters: RPSParameters, points: int) -> PaperComparison:
