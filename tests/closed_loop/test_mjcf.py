@@ -554,7 +554,7 @@ REFUSED = {
     ),
     "no rigid body": (
         mujoco_file(BODY.replace('0.02 0.03 0.04"', '0.02 0.03 0.4"')),
-        "is that of no rigid body",
+        "is not that of a rigid body",
     ),
     "tendon": (
         fourbar(
@@ -576,7 +576,7 @@ REFUSED = {
     ),
     "held and driven": (
         fourbar(equalities('<joint joint1="j1"/>'), '<actuator><motor joint="j1"/></actuator>'),
-        "'j1' is held by an equality",
+        "'j1' is fixed by an equality",
     ),
     "long ball": (
         mujoco_file("<body><joint/><geom size='1' fromto='0 0 0 0 0 1'/></body>"),
@@ -602,7 +602,7 @@ def test_what_is_not_read_is_refused_with_its_line(text: str, why: str, tmp_path
     with pytest.raises(MechanismError) as caught:
         parts_from_mjcf(file)
     assert why in str(caught.value)
-    assert str(file) in str(caught.value) or "held by" in str(caught.value)
+    assert str(file) in str(caught.value) or "fixed by" in str(caught.value)
 
 
 def test_the_line_is_that_of_the_element(tmp_path: Path) -> None:

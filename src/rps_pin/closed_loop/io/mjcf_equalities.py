@@ -6,14 +6,14 @@ element        becomes
 ``connect``    a spherical closure: at the anchor, fixed in body1, and in body2 where the anchor
                is in ``qpos0``; or at two sites
 ``weld``       a rigid closure: of body1 moved by relpose, and body2 moved by the anchor; without
-               a relpose, of body1 as it stands in ``qpos0``; or of two sites
+               a relpose, of body1 as it is placed in ``qpos0``; or of two sites
 ``joint``      a `JointCoupling` q1 - ref1 = c0 + c1 (q2 - ref2); if joint2 is left out, or c1 is
-               0, joint1 is fixed at ref1 + c0 and no longer a joint of the tree
+               0, joint1 is fixed at ref1 + c0 and is not a joint of the tree
 =============  =================================================================================
 
-All are exact: what MuJoCo needs to keep them soft (solref, solimp, torquescale) has no meaning
-here. The frames made for anchors are called ``NAME:1`` and ``NAME:2`` after the element, or after
-``connect_1``, ``weld_2``, ... if it has no name.
+All are exact: MuJoCo's softness of constraints (solref, solimp, torquescale) is not used. The
+frames of anchors are called ``NAME:1`` and ``NAME:2`` after the element, or after ``connect_1``,
+``weld_2``, ... if it has no name.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, Kind, LoopClosure
-from rps_pin.closed_loop.io.mjcf_file import MjcfFile, rotation_of_quaternion
+from rps_pin.closed_loop.io.mjcf_file import MjcfElement, MjcfFile, rotation_of_quaternion
 from rps_pin.closed_loop.io.mjcf_tree import WORLD, MjcfTree
 
 _KINDS: dict[str, Kind] = {"connect": "spherical", "weld": "rigid"}
@@ -33,14 +33,14 @@ _KINDS: dict[str, Kind] = {"connect": "spherical", "weld": "rigid"}
 
 @dataclass
 class Equalities:
-    """What the equality elements of a file come to.
+    """The equality elements of a file.
 
     Attributes
     ----------
     closures
         In the order of the file.
     fixed
-        Coordinates of the joints that are held, by name.
+        Coordinates of the joints that are fixed, by name.
     """
 
     closures: list[Closure] = field(default_factory=list)
@@ -58,47 +58,39 @@ def read_equalities(file: MjcfFile, tree: MjcfTree) -> Equalities:
     """
     found = Equalities()
     for number, element in enumerate(file.entries("equality"), 1):
-        attributes = file.attributes(element, tag="equality")
-        if file.choice(element, attributes, "active", "true false", "true") == "false":
+        if element.choice("active", "true false", "true") == "false":
             continue
-        name = element.get("name", f"{element.tag}_{number}")
+        name = element.name or f"{element.tag}_{number}"
         if element.tag in _KINDS:
-            frames = _frames(file, tree, element, attributes, name)
+            frames = _frames(tree, element, name)
             found.closures.append(LoopClosure(*frames, _KINDS[element.tag], name))
         elif element.tag == "joint":
-            _add_coupling(file, tree, element, attributes, name, found)
+            _add_coupling(tree, element, name, found)
         else:
-            file.refuse(element, "is an equality that is not read; read are: connect, weld, joint")
+            element.refuse("is an equality that is not read; read are: connect, weld, joint")
     return found
 
 
-def _frames(
-    file: MjcfFile, tree: MjcfTree, element: Any, attributes: dict[str, str], name: str
-) -> tuple[str, str]:
-    """Return the names of the two frames that are to stay together."""
-    if "site1" in attributes or "site2" in attributes:
-        if "body1" in attributes or "body2" in attributes or "anchor" in attributes:
-            file.refuse(element, "joins two sites, or two bodies at an anchor; not both")
-        one, two = (
-            _known(file, element, attributes, option, tree.site_frames)
-            for option in ("site1", "site2")
-        )
+def _frames(tree: MjcfTree, element: MjcfElement, name: str) -> tuple[str, str]:
+    """Return the names of the two frames that the equality holds together."""
+    if "site1" in element or "site2" in element:
+        if "body1" in element or "body2" in element or "anchor" in element:
+            element.refuse("joins two sites, or two bodies at an anchor; not both")
+        one, two = (_known(element, end, tree.site_frames) for end in ("site1", "site2"))
         return one, two
-    first = _known(file, element, attributes, "body1", tree.body_frames)
-    second = WORLD
-    if "body2" in attributes:
-        second = _known(file, element, attributes, "body2", tree.body_frames)
+    first = _known(element, "body1", tree.body_frames)
+    second = _known(element, "body2", tree.body_frames) if "body2" in element else WORLD
     if first == second:
-        file.refuse(element, "joins a body to itself")
-    if element.tag == "connect" and "anchor" not in attributes:
-        file.refuse(element, "needs an anchor")
-    anchor = pin.SE3(np.eye(3), file.vector(element, attributes, "anchor", (0.0, 0.0, 0.0)))
+        element.refuse("joins a body to itself")
+    if element.tag == "connect" and "anchor" not in element:
+        element.refuse("needs an anchor")
+    anchor = pin.SE3(np.eye(3), element.vector("anchor", (0.0, 0.0, 0.0)))
     between = _placement(tree, first).inverse() * _placement(tree, second)
     if element.tag == "connect":
         in_first, in_second = anchor, between.inverse() * anchor
     else:
         in_first, in_second = between * anchor, anchor
-        relpose = file.vector(element, attributes, "relpose", (0.0, 1, 0, 0, 0, 0, 0))
+        relpose = element.vector("relpose", (0.0, 1, 0, 0, 0, 0, 0))
         if relpose[3:].any():
             in_first = pin.SE3(rotation_of_quaternion(relpose[3:]), relpose[:3])
     return (
@@ -108,47 +100,37 @@ def _frames(
 
 
 def _placement(tree: MjcfTree, frame: str) -> pin.SE3:
-    """Return where a frame is in ``qpos0``."""
+    """Return the placement of a frame in ``qpos0``."""
     data = tree.model.createData()
     q = tree.model.referenceConfigurations["qpos0"]
     pin.framesForwardKinematics(tree.model, data, q)
     return data.oMf[tree.model.getFrameId(frame)]
 
 
-def _known(
-    file: MjcfFile, element: Any, attributes: dict[str, str], option: str, names: dict[str, str]
-) -> str:
-    given = attributes.get(option)
-    if given is None:
-        file.refuse(element, f"needs a {option}")
+def _known(element: MjcfElement, option: str, names: dict[str, Any]) -> Any:
+    """Return what an option names."""
+    given = element.get(option)
+    if option not in element:
+        element.refuse(f"needs a {option}")
     if given not in names:
         what = option.rstrip("12")
-        file.refuse(element, f"{option}: no {what} {given!r}; there are: {', '.join(names)}")
+        element.refuse(f"{option}: no {what} {given!r}; there are: {', '.join(names)}")
     return names[given]
 
 
-def _add_coupling(
-    file: MjcfFile,
-    tree: MjcfTree,
-    element: Any,
-    attributes: dict[str, str],
-    name: str,
-    found: Equalities,
-) -> None:
+def _add_coupling(tree: MjcfTree, element: MjcfElement, name: str, found: Equalities) -> None:
     simple = {joint.name: joint for joint in tree.joints if joint.kind in ("hinge", "slide")}
-    names = {joint: joint for joint in simple}
-    first = simple[_known(file, element, attributes, "joint1", names)]
-    c = file.vector(element, attributes, "polycoef", (0.0, 1.0, 0.0, 0.0, 0.0), partial=True)
-    if c[2:].any() and "joint2" in attributes:
-        file.refuse(
-            element,
-            f"couples by a curve, polycoef = {attributes['polycoef']!r}; only a straight line "
-            "(the first two coefficients) is read",
+    first = _known(element, "joint1", simple)
+    c = element.vector("polycoef", (0.0, 1.0, 0.0, 0.0, 0.0), partial=True)
+    if c[2:].any() and "joint2" in element:
+        element.refuse(
+            f"couples by a curve, polycoef = {element.get('polycoef')!r}; only a straight line "
+            "(the first two coefficients) is read"
         )
-    if "joint2" in attributes and c[1] != 0:
-        second = simple[_known(file, element, attributes, "joint2", names)]
+    if "joint2" in element and c[1] != 0:
+        second = _known(element, "joint2", simple)
         if first is second:
-            file.refuse(element, "couples a joint to itself")
+            element.refuse("couples a joint to itself")
         offset = first.ref + c[0] - c[1] * second.ref
         found.closures.append(
             JointCoupling(first.name, second.name, float(c[1]), float(offset), name)
@@ -156,5 +138,5 @@ def _add_coupling(
         return
     value = first.ref + float(c[0])
     if found.fixed.get(first.name, value) != value:
-        file.refuse(element, f"holds {first.name!r}, which another element holds elsewhere")
+        element.refuse(f"fixes {first.name!r}, which another element fixes elsewhere")
     found.fixed[first.name] = value

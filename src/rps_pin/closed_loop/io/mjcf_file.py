@@ -1,7 +1,7 @@
-"""A MuJoCo file (MJCF) as data: its elements with their defaults, numbers and poses.
+"""MuJoCo files (MJCF) as data: elements with the attributes of their default classes.
 
-What MuJoCo's compiler would do before it builds anything: default classes are applied, angles
-become radians, and every way of giving an orientation becomes a rotation.
+As in MuJoCo's compiler, default classes are applied, angles become radians, and every form of an
+orientation becomes a rotation.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.io.urdf import xml_root, xml_text
 from rps_pin.errors import MechanismError
 
-_ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
-#: Settings of the compiler that change masses or frames, and the value that leaves them alone.
+#: How many numbers each form of an orientation has.
+_ORIENTATIONS = {"quat": 4, "axisangle": 4, "euler": 3, "xyaxes": 6, "zaxis": 3}
+#: Settings of the compiler that change masses or frames, and their values that change nothing.
 _UNREAD_SETTINGS = {
     "settotalmass": ("-1", "0"),
     "balanceinertia": ("false",),
@@ -32,7 +33,7 @@ _SMALLEST_NORM = 1e-12
 
 
 class MjcfFile:
-    """The elements of an MJCF, and what they mean once its defaults and settings are applied.
+    """The elements of an MJCF with its defaults and settings applied.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ class MjcfFile:
     InputError
         If the file cannot be read.
     MechanismError
-        If it is no MJCF, or uses what is not read here; with the line.
+        If it is not an MJCF, or has elements that are not read here; with the line.
     """
 
     def __init__(self, path_or_xml: str | os.PathLike[str]) -> None:
@@ -56,31 +57,32 @@ class MjcfFile:
                 "not <mujoco>"
             )
         for element in self.root.iter("include"):
-            self.refuse(element, "is not read; put the included elements into the file itself")
+            self.plain(element).refuse(
+                "is not read; put the included elements into the file itself"
+            )
         self._read_compiler()
         self._classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
-        for element in self.section("default"):
-            self._read_default(element, "main", {})
+        for section in self.sections("default"):
+            self._read_default(section.xml, "main", {})
 
     # Elements -------------------------------------------------------------------------------------
 
-    def section(self, tag: str) -> Iterator[Any]:
-        """Yield the top elements of a tag; MuJoCo lets a section be split over several."""
-        yield from self.root.findall(tag)
+    def sections(self, tag: str) -> Iterator[MjcfElement]:
+        """Yield the top elements of a tag; MuJoCo merges those of one tag."""
+        return map(self.plain, self.root.findall(tag))
 
-    def entries(self, tag: str) -> Iterator[Any]:
-        """Yield the elements directly in all sections of a tag, without comments."""
-        for section in self.section(tag):
-            yield from children(section)
+    def entries(self, tag: str) -> Iterator[MjcfElement]:
+        """Yield the elements directly in all sections of a tag, with the defaults of that tag."""
+        for section in self.sections(tag):
+            for element in children(section.xml):
+                yield self.read(element, tag=tag)
 
-    def refuse(self, element: Any, why: str) -> NoReturn:
-        """Raise a `MechanismError` that names an element and its line."""
-        name = element.get("name")
-        called = f"{element.tag} {name!r}" if name else f"{element.tag}"
-        raise MechanismError(f"{self.origin}, line {element.sourceline}: {called} {why}")
+    def plain(self, element: Any) -> MjcfElement:
+        """Return an element without defaults."""
+        return MjcfElement(self, element, element.attrib)
 
-    def attributes(self, element: Any, inherited: str = "main", tag: str = "") -> dict[str, str]:
-        """Return an element's attributes and, for those it leaves out, its default class's.
+    def read(self, element: Any, inherited: str = "main", tag: str = "") -> MjcfElement:
+        """Return an element with the attributes of its default class.
 
         Parameters
         ----------
@@ -89,136 +91,45 @@ class MjcfFile:
         inherited
             The class that applies if the element names none.
         tag
-            The tag under which default classes hold it; its own if left out.
+            The tag that default classes have for it; its own if left out.
         """
         wanted = element.get("class", inherited)
         if wanted not in self._classes:
-            self.refuse(
-                element, f"is of class {wanted!r}; there are: {', '.join(sorted(self._classes))}"
+            self.plain(element).refuse(
+                f"is of class {wanted!r}; there are: {', '.join(sorted(self._classes))}"
             )
-        return _over(self._classes[wanted].get(tag or str(element.tag), {}), element.attrib)
-
-    # Values ---------------------------------------------------------------------------------------
-
-    def numbers(self, element: Any, attributes: Mapping[str, str], name: str) -> Array | None:
-        """Return an attribute's numbers, or None if it is not given."""
-        text = attributes.get(name)
-        if text is None:
-            return None
-        try:
-            values = np.array([float(part) for part in text.split()])
-        except ValueError:
-            values = np.empty(0)
-        if not values.size or not np.isfinite(values).all():
-            self.refuse(element, f"{name} = {text!r} must be finite numbers")
-        return values
-
-    def vector(
-        self,
-        element: Any,
-        attributes: Mapping[str, str],
-        name: str,
-        default: tuple[float, ...],
-        partial: bool = False,
-    ) -> Array:
-        """Return as many numbers as `default` has; `partial`: it fills in what is missing."""
-        values = self.numbers(element, attributes, name)
-        if values is None:
-            return np.array(default)
-        if partial and values.size <= len(default):
-            return np.concatenate([values, default[values.size :]])
-        if values.size != len(default):
-            self.refuse(element, f"{name} = {attributes[name]!r} must be {len(default)} numbers")
-        return values
-
-    def number(
-        self, element: Any, attributes: Mapping[str, str], name: str, default: float = 0.0
-    ) -> float:
-        """Return an attribute of one number."""
-        return float(self.vector(element, attributes, name, (default,))[0])
-
-    def choice(
-        self, element: Any, attributes: Mapping[str, str], name: str, values: str, default: str
-    ) -> str:
-        """Return an attribute that is one of a few words (given with spaces between)."""
-        value = attributes.get(name, default)
-        if value not in values.split():
-            self.refuse(element, f"{name} = {value!r}; it can be: {', '.join(values.split())}")
-        return value
+        below = self._classes[wanted].get(tag or str(element.tag), {})
+        return MjcfElement(self, element, _over(below, element.attrib))
 
     def angle(self, value: float) -> float:
         """Return an angle of the file in radians."""
         return math.radians(value) if self.degrees else value
 
-    def pose(self, element: Any, attributes: Mapping[str, str]) -> pin.SE3:
-        """Return an element's place in the one around it, from its ``pos`` and orientation."""
-        position = self.vector(element, attributes, "pos", (0.0, 0.0, 0.0))
-        return pin.SE3(self.rotation(element, attributes), position)
-
-    def rotation(self, element: Any, attributes: Mapping[str, str]) -> Array:
-        """Return an element's orientation, shape (3, 3)."""
-        given = [name for name in _ORIENTATIONS if name in attributes]
-        if not given:
-            return np.eye(3)
-        if len(given) > 1:
-            self.refuse(element, f"has more than one orientation: {', '.join(given)}")
-        name = given[0]
-        sizes = {"quat": 4, "axisangle": 4, "euler": 3, "xyaxes": 6, "zaxis": 3}
-        values = self.vector(element, attributes, name, (0.0,) * sizes[name])
-        if name == "euler":
-            return self._from_euler(values)
-        lengths = [np.linalg.norm(values[:3] if name != "quat" else values)]
-        if name == "xyaxes":
-            lengths.append(np.linalg.norm(np.cross(values[:3], values[3:])))
-        if min(lengths) < _SMALLEST_NORM:
-            self.refuse(element, f"{name} = {attributes[name]!r} has no direction")
-        if name == "quat":
-            return rotation_of_quaternion(values)
-        if name == "axisangle":
-            axis = values[:3] / lengths[0]
-            return np.asarray(pin.exp3(axis * self.angle(values[3])))
-        if name == "zaxis":
-            return rotation_of_z(values)
-        x = values[:3] / lengths[0]
-        y = values[3:] - x * (x @ values[3:])
-        y /= np.linalg.norm(y)
-        return np.column_stack([x, y, np.cross(x, y)])
-
-    def _from_euler(self, angles: Array) -> Array:
-        """Turn about axes in order: about moving ones (lower case) or fixed ones (upper case)."""
-        result = np.eye(3)
-        for letter, angle in zip(self.eulerseq, angles, strict=True):
-            axis = np.eye(3)["xyz".index(letter.lower())]
-            turn = pin.exp3(axis * self.angle(angle))
-            result = result @ turn if letter.islower() else turn @ result
-        return np.asarray(result)
-
     # Settings -------------------------------------------------------------------------------------
 
     def _read_compiler(self) -> None:
-        """Merge the compiler elements; the last one to say something is heard."""
-        settings: dict[str, str] = {}
-        for element in self.section("compiler"):
-            settings |= element.attrib
+        """Merge the compiler elements; later ones replace the settings of earlier ones."""
+        settings = MjcfElement(self, self.root, {})
+        for section in self.sections("compiler"):
             for name, harmless in _UNREAD_SETTINGS.items():
-                if element.get(name, harmless[0]) not in harmless:
-                    self.refuse(element, f"{name} = {element.get(name)!r} is not read")
-            self.choice(element, settings, "angle", "degree radian", "degree")
-            self.choice(element, settings, "autolimits", "true false", "true")
-            self.choice(element, settings, "inertiafromgeom", "true false auto", "auto")
+                if section.get(name, harmless[0]) not in harmless:
+                    section.refuse(f"{name} = {section.get(name)!r} is not read")
+            settings = MjcfElement(self, section.xml, settings.attributes | section.attributes)
+            settings.choice("angle", "degree radian", "degree")
+            settings.choice("autolimits", "true false", "true")
+            settings.choice("inertiafromgeom", "true false auto", "auto")
             sequence = settings.get("eulerseq", "xyz")
             if len(sequence) != 3 or set(sequence) - set("xyzXYZ"):
-                self.refuse(element, f"eulerseq = {sequence!r} must be three letters of xyzXYZ")
-            self.vector(element, settings, "inertiagrouprange", (0.0, 5.0))
+                section.refuse(f"eulerseq = {sequence!r} must be three letters of xyzXYZ")
+            settings.vector("inertiagrouprange", (0.0, 5.0))
         self.degrees = settings.get("angle", "degree") == "degree"
         self.eulerseq = settings.get("eulerseq", "xyz")
         self.autolimits = settings.get("autolimits", "true") == "true"
         self.inertia_from_geom = settings.get("inertiafromgeom", "auto")
-        first, last = (float(part) for part in settings.get("inertiagrouprange", "0 5").split())
-        self.inertia_groups = (first, last)
+        self.inertia_groups = tuple(settings.vector("inertiagrouprange", (0.0, 5.0)))
 
     def _read_default(self, element: Any, name: str, above: dict[str, dict[str, str]]) -> None:
-        """Store a default class and those in it; each begins with what is above it."""
+        """Store a default class and the classes in it, which inherit its attributes."""
         name = element.get("class", name)
         own = {tag: dict(values) for tag, values in above.items()}
         own |= {tag: values for tag, values in self._classes.get(name, {}).items() if not above}
@@ -229,8 +140,131 @@ class MjcfFile:
         for entry in children(element):
             if entry.tag == "default":
                 if "class" not in entry.attrib:
-                    self.refuse(entry, "inside another needs a class")
+                    self.plain(entry).refuse("inside another needs a class")
                 self._read_default(entry, entry.get("class"), own)
+
+
+class MjcfElement:
+    """An element of an MJCF.
+
+    Attributes
+    ----------
+    file : MjcfFile
+    xml : lxml element
+    attributes : dict of str to str
+        Its own and those of its default class.
+    """
+
+    def __init__(self, file: MjcfFile, xml: Any, attributes: Mapping[str, str]) -> None:
+        self.file = file
+        self.xml = xml
+        self.attributes = dict(attributes)
+
+    @property
+    def tag(self) -> str:
+        """Its tag."""
+        return str(self.xml.tag)
+
+    @property
+    def name(self) -> str:
+        """Its name; empty if it has none."""
+        return str(self.xml.get("name", ""))
+
+    def __contains__(self, attribute: str) -> bool:
+        return attribute in self.attributes
+
+    def get(self, attribute: str, default: str = "") -> str:
+        """Return an attribute's text."""
+        return self.attributes.get(attribute, default)
+
+    def refuse(self, why: str) -> NoReturn:
+        """Raise a `MechanismError` that names the element and its line."""
+        called = f"{self.tag} {self.name!r}" if self.name else self.tag
+        raise MechanismError(f"{self.file.origin}, line {self.xml.sourceline}: {called} {why}")
+
+    def numbers(self, name: str) -> Array | None:
+        """Return an attribute's numbers, or None if it is not given."""
+        if name not in self:
+            return None
+        try:
+            values = np.array([float(part) for part in self.get(name).split()])
+        except ValueError:
+            values = np.empty(0)
+        if not values.size or not np.isfinite(values).all():
+            self.refuse(f"{name} = {self.get(name)!r} must be finite numbers")
+        return values
+
+    def vector(self, name: str, default: Iterable[float], partial: bool = False) -> Array:
+        """Return as many numbers as `default` has; `partial`: it replaces missing ones."""
+        values, default = self.numbers(name), np.array(list(default), dtype=np.float64)
+        if values is None:
+            return default
+        if partial and values.size <= default.size:
+            return np.concatenate([values, default[values.size :]])
+        if values.size != default.size:
+            self.refuse(f"{name} = {self.get(name)!r} must be {default.size} numbers")
+        return values
+
+    def number(self, name: str, default: float = 0.0) -> float:
+        """Return an attribute of one number."""
+        return float(self.vector(name, (default,))[0])
+
+    def choice(self, name: str, values: str, default: str) -> str:
+        """Return an attribute that is one of a few words (given with spaces between)."""
+        value = self.get(name, default)
+        if value not in values.split():
+            self.refuse(f"{name} = {value!r}; it can be: {', '.join(values.split())}")
+        return value
+
+    def pose(self) -> pin.SE3:
+        """Return its placement in its parent, from its ``pos`` and orientation."""
+        return pin.SE3(self.rotation(), self.vector("pos", (0.0, 0.0, 0.0)))
+
+    def rotation(self) -> Array:
+        """Return its orientation, shape (3, 3)."""
+        given = [name for name in _ORIENTATIONS if name in self]
+        if not given:
+            return np.eye(3)
+        if len(given) > 1:
+            self.refuse(f"has more than one orientation: {', '.join(given)}")
+        name = given[0]
+        values = self.vector(name, (0.0,) * _ORIENTATIONS[name])
+        if name == "euler":
+            return self._from_euler(values)
+        length = np.linalg.norm(values[:3] if name != "quat" else values)
+        across = np.linalg.norm(np.cross(values[:3], values[3:])) if name == "xyaxes" else length
+        if min(length, across) < _SMALLEST_NORM:
+            self.refuse(f"{name} = {self.get(name)!r} has no direction")
+        if name == "quat":
+            return rotation_of_quaternion(values)
+        if name == "axisangle":
+            return np.asarray(pin.exp3(values[:3] / length * self.file.angle(values[3])))
+        if name == "zaxis":
+            return rotation_of_z(values)
+        x = values[:3] / length
+        y = values[3:] - x * (x @ values[3:])
+        y /= np.linalg.norm(y)
+        return np.column_stack([x, y, np.cross(x, y)])
+
+    def _from_euler(self, angles: Array) -> Array:
+        """Return the rotation about axes in order: moving ones (lower case) or fixed ones."""
+        result = np.eye(3)
+        for letter, angle in zip(self.file.eulerseq, angles, strict=True):
+            axis = np.eye(3)["xyz".index(letter.lower())]
+            turn = pin.exp3(axis * self.file.angle(angle))
+            result = result @ turn if letter.islower() else turn @ result
+        return np.asarray(result)
+
+    def segment(self) -> tuple[pin.SE3, float | None]:
+        """Return the pose of a geom or site, and half its length if ``fromto`` gives it."""
+        if "fromto" not in self:
+            return self.pose(), None
+        ends = self.vector("fromto", (0.0,) * 6)
+        along = ends[:3] - ends[3:]
+        length = float(np.linalg.norm(along))
+        if length == 0:
+            self.refuse("has two ends in one place")
+        return pin.SE3(rotation_of_z(along), (ends[:3] + ends[3:]) / 2), length / 2
 
 
 def children(element: Any) -> Iterator[Any]:
@@ -239,14 +273,14 @@ def children(element: Any) -> Iterator[Any]:
 
 
 def text(values: Iterable[float]) -> str:
-    """Return numbers as a file holds them, without loss."""
+    """Return numbers for an attribute, with all their digits."""
     return " ".join(repr(float(value)) for value in values)
 
 
-def quaternion_text(rotation: Array) -> str:
-    """Return a rotation as MuJoCo's quaternion (w, x, y, z)."""
-    x, y, z, w = pin.Quaternion(rotation).coeffs()
-    return text((w, x, y, z))
+def placement(pose: pin.SE3) -> dict[str, str]:
+    """Return a placement as the attributes ``pos`` and ``quat`` (w, x, y, z)."""
+    x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
+    return {"pos": text(pose.translation), "quat": text((w, x, y, z))}
 
 
 def rotation_of_quaternion(values: Array) -> Array:
@@ -256,7 +290,7 @@ def rotation_of_quaternion(values: Array) -> Array:
 
 
 def rotation_of_z(direction: Array) -> Array:
-    """Return the least rotation that takes z to a direction; half a turn about x for -z."""
+    """Return the smallest rotation from z to a direction; half a turn about x for -z."""
     x, y, z = direction / np.linalg.norm(direction)
     across = math.hypot(x, y)
     axis = np.array([-y, x, 0.0]) / across if across > _SMALLEST_NORM else np.array([1.0, 0, 0])
@@ -264,7 +298,7 @@ def rotation_of_z(direction: Array) -> Array:
 
 
 def _over(below: Mapping[str, str], above: Mapping[str, str]) -> dict[str, str]:
-    """Return attributes with others laid over them, as MuJoCo does.
+    """Return attributes `below` replaced by those `above`, as MuJoCo does.
 
     An orientation replaces one of another kind, and a shorter ``size`` only the first numbers.
     """

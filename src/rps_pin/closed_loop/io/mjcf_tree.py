@@ -1,14 +1,14 @@
-"""The open tree of an MJCF, built by Pinocchio's parser from a plain form of the file.
+"""Open tree of an MJCF, built by Pinocchio's parser from a plain form of the file.
 
-Read as it is, an MJCF loses much in Pinocchio 4.1: all bodies of the world but the first, the
-place of a fixed first body, bodies without attributes, sites of bodies without joints, gravity,
-defaults that follow their use; limits are shifted by ``ref``, those of slides turned from degrees;
-several joints of a body become one composite joint. So the parser is given a form in which nothing
-is left to it but masses and places:
+Pinocchio 4.1 reads an MJCF only in part. It drops all bodies of the world but the first, the
+placement of a fixed first body, bodies without attributes, sites of bodies without joints, gravity,
+and defaults that follow their use; limits are shifted by ``ref``, those of slides converted from
+degrees; several joints of a body become one composite joint. So the parser is given a plain form,
+from which it reads masses and placements:
 
 - one body ``world`` holds all others; every body and joint has a name;
 - defaults are applied, angles in radians, orientations quaternions; ``frame`` elements are gone;
-- a body with several joints is a row of bodies with one each, without mass but for the last.
+- a body with several joints is a chain of bodies with one each, massless but for the last.
 
 Limits, sites, gravity and key frames are added to the model afterwards.
 """
@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +28,14 @@ from lxml import etree
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.io.mjcf_file import (
+    MjcfElement,
     MjcfFile,
     children,
-    quaternion_text,
+    placement,
     rotation_of_quaternion,
     text,
 )
-from rps_pin.closed_loop.io.mjcf_inertia import add_inertia, placed
+from rps_pin.closed_loop.io.mjcf_inertia import add_inertia
 from rps_pin.errors import MechanismError
 
 #: Frame of the world that bears MuJoCo's name for it.
@@ -47,20 +48,25 @@ _SEEN_ONLY = ("camera", "light")
 
 @dataclass(frozen=True)
 class MjcfJoint:
-    """A joint of the file: its name in the model, and what Pinocchio's parser is not asked for."""
+    """A joint of the file, with what Pinocchio's parser does not read."""
 
     name: str
+    """In the model."""
     kind: str
-    element: Any
-    attributes: dict[str, str]
+    """``"hinge"``, ``"slide"``, ``"ball"`` or ``"free"``."""
+    element: MjcfElement
     ref: float
-    """Coordinate at which the bodies stand as the file places them, rad or m."""
+    """Coordinate at the placements of the file, rad or m."""
     start: tuple[float, ...]
-    """Coordinates in ``qpos0``, as MuJoCo orders them."""
+    """Coordinates in ``qpos0``, in MuJoCo's order."""
+
+    def coordinate(self, value: float) -> float:
+        """Return a number of the file in rad or m."""
+        return self.element.file.angle(value) if self.kind == "hinge" else value
 
 
 class MjcfTree:
-    """The tree of a file, and what its names in the file became.
+    """The tree of a file, and the names of its frames.
 
     Attributes
     ----------
@@ -83,32 +89,25 @@ class MjcfTree:
         plain = etree.Element("mujoco", model=file.root.get("model", "mechanism"))
         etree.SubElement(plain, "compiler", angle="radian", inertiafromgeom="auto")
         world = etree.SubElement(etree.SubElement(plain, "worldbody"), "body", name=WORLD)
-        for section in file.section("worldbody"):
-            self._read_contents(section, world, WORLD, pin.SE3.Identity(), "main", False)
+        for section in file.sections("worldbody"):
+            self._read_contents(section.xml, world, WORLD, pin.SE3.Identity(), "main", False)
         if not self.joints:
-            raise MechanismError(f"{file.origin} has no joints, so no mechanism")
+            raise MechanismError(f"{file.origin} has no joints, so it is not a mechanism")
         self.model = self._built(etree.tostring(plain))
         self._add_limits()
-        for name, body, placement in self._sites:
-            self.add_frame(name, body, placement)
+        for site in self._sites:
+            self.add_frame(*site)
         self.model.gravity.linear = self._gravity()
         self._add_key_frames()
 
-    def add_frame(self, name: str, frame: str, placement: pin.SE3) -> str:
+    def add_frame(self, name: str, frame: str, pose: pin.SE3) -> str:
         """Add a frame fixed in another; return its name, to which ``_`` is added if it is taken."""
         while self.model.existFrame(name):
             name += "_"
         parent = self.model.getFrameId(frame)
         base = self.model.frames[parent]
-        self.model.addFrame(
-            pin.Frame(
-                name,
-                base.parentJoint,
-                parent,
-                base.placement * placement,
-                pin.FrameType.OP_FRAME,
-            )
-        )
+        kind = pin.FrameType.OP_FRAME
+        self.model.addFrame(pin.Frame(name, base.parentJoint, parent, base.placement * pose, kind))
         return name
 
     # Names ----------------------------------------------------------------------------------------
@@ -123,13 +122,13 @@ class MjcfTree:
         self.body_frames[WORLD] = WORLD
 
     def _name(self, tags: tuple[str, ...], names: dict[str, str], suffix: str) -> None:
-        for section in self._file.section("worldbody"):
-            for element in section.iter(*tags):
+        for section in self._file.sections("worldbody"):
+            for element in section.xml.iter(*tags):
                 name = element.get("name")
                 if not name:
                     continue
                 if name in names:
-                    self._file.refuse(element, "has a name that another one has")
+                    self._file.plain(element).refuse("has a name that another one has")
                 names[name] = self._fresh(name if name not in self._taken else name + suffix)
 
     def _fresh(self, name: str) -> str:
@@ -148,98 +147,90 @@ class MjcfTree:
         pose: pin.SE3,
         childclass: str,
         in_frame: bool,
-    ) -> list[tuple[Any, pin.SE3, str]]:
-        """Read what a body (or a ``frame`` in it) holds; return its geoms, placed in the body."""
+    ) -> list[tuple[MjcfElement, pin.SE3]]:
+        """Read the elements of a body (or of a ``frame`` in it); return its geoms, placed in it."""
         file = self._file
         geoms = []
         for child in children(element):
             tag = child.tag
             if tag in _OF_THE_BODY:  # read with it
                 if in_frame:
-                    file.refuse(child, "cannot stand in a frame element")
+                    file.plain(child).refuse("cannot be in a frame element")
             elif tag == "geom":
-                geoms.append((child, pose, childclass))
+                geoms.append((file.read(child, childclass), pose))
             elif tag == "site":
-                attributes = file.attributes(child, childclass)
-                if name := child.get("name"):
-                    place = pose * placed(file, child, attributes)[0]
-                    self._sites.append((self.site_frames[name], frame, place))
+                site = file.read(child, childclass)
+                if site.name:
+                    placed = pose * site.segment()[0]
+                    self._sites.append((self.site_frames[site.name], frame, placed))
             elif tag == "frame":
                 inner = child.get("childclass", childclass)
-                place = pose * file.pose(child, child.attrib)
-                geoms += self._read_contents(child, plain, frame, place, inner, True)
+                around = pose * file.plain(child).pose()
+                geoms += self._read_contents(child, plain, frame, around, inner, True)
             elif tag == "body":
-                self._read_body(child, plain, pose, childclass)
+                self._read_body(file.plain(child), plain, pose, childclass)
             elif tag not in _SEEN_ONLY:
                 known = (*_OF_THE_BODY, "geom", "site", "frame", "body")
-                file.refuse(child, f"is not read; known here: {', '.join(known)}")
+                file.plain(child).refuse(f"is not read; known here: {', '.join(known)}")
         return geoms
 
-    def _read_body(self, element: Any, plain: Any, around: pin.SE3, childclass: str) -> None:
-        file = self._file
-        if file.number(element, element.attrib, "gravcomp"):
-            file.refuse(element, "has gravcomp, which is not read")
-        if element.get("mocap", "false") != "false":
-            file.refuse(element, "is moved by motion capture, which is not read")
-        childclass = element.get("childclass", childclass)
-        name = element.get("name")
-        frame = self.body_frames[name] if name else self._fresh(f"{plain.get('name')}_child")
-        pose = around * file.pose(element, element.attrib)
-        joints = [child for child in children(element) if child.tag in ("joint", "freejoint")]
+    def _read_body(self, body: MjcfElement, plain: Any, around: pin.SE3, childclass: str) -> None:
+        if body.number("gravcomp"):
+            body.refuse("has gravcomp, which is not read")
+        if body.get("mocap", "false") != "false":
+            body.refuse("is moved by motion capture, which is not read")
+        childclass = body.get("childclass", childclass)
+        if body.name:
+            frame = self.body_frames[body.name]
+        else:
+            frame = self._fresh(f"{plain.get('name')}_child")
+        pose = around * body.pose()
+        joints = [child for child in children(body.xml) if child.tag in ("joint", "freejoint")]
         for number, joint in enumerate(joints, 1):
-            last = number == len(joints)
-            link = frame if last else self._fresh(f"{frame}_{number}")
-            plain = _plain_body(plain, link, pose)
-            self._read_joint(joint, plain, frame, number, pose, childclass, len(joints) == 1)
+            link = frame if number == len(joints) else self._fresh(f"{frame}_{number}")
+            plain = etree.SubElement(plain, "body", name=link, **placement(pose))
+            alone = len(joints) == 1
+            unnamed = f"{frame}_joint" + ("" if alone else f"_{number}")
+            self._read_joint(joint, plain, unnamed, pose, childclass, alone)
             pose = pin.SE3.Identity()
         if not joints:
-            plain = _plain_body(plain, frame, pose)
-        held = self._read_contents(element, plain, frame, pin.SE3.Identity(), childclass, False)
-        add_inertia(file, element, plain, held)
+            plain = etree.SubElement(plain, "body", name=frame, **placement(pose))
+        inside = self._read_contents(body.xml, plain, frame, pin.SE3.Identity(), childclass, False)
+        add_inertia(body, plain, inside)
 
     def _read_joint(
         self,
         element: Any,
         plain: Any,
-        frame: str,
-        number: int,
+        unnamed: str,
         pose: pin.SE3,
         childclass: str,
         alone: bool,
     ) -> None:
         file = self._file
         free = element.tag == "freejoint"
-        attributes = dict(element.attrib) if free else file.attributes(element, childclass)
-        kinds = "hinge slide ball free"
-        kind = "free" if free else file.choice(element, attributes, "type", kinds, "hinge")
-        if kind == "free" and not (alone and plain.getparent().get("name") == WORLD):
-            file.refuse(element, "is free: its body must be in the world and have no other joint")
-        if kind == "free":  # its coordinates are its place in the world
-            plain.set("pos", "0 0 0")
-            plain.set("quat", "1 0 0 0")
-        name = element.get("name")
-        if name:
-            name = self._joint_names[name]
-        else:
-            name = self._fresh(f"{frame}_joint" + (f"_{number}" if not alone else ""))
-        written = {"name": name, "type": kind}
-        ref = 0.0
+        joint = file.plain(element) if free else file.read(element, childclass)
+        kind = "free" if free else joint.choice("type", "hinge slide ball free", "hinge")
+        if kind == "free":
+            if not (alone and plain.getparent().get("name") == WORLD):
+                joint.refuse("is free: its body must be in the world and have no other joint")
+            plain.attrib.update({"pos": "0 0 0", "quat": "1 0 0 0"})  # q is its placement
+        name = self._joint_names[joint.name] if joint.name else self._fresh(unnamed)
+        written = {"name": name, "type": kind, "armature": text([joint.number("armature")])}
+        found = MjcfJoint(name, kind, joint, 0.0, ())
         if kind != "free":
-            written["pos"] = text(file.vector(element, attributes, "pos", (0.0, 0.0, 0.0)))
+            written["pos"] = text(joint.vector("pos", (0.0, 0.0, 0.0)))
         if kind in ("hinge", "slide"):
-            axis = file.vector(element, attributes, "axis", (0.0, 0.0, 1.0))
+            axis = joint.vector("axis", (0.0, 0.0, 1.0))
             if not axis.any():
-                file.refuse(element, "has an axis without direction")
+                joint.refuse("has an axis without direction")
             written["axis"] = text(axis / np.linalg.norm(axis))
-            ref = file.number(element, attributes, "ref")
-            ref = file.angle(ref) if kind == "hinge" else ref
-            written["ref"] = text([ref])
-        armature = file.number(element, attributes, "armature")
-        written["armature"] = text([armature])
+            found = replace(found, ref=found.coordinate(joint.number("ref")))
+            written["ref"] = text([found.ref])
         etree.SubElement(plain, "joint", **written)
         quaternion = pin.Quaternion(pose.rotation).coeffs()[[3, 0, 1, 2]]
         start = {"ball": (1.0, 0.0, 0.0, 0.0), "free": (*pose.translation, *quaternion)}
-        self.joints.append(MjcfJoint(name, kind, element, attributes, ref, start.get(kind, (ref,))))
+        self.joints.append(replace(found, start=start.get(kind, (found.ref,))))
 
     def _built(self, plain: bytes) -> pin.Model:
         """Return Pinocchio's model of a plain text; it reads files only."""
@@ -258,66 +249,67 @@ class MjcfTree:
     # What the model gets afterwards ---------------------------------------------------------------
 
     def _add_limits(self) -> None:
-        file, model = self._file, self.model
+        model = self.model
         for joint in self.joints:
             place = model.joints[model.getJointId(joint.name)]
-            if joint.kind == "free":  # Pinocchio's parser bounds places by 1.01 m
+            if joint.kind == "free":  # Pinocchio's parser bounds positions by 1.01 m
                 model.lowerPositionLimit[place.idx_q : place.idx_q + 3] = -math.inf
                 model.upperPositionLimit[place.idx_q : place.idx_q + 3] = math.inf
             if place.nq > 1:
                 continue
-            limits = self._limits(joint, "range", "limited")
+            limits = self._limits(joint.element, "range", "limited")
             if limits is not None:
-                lower, upper = limits if joint.kind == "slide" else map(file.angle, limits)
+                lower, upper = map(joint.coordinate, limits)
                 model.lowerPositionLimit[place.idx_q] = lower
                 model.upperPositionLimit[place.idx_q] = upper
-            effort = self._limits(joint, "actuatorfrcrange", "actuatorfrclimited")
+            effort = self._limits(joint.element, "actuatorfrcrange", "actuatorfrclimited")
             if effort is not None:
                 model.lowerEffortLimit[place.idx_v], model.upperEffortLimit[place.idx_v] = effort
 
-    def _limits(self, joint: MjcfJoint, name: str, flag: str) -> tuple[float, float] | None:
-        """Return the limits that hold, or None."""
-        file, element = self._file, joint.element
-        limited = file.choice(element, joint.attributes, flag, "true false auto", "auto")
-        given = file.numbers(element, joint.attributes, name)
+    def _limits(self, joint: MjcfElement, name: str, flag: str) -> tuple[float, float] | None:
+        """Return the limits that apply, or None."""
+        limited = joint.choice(flag, "true false auto", "auto")
+        given = joint.numbers(name)
         if limited == "false" or (limited == "auto" and given is None):
             return None
-        if limited == "auto" and not file.autolimits:
-            file.refuse(element, f"has a {name}, but autolimits is off and {flag} is not given")
-        lower, upper = file.vector(element, joint.attributes, name, (0.0, 0.0))
+        if limited == "auto" and not self._file.autolimits:
+            joint.refuse(f"has a {name}, but autolimits is off and {flag} is not given")
+        lower, upper = joint.vector(name, (0.0, 0.0))
         if not lower < upper:
-            file.refuse(element, f"{name}: {lower:.6g} must be below {upper:.6g}")
+            joint.refuse(f"{name}: {lower:.6g} must be below {upper:.6g}")
         return float(lower), float(upper)
 
     def _gravity(self) -> Array:
-        gravity = np.array([0.0, 0.0, -9.81])
-        for option in self._file.section("option"):
-            gravity = self._file.vector(option, option.attrib, "gravity", tuple(gravity))
+        gravity, on = np.array([0.0, 0.0, -9.81]), True
+        for option in self._file.sections("option"):
+            gravity = option.vector("gravity", gravity)
             for name in ("density", "viscosity"):
-                if self._file.number(option, option.attrib, name):
-                    self._file.refuse(option, f"has a {name}: a medium around is not read")
-            for flag in option.findall("flag"):
+                if option.number(name):
+                    option.refuse(f"has a {name}: forces of a medium are not read")
+            for flag in map(self._file.plain, option.xml.findall("flag")):
                 for name in ("equality", "spring", "damper", "passive", "frictionloss", "limit"):
                     if flag.get(name) == "disable":
-                        self._file.refuse(flag, f"{name} = 'disable' is not read")
-        off = [f for o in self._file.section("option") for f in o.findall("flag[@gravity]")]
-        return np.zeros(3) if off and off[-1].get("gravity") == "disable" else gravity
+                        flag.refuse(f"{name} = 'disable' is not read")
+                if "gravity" in flag:
+                    on = flag.get("gravity") != "disable"
+        return gravity if on else np.zeros(3)
 
     def _add_key_frames(self) -> None:
         configurations = self.model.referenceConfigurations
         start = np.concatenate([joint.start for joint in self.joints])
         configurations["qpos0"] = self.configuration(start)
-        for key in self._file.entries("keyframe"):
-            values = self._file.numbers(key, key.attrib, "qpos")
-            if values is None:
-                continue
-            if values.size != start.size:
-                self._file.refuse(key, f"has {values.size} numbers in qpos, not {start.size}")
-            if name := key.get("name"):
-                try:
-                    configurations[name] = self.configuration(values)
-                except ZeroDivisionError:
-                    self._file.refuse(key, "has a quaternion of zeros")
+        for section in self._file.sections("keyframe"):
+            for key in map(self._file.plain, children(section.xml)):
+                values = key.numbers("qpos")
+                if values is None:
+                    continue
+                if values.size != start.size:
+                    key.refuse(f"has {values.size} numbers in qpos, not {start.size}")
+                if key.name:
+                    try:
+                        configurations[key.name] = self.configuration(values)
+                    except ZeroDivisionError:
+                        key.refuse("has a quaternion of zeros")
 
     def configuration(self, qpos: Iterable[float]) -> Array:
         """Return Pinocchio's configuration of MuJoCo's ``qpos``.
@@ -338,8 +330,3 @@ class MjcfTree:
             q[index : index + size] = own
             start += size
         return q
-
-
-def _plain_body(parent: Any, name: str, pose: pin.SE3) -> Any:
-    quaternion = quaternion_text(pose.rotation)
-    return etree.SubElement(parent, "body", name=name, pos=text(pose.translation), quat=quaternion)
