@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -14,6 +15,7 @@ from rps_pin.validation import (
     choice,
     finite_number,
     fixed_array,
+    inertia_fault,
     non_negative_number,
     one_shape,
     positive_number,
@@ -155,3 +157,19 @@ def test_a_fixed_array_is_a_read_only_copy() -> None:
 def test_other_shapes_and_values_are_refused(bad: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         fixed_array(bad, "start", (3,), "z, tilt_x, tilt_y")
+
+
+def test_rigid_bodies_have_their_inertia() -> None:
+    """Point masses make up any body; the inertia of each set is accepted."""
+    rng = np.random.default_rng(5)
+    for count in (0, 1, 2, 3, 10):
+        points = rng.normal(size=(count, 3))
+        inertia = sum((np.eye(3) * (p @ p) - np.outer(p, p) for p in points), np.zeros((3, 3)))
+        assert inertia_fault(inertia) == ""
+    for bad, fault in (
+        (np.diag([1.0, 1.0, 2.1]), r"principal moments are 1, 1 and 2.1 .* exceed"),
+        (np.diag([-0.1, 1.0, 1.0]), r"principal moments are -0.1, 1 and 1 .* negative"),
+        (np.eye(3, k=1) + np.eye(3), "must be symmetric"),
+    ):
+        assert re.search(fault, inertia_fault(bad))
+    assert inertia_fault(np.diag([1.0, 1.0, 2.1]), rounding=0.1) == ""

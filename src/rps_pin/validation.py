@@ -185,3 +185,21 @@ def read_only(array: Array) -> Array:
     copy = array.copy()
     copy.setflags(write=False)
     return copy
+
+
+def inertia_fault(inertia: Array, rounding: float = 1e-9) -> str:
+    """Return why a matrix (3, 3) is not a rigid body's moment of inertia; empty if it is one.
+
+    `rounding` is the share of the largest principal moment by which it may exceed the others' sum.
+    """
+    scale = float(np.abs(inertia).max())
+    if np.abs(inertia - inertia.T).max() > 1e-9 * scale:
+        return "must be symmetric"
+    smallest, middle, largest = np.linalg.eigvalsh(inertia)
+    if smallest < -1e-9 * scale or largest - smallest - middle > rounding * largest:
+        return (
+            f"no rigid body has it: its principal moments are {smallest:.6g}, {middle:.6g} and "
+            f"{largest:.6g} kg m^2; none may be negative, or exceed the sum of the others by more "
+            f"than {rounding:g} of it"
+        )
+    return ""

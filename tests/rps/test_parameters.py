@@ -373,7 +373,7 @@ def turned(principal: list[float]) -> np.ndarray:
 def test_inertia_beyond_the_triangle_inequality_is_refused() -> None:
     for inertia in (np.diag([0.093, 0.093, 0.19]), turned([1.0, 1.0, 2.03])):
         error = refused("platform_inertia", inertia, "no rigid body has it")
-        assert "exceeds the sum of the others" in error.rule
+        assert "exceed the sum of the others" in error.rule
 
 
 def test_inertia_may_miss_the_triangle_inequality_by_a_table_s_rounding() -> None:
@@ -403,7 +403,7 @@ def test_asymmetric_inertia_is_refused(entry: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("principal", [[-0.01, 0.1, 0.1], [-1.0, -1.0, -1.0], [0.0, 0.0, 0.0]])
 def test_inertia_that_is_not_positive_is_refused(principal: list[float]) -> None:
-    refused("platform_inertia", turned(principal), "positive")
+    refused("platform_inertia", turned(principal), "negative" if any(principal) else "positive")
 
 
 @pytest.mark.parametrize("body", ["leg", "rod"])

@@ -29,6 +29,7 @@ from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED
 from rps_pin.config import Finite, NonNegative, Positive, YamlFile, first_problem, read_yaml
 from rps_pin.errors import InputError, ParameterError, did_you_mean
 from rps_pin.files import whole_file
+from rps_pin.validation import inertia_fault
 
 #: A printed table rounds its inertias (the paper's Table 1 by 0.5 %): this much of the largest
 #: principal moment may be missing from the triangle inequality.
@@ -195,19 +196,10 @@ class RPSParameters(BaseModel):
     @field_validator("platform_inertia")
     @classmethod
     def _inertia_of_a_rigid_body(cls, inertia: Array) -> Array:
-        scale = float(np.abs(inertia).max())
-        if np.abs(inertia - inertia.T).max() > 1e-9 * scale:
-            raise ValueError("must be symmetric")
-        smallest, middle, largest = np.linalg.eigvalsh(inertia)
-        if smallest < -1e-9 * scale or largest <= 0:
-            raise ValueError(f"must be positive: its smallest principal moment is {smallest:.6g}")
-        excess = largest - (smallest + middle)
-        if excess > INERTIA_ROUNDING * largest:
-            raise ValueError(
-                "no rigid body has it: its largest principal moment "
-                f"{largest:.6g} exceeds the sum of the others by {excess:.3g}, more than "
-                f"{INERTIA_ROUNDING:.0%} of it, which rounding would explain"
-            )
+        if not inertia.any():
+            raise ValueError("must be positive")
+        if fault := inertia_fault(inertia, INERTIA_ROUNDING):
+            raise ValueError(fault)
         return inertia
 
     @field_validator("leg_length_limits", "leg_angle_limits")

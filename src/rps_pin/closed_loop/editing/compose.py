@@ -13,17 +13,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array
 from rps_pin.closed_loop.editing.joint_properties import copy_joint_properties
 from rps_pin.errors import InputError, MechanismError
-from rps_pin.validation import real_vector
+from rps_pin.validation import fixed_array, inertia_fault, positive_number, real_vector
 
 #: Between a part's name and its own names.
 SEPARATOR = "/"
 #: Name of the joint that lets a `body` float.
 FREE_JOINT = "root_joint"
-#: Largest share of its largest moment by which an inertia may fail to be a body's.
-_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -115,9 +112,12 @@ def body(
     InputError
         If no rigid body has such a mass or inertia.
     """
-    if not isinstance(mass, (int, float)) or not 0 < mass < np.inf:
-        raise InputError(f"body {name!r}: mass = {mass!r} must be positive and finite")
-    own = pin.Inertia(float(mass), real_vector(com, 3, "com"), _checked_inertia(name, inertia))
+    moments = fixed_array(inertia, f"inertia of body {name!r}", (3, 3))
+    if fault := inertia_fault(moments):
+        raise InputError(f"inertia of body {name!r}: {fault}")
+    own = pin.Inertia(
+        positive_number(mass, f"mass of body {name!r}", "kg"), real_vector(com, 3, "com"), moments
+    )
     model = pin.Model()
     model.name = name
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), FREE_JOINT)
@@ -133,25 +133,6 @@ def body(
         added = model.addFrame(pin.Frame(label, joint, base, placement, kind))
         base = added if label == name else base
     return model
-
-
-def _checked_inertia(name: str, inertia: ArrayLike) -> Array:
-    try:
-        matrix = np.asarray(inertia, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"body {name!r}: inertia must be 3 x 3 numbers") from None
-    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
-        raise InputError(f"body {name!r}: inertia must be 3 x 3 finite numbers")
-    scale = float(np.abs(matrix).max())
-    if np.abs(matrix - matrix.T).max() > _ROUNDING * scale:
-        raise InputError(f"body {name!r}: inertia must be symmetric")
-    smallest, middle, largest = np.linalg.eigvalsh(matrix)
-    if smallest < -_ROUNDING * scale or largest > smallest + middle + _ROUNDING * scale:
-        raise InputError(
-            f"body {name!r}: no rigid body has principal moments of {smallest:.6g}, {middle:.6g} "
-            f"and {largest:.6g} kg m^2 (none is negative, none exceeds the sum of the others)"
-        )
-    return matrix
 
 
 def _check(parts: Mapping[str, Part]) -> None:

@@ -9,6 +9,7 @@ import pinocchio as pin
 from lxml import etree
 
 from rps_pin.closed_loop.io.mjcf_file import MjcfElement, children, placement, text
+from rps_pin.validation import inertia_fault
 
 #: Shapes with a volume, and how many numbers their size has.
 _SHAPES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
@@ -51,12 +52,9 @@ def _inertial(element: MjcfElement) -> Any:
         full = element.vector("fullinertia", (0.0,) * 6)
     xx, yy, zz, xy, xz, yz = full
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    smallest, middle, largest = np.linalg.eigvalsh(matrix)
-    if mass < 0 or smallest < 0 or largest > (smallest + middle) * (1 + 1e-9):
-        element.refuse(
-            f"is not that of a rigid body: mass {mass:.6g} kg, principal moments "
-            f"{smallest:.6g}, {middle:.6g} and {largest:.6g} kg m^2"
-        )
+    fault = "has a negative mass" if mass < 0 else inertia_fault(matrix)
+    if fault:
+        element.refuse(f"is not that of a rigid body: {fault}")
     return etree.Element("inertial", mass=repr(mass), fullinertia=text(full), **placement(pose))
 
 

@@ -17,10 +17,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, ParameterError
-from rps_pin.validation import finite_number, read_only, real_array
-
-#: Share of the largest principal moment by which the triangle inequality may fail: rounding.
-_ROUNDING = 1e-9
+from rps_pin.validation import finite_number, fixed_array, inertia_fault, real_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +52,10 @@ class Payload:
             raise ParameterError("payload mass", mass, "must be positive, in kg")
         inertia = np.zeros((3, 3)) if self.inertia is None else self.inertia
         object.__setattr__(self, "mass", mass)
-        for name, value, shape in (("centre", self.centre, (3,)), ("inertia", inertia, (3, 3))):
-            array = real_array(value, f"payload {name}")
-            if array.shape != shape:
-                raise InputError(f"payload {name} has shape {array.shape}; it must be {shape}")
-            object.__setattr__(self, name, read_only(array))
-        _check_inertia(np.asarray(self.inertia))
+        object.__setattr__(self, "centre", fixed_array(self.centre, "payload centre", (3,)))
+        object.__setattr__(self, "inertia", fixed_array(inertia, "payload inertia", (3, 3)))
+        if fault := inertia_fault(np.asarray(self.inertia)):
+            raise ParameterError("payload inertia", self.inertia, fault)
 
     @property
     def first_moment(self) -> Array:
@@ -104,17 +99,3 @@ def checked_wrench(value: ArrayLike, batch: tuple[int, ...]) -> Array:
             f"wrench has shape {wrench.shape}; it must be (6,) or go with {(*batch, 6)}: force and "
             "moment of each sample"
         ) from None
-
-
-def _check_inertia(inertia: Array) -> None:
-    scale = float(np.abs(inertia).max())
-    if np.abs(inertia - inertia.T).max() > _ROUNDING * scale:
-        raise ParameterError("payload inertia", inertia, "must be symmetric")
-    smallest, middle, largest = np.linalg.eigvalsh(inertia)
-    if smallest < -_ROUNDING * scale or largest - smallest - middle > _ROUNDING * scale:
-        raise ParameterError(
-            "payload inertia",
-            inertia,
-            f"no rigid body has it: its principal moments are {smallest:.6g}, {middle:.6g} and "
-            f"{largest:.6g}; none may be negative or exceed the sum of the others",
-        )
