@@ -192,7 +192,8 @@ def test_films_that_cannot_be_are_refused(robot, path, tmp_path, name, pose, opt
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [("playwright.sync_api", "a.png"), ("imageio_ffmpeg", "a.mp4")]
+    ("module", "name"),
+    [("playwright.sync_api", "a.png"), ("imageio_ffmpeg", "a.mp4"), ("imageio.v2", "a.gif")],
 )
 def test_what_is_missing_is_said_with_how_to_install_it(
     robot, path, tmp_path, monkeypatch, module, name

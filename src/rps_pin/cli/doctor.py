@@ -61,6 +61,7 @@ PARTS = (
     Part("viser", "viser", "the live panel", "panel"),
     Part("playwright", "playwright", "pictures and films", "pictures"),
     Part("pillow", "PIL", "pictures and films", "pictures"),
+    Part("imageio", "imageio", "films", "pictures"),
     Part("imageio-ffmpeg", "imageio_ffmpeg", "films as MP4", "pictures"),
     Part("mujoco", "mujoco", "only to compare with", ""),
 )

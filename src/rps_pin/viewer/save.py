@@ -166,7 +166,7 @@ def save_video(
         If something cannot be shown, the motion has no duration, or the file cannot be written
         there.
     RPSPinError
-        If Playwright, Chromium or (for MP4) ffmpeg is missing; says how to install them.
+        If Playwright, Chromium or imageio is missing; says how to install them.
     """
     target = checked_target(path)
     check_film(target)
@@ -191,7 +191,7 @@ def save_video(
             background=background,
             captions=captions,
         )
-        write_film(scratch, pictures, frame_rate, target.suffix.lower())
+        write_film(scratch, pictures, frame_rate)
 
     with whole_file(target) as scratch:
         in_own_thread(lambda stop: film(scratch, stop))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import os
-from collections.abc import Sequence
 from pathlib import Path
 
 import pinocchio as pin
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
-from rps_pin.viewer.files.page import WATCH_LAYERS, inline_script, licences, page, viewer_library
+from rps_pin.viewer.files.page import inline_script, licences, own_file, page, viewer_library
 from rps_pin.viewer.motion import FRAME_RATE, Motion
 from rps_pin.viewer.scene.scene import Scene
 from rps_pin.viewer.writers.recorder import Recorder
@@ -23,22 +22,6 @@ from rps_pin.viewer.writers.recorder import Recorder
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 )
-
-# Each command is decoded and carried out before the next: Meshcat's own static pages fetch() their
-# commands, and then an object may arrive after the animation that moves it.
-_START = """\
-const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-watchLayers(viewer);
-for (const text of JSON.parse(document.getElementById("commands").textContent)) {
-  viewer.handle_command_bytearray(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)));
-}
-"""
-
-# Meshcat folds its panel away; open it with nothing but the playback controls unfolded.
-_SHOW_CONTROLS = """\
-viewer.gui.__folders["Scene"].close();
-viewer.gui.open();
-"""
 
 
 def write_html(
@@ -117,23 +100,13 @@ def recorded_page(recorder: Recorder, scene: Scene, motion: Motion, title: str) 
     moves = motion.duration > 0.0
     grid = f"grid {1e3 * scene.grid_spacing:g} mm"
     note = f"{motion.duration:.3g} s, in a loop · {grid}" if moves else grid
-    return page(
-        title=title,
-        note=note,
-        policy=_POLICY,
-        scripts=_scripts(recorder.packed(), controls=moves),
-    )
-
-
-def _scripts(commands: Sequence[bytes], *, controls: bool) -> str:
-    """Return the library, its licences, the commands, and the script that runs them."""
-    texts = json.dumps([base64.b64encode(command).decode("ascii") for command in commands])
-    as_data = ' type="application/json" id="{}"'
-    return "\n".join(
-        [
-            inline_script(licences(), as_data.format("licences")),
-            inline_script(texts, as_data.format("commands")),
-            inline_script(viewer_library()),
-            inline_script(WATCH_LAYERS + _START + (_SHOW_CONTROLS if controls else "")),
-        ]
-    )
+    # The commands are data: JSON within a script that is not run.
+    commands = [base64.b64encode(command).decode("ascii") for command in recorder.packed()]
+    run = ["legend.js", "recorded.js", *(["controls.js"] if moves else [])]
+    scripts = [
+        inline_script(licences(), ' type="application/json" id="licences"'),
+        inline_script(json.dumps(commands), ' type="application/json" id="commands"'),
+        inline_script(viewer_library()),
+        inline_script("".join(map(own_file, run))),
+    ]
+    return page(title=title, note=note, policy=_POLICY, scripts="\n".join(scripts))

@@ -9,25 +9,16 @@ import tornado.web
 import tornado.websocket
 from tornado.iostream import IOStream
 
-from rps_pin.viewer.files.page import WATCH_LAYERS, inline_script, page, viewer_library
+from rps_pin.viewer.files.page import inline_script, own_file, page, viewer_library
 from rps_pin.viewer.server.store import SceneStore
 
 _SOCKET_PATH = "/socket"
+"""As in live.js."""
 _SCRIPT_PATH = "/meshcat.js"
 _MOST_UNSENT = 20_000
 """Messages, besides the scene itself, that may wait for one tab: a few megabytes."""
 _GOING_AWAY = 1001
 """WebSocket status of a server that ends."""
-
-_START = f"""\
-const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-watchLayers(viewer);
-viewer.connect("ws://" + location.host + "{_SOCKET_PATH}");
-viewer.connection.onclose = () => {{
-  document.getElementById("note").textContent =
-    "No connection to the viewer any more; this is the last picture it showed.";
-}};
-"""
 
 
 class Hub:
@@ -176,7 +167,8 @@ def application(hub: Hub, *, port: int, title: str, note: str) -> tornado.web.Ap
             "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'unsafe-inline'; "
             f"img-src data: blob:; connect-src {sockets}"
         ),
-        scripts=f'<script src="{_SCRIPT_PATH}"></script>\n{inline_script(WATCH_LAYERS + _START)}',
+        scripts=f'<script src="{_SCRIPT_PATH}"></script>\n'
+        + inline_script(own_file("legend.js") + own_file("live.js")),
     )
     return tornado.web.Application(
         [
