@@ -1,4 +1,4 @@
-"""Actuator forces of a hundred thousand samples: in closed form, and what Pinocchio takes.
+"""Time of the actuator forces of 100,000 samples: closed form, and Pinocchio's RNEA.
 
 Run with ``make bench``. The goals: at most 0.5 us a sample on one core, and less than
 ``pin.rneaInParallel`` takes on one thread for the open chains alone, with nothing closed.
@@ -25,7 +25,7 @@ CONSTRAINTS = "constraint models, sample by sample"
 
 
 def motion(name: str) -> tuple[Array, Array, Array]:
-    """Smooth, fast motions within the robot's reach."""
+    """Return smooth, fast motions within the workspace."""
     rng = np.random.default_rng(1)
     low, high, tilt = {"sokolov": (0.35, 0.6, 0.4), "micro": (0.22, 0.23, 0.05)}[name]
     pose = np.stack(
@@ -35,7 +35,7 @@ def motion(name: str) -> tuple[Array, Array, Array]:
 
 
 def jobs(robot: RPSRobot, name: str) -> dict[str, Job]:
-    """The same work three ways, the second without the closures."""
+    """Time the closed form, RNEA of the open chains, and the constraint models."""
     samples = motion(name)
     q, v, a = robot.state(*samples)
     model = robot.mechanism.model

@@ -23,7 +23,7 @@ LOOPS = [1, 2, 4, 8, 16, 32, 64]
 
 
 def chain(loops: int, kind: str) -> ClosedLoopModel:
-    """Parallelograms: every crank and rocker stands at the driven angle."""
+    """Return a chain of parallelograms: all cranks and rockers have the driven angle."""
     model = pin.Model()
     turn = pin.JointModelRY()
 

@@ -1,4 +1,4 @@
-"""One call of force distribution, warm-started, against other ways to the same forces.
+"""Time of a force distribution with warm start, and of other methods.
 
 A five-bar with four actuators, one of them at its limit. The peers solve for tau and lambda
 together, from the same Jacobian and generalised force: ProxQP with a problem built at each call, as
@@ -34,7 +34,7 @@ def ours(mechanism: ClosedLoopModel) -> Solver:
 
 
 def solver_each_time(mechanism: ClosedLoopModel) -> Solver:
-    """Ours without its memory: ProxQP cold at each call."""
+    """Force distribution without warm start."""
     distribution = ForceDistribution(mechanism, torque_limits=LIMITS)
 
     def solve(q: Array, v: Array, a: Array) -> Array:

@@ -1,4 +1,4 @@
-"""One call of inverse dynamics of the 3-RPS against the plain way of writing it, in the same run.
+"""Time of the 3-RPS's inverse dynamics, and of plain Pinocchio and NumPy, in one run.
 
 Run with ``make bench``. The goal: a third of the plain way, or less.
 """
@@ -24,7 +24,7 @@ ACCELERATION = [0.5, -1.0, 2.0]
 
 
 def plain(robot: RPSRobot) -> Solver:
-    """Closed-loop inverse dynamics as Pinocchio's examples would have one write it."""
+    """Closed-loop inverse dynamics as in Pinocchio's examples."""
     mechanism = robot.mechanism
     model = mechanism.model
     data = model.createData()

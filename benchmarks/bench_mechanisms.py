@@ -31,7 +31,7 @@ MECHANISMS = {"3-RPS": "rps", "Delta": "delta_rods", "Stewart": "stewart"}
 
 
 class Case:
-    """A mechanism in a state off its home."""
+    """A mechanism in a state away from home."""
 
     def __init__(self, name: str) -> None:
         file = URDF / f"{MECHANISMS[name]}.yaml"

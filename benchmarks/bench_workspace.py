@@ -1,4 +1,4 @@
-"""The workspace's direct kinematics against a loop of SciPy's solver, and its cost per point.
+"""Time of the workspace's forward kinematics, and of a loop of SciPy's solver; time per point.
 
 Run with ``make bench``. The goals: 125,000 triples of leg lengths in less than 0.1 s on one core
 and 200 times faster than the loop; a cost per point that does not depend on how many there are.
@@ -26,7 +26,7 @@ FEW = 500
 
 
 def fsolve_loop(length: Array, start: Array, g: float, h: float) -> Array:
-    """Eq. 8 triple by triple, as one would write it with SciPy."""
+    """Solve Eq. 8 for one set of leg lengths after the other with SciPy."""
 
     def equations(phi: Array, d: Array) -> Array:
         rho, z = g - d * np.cos(phi), d * np.sin(phi)
@@ -43,7 +43,7 @@ def micro() -> RPSParameters:
 
 @pytest.mark.benchmark(group="direct kinematics, 50^3", min_rounds=7)
 def bench_direct_kinematics(benchmark: BenchmarkFixture, micro: RPSParameters) -> None:
-    """The whole grid, beside a loop over some of its triples in the same run."""
+    """Time the whole grid, and a loop over some of its points in the same run."""
     job = GridJob(micro, leg_grid(micro, 50))
     mode = job.assembly_mode
     assert mode is not None
@@ -84,6 +84,6 @@ def bench_cost_per_point(
 
 
 def bench_all_in_memory(benchmark: BenchmarkFixture, micro: RPSParameters) -> None:
-    """The paper's 51^3 points with all their fields."""
+    """Time the paper's 51^3 points with all fields."""
     space = benchmark.pedantic(workspace, (micro,), rounds=3)
     assert space.inside.all()

@@ -1,4 +1,4 @@
-"""Prints, after the table, each benchmark's time as a ratio to the peers of its group."""
+"""Ratios of each benchmark's time to the peers of its group, printed after the table."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Print times of ours over those of the peers, group by group; medians and minima."""
+    """Print our times over those of the peers by group: medians and minima."""
     session = getattr(terminalreporter.config, "_benchmarksession", None)
     groups: dict[str, dict[str, Any]] = defaultdict(dict)
     for bench in session.benchmarks if session else []:

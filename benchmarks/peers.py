@@ -54,7 +54,7 @@ class PlainPinocchio:
         return tau
 
     def forward_dynamics(self, q: Array, v: Array, tau: Array) -> Array:
-        """The KKT system as it stands, which massless links do not make singular."""
+        """Solve the full KKT system, which massless links do not make singular."""
         model, data = self.model, self.data
         pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
         axes = pin.LOCAL_WORLD_ALIGNED
@@ -76,7 +76,7 @@ class PlainPinocchio:
 
 
 class ConstraintDynamics(PlainPinocchio):
-    """Pinocchio's own constrained forward dynamics: for links that all have mass."""
+    """Pinocchio's `constraintDynamics`; all links must have mass."""
 
     def __init__(self, mechanism: ClosedLoopModel) -> None:
         super().__init__(mechanism)
@@ -112,7 +112,7 @@ class LoopConstrainedABA(ConstraintDynamics):
 
 
 class Mujoco:
-    """The same URDF in MuJoCo, its spherical closures `connect` equalities."""
+    """The same URDF in MuJoCo, with `connect` equalities for spherical closures."""
 
     def __init__(self, mechanism: ClosedLoopModel, urdf: str, q: Array, v: Array) -> None:
         tree = etree.fromstring(urdf.encode())
@@ -142,7 +142,7 @@ class Mujoco:
 
     @staticmethod
     def _site(spec: mujoco.MjSpec, mechanism: ClosedLoopModel, frame: str) -> str:
-        """Mark a frame of a link; MuJoCo's bodies are named after the URDF's links."""
+        """Add a site at a frame of a link, and return its name."""
         body = spec.body(frame)
         body.add_site(name=f"{frame}_closed", pos=[0, 0, 0])
         return f"{frame}_closed"
@@ -162,7 +162,7 @@ class Mujoco:
             self.data.qvel[dof : dof + 6] = [*(turn @ twist[:3]), *twist[3:]]
 
     def inverse_dynamics(self) -> Array:
-        """MuJoCo's position and velocity stages and its recursion, the loops solved with NumPy."""
+        """Solve with MuJoCo's position and velocity stages, its recursion, and NumPy."""
         model, data = self.model, self.data
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
@@ -174,7 +174,7 @@ class Mujoco:
         return tau
 
     def forward_dynamics(self) -> Array:
-        """MuJoCo's own soft constraints."""
+        """Return MuJoCo's acceleration, with soft constraints."""
         mujoco.mj_forward(self.model, self.data)
         a: Array = self.data.qacc
         return a

@@ -1,6 +1,6 @@
 """Write the tables of docs/benchmarks.md from a run of the benchmarks.
 
-Run it from the checkout, on a machine with nothing else to do, in an environment with the
+Run it from the checkout, on an idle machine, in an environment with the
 development dependencies (about five minutes):
 
     .venv/bin/python docs/benchmarks_table.py
@@ -22,12 +22,12 @@ ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "benchmarks.md"
 FILES = ("inverse_dynamics", "mechanisms", "chains", "force_distribution")
 
-#: Least time in microseconds by group and role: a shared machine's median wanders.
+#: Minimum time in microseconds by group and role; on a shared machine the median varies.
 Times = dict[str, dict[str, float]]
 
 
 def main() -> None:
-    """Make both tables anew."""
+    """Run the benchmarks and write both tables."""
     times = measured()
     text = PAGE.read_text("utf-8")
     chains = {group: roles for group, roles in times.items() if "four-bars" in group}
@@ -38,7 +38,7 @@ def main() -> None:
 
 
 def measured() -> Times:
-    """Run the benchmarks and return the least time of each."""
+    """Run the benchmarks and return the minimum time of each."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
         files = [str(ROOT / "benchmarks" / f"bench_{name}.py") for name in FILES]
@@ -54,7 +54,7 @@ def measured() -> Times:
 
 
 def operations_table(times: Times) -> str:
-    """Return a line for each operation and peer."""
+    """Return a row for each operation and peer."""
     lines = ["| operation | ours (us) | peer | peer (us) | ours / peer |", "|---|---|---|---|---|"]
     for group, roles in times.items():
         for role, peer in roles.items():
@@ -65,7 +65,7 @@ def operations_table(times: Times) -> str:
 
 
 def chains_table(times: Times) -> str:
-    """Return a line for each number of loops."""
+    """Return a row for each number of loops."""
     kinds = sorted({group.partition(" four-bars, ")[2] for group in times})
     counts = sorted({int(group.partition(" ")[0]) for group in times})
     heads = []

@@ -1,4 +1,4 @@
-"""How Sphinx builds this site; `make docs` does, with warnings as errors."""
+"""Sphinx configuration of the site; `make docs` builds it with warnings as errors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx.ext.mathjax",
     "sphinx_copybutton",
-    "docstrings",  # ours, beside this file
+    "docstrings",  # docs/docstrings.py
 ]
 exclude_patterns = ["README.md"]
 
@@ -31,7 +31,7 @@ html_static_path = ["_static", str(files("sphinx-mathjax-offline") / "static")]
 mathjax_path = "mathjax/tex-chtml.js"  # a copy in the site, not from the network
 html_css_files = ["site.css"]
 html_copy_source = html_show_sourcelink = False
-highlight_language = "none"  # blocks that are indented: what a terminal shows
+highlight_language = "none"  # indented blocks are terminal output
 
 # Markdown ---------------------------------------------------------------------------------------
 
@@ -40,7 +40,7 @@ myst_heading_anchors = 3
 
 # The API from docstrings ------------------------------------------------------------------------
 
-default_role = "py:obj"  # `name` in a docstring: a link where it is one
+default_role = "py:obj"  # `name` in a docstring is a link if it resolves
 add_module_names = False
 toc_object_entries = False
 autodoc_default_options = {"members": True, "member-order": "bysource"}
@@ -53,7 +53,7 @@ napoleon_google_docstring = False
 napoleon_use_ivar = True
 napoleon_use_rtype = False
 
-# A link of ours to a name that is not in the API is a mistake; types in signatures, and names of
-# other libraries, are links where they can be.
+# Links to rps_pin names that are not in the API are errors. Types in signatures and names of other
+# libraries are linked if possible.
 nitpicky = True
 nitpick_ignore_regex = [("py:class", ".*"), ("py:.*", r"(?!rps_pin\.).*")]

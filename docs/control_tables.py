@@ -1,12 +1,12 @@
 """Write the tables and pictures of docs/control.md.
 
-Run it from the checkout, on a machine with nothing else to do, in an environment with the
+Run it from the checkout, on an idle machine, in an environment with the
 development dependencies (about two minutes):
 
     .venv/bin/python docs/control_tables.py
 
-The tables of times are of docs/control_latency.json and docs/control_profile.json. The first takes
-longer, about ten minutes for a million ticks a stage:
+The tables of times are made from docs/control_latency.json and docs/control_profile.json. The first
+takes about ten minutes, for a million ticks per stage:
 
     export OPENBLAS_NUM_THREADS=1
     .venv/bin/python -m benchmarks.latency --json docs/control_latency.json
@@ -57,7 +57,7 @@ Make = Callable[[RPSRobot], Controller]
 
 
 def main() -> None:
-    """Make everything anew."""
+    """Write all tables and pictures."""
     parts: dict[str, Callable[[], str]] = {
         "micro": micro,
         "margins": margins,
@@ -75,7 +75,7 @@ def main() -> None:
 
 
 def controllers(start: Any, robot: RPSRobot) -> dict[str, Make]:
-    """Return what is compared, all equally stiff at the start."""
+    """Return the compared controllers, with equal initial stiffness."""
     placed, pd = Gains.placed(BANDWIDTH, integral=INTEGRAL), Gains.placed(BANDWIDTH)
     legs = effective_inertia(robot, start)
     pose = effective_inertia(robot, start, space="task")
@@ -93,7 +93,7 @@ def controllers(start: Any, robot: RPSRobot) -> dict[str, Make]:
 
 
 def plants(p: RPSParameters) -> dict[str, tuple[RPSRobot, RPSRobot, dict[str, Any]]]:
-    """Return the robot as believed, as it is, and the plant's other faults, by name."""
+    """Return the robot of the model, that of the plant, and the plant's options, by name."""
     robot = RPSRobot(p)
     with_friction = wrong_parameters(p, **FRICTION)
     more = {name: 1.2 * value for name, value in FRICTION.items()}
@@ -115,7 +115,7 @@ def plants(p: RPSParameters) -> dict[str, tuple[RPSRobot, RPSRobot, dict[str, An
 
 
 def compared(robot: RPSRobot, path: Trajectory) -> str:
-    """Return the errors of every controller on every plant: a row a plant, then the ratio."""
+    """Return the errors of every controller on every plant, and their ratio."""
     start = path.sample(0.0).pose
     machines = plants(robot.parameters)
     lines = [f"| | {' | '.join(machines)} |", "|---|" + "---:|" * len(machines)]
@@ -146,7 +146,7 @@ def micro() -> str:
 
 
 def margins() -> str:
-    """Return the margins of the gains used here, and of others."""
+    """Return the margins of these and other gains."""
     lines = [
         "| bandwidth | integral | cut-off | delay | gain may change by | phase | delay more | "
         "modulus |",
@@ -167,7 +167,7 @@ def margins() -> str:
 
 
 def robustness() -> str:
-    """Return the margins against a simulated robot: where it is unstable indeed."""
+    """Return the errors of a simulated robot near its stability limits."""
     robot = RPSRobot.from_preset("micro")
     path = helix(robot, radius=0.5e-3, pitch=0.33e-3, height=0.223, duration=1.0)
     start = path.sample(0.0).pose
@@ -188,7 +188,7 @@ def robustness() -> str:
 
 
 def faults() -> str:
-    """Return what the controller said in the scenario of faults."""
+    """Return the controller's status in the scenario of faults."""
     scenario = load_scenario(SCENARIOS / "faults.yaml")
     run = scenario.run()
     errors = TrackingErrors.of(run)
@@ -212,7 +212,7 @@ def faults() -> str:
 
 
 def saturation() -> str:
-    """Return how far a weak robot leaves its path, with and without pace."""
+    """Return the path error of a saturated robot, with and without a paced setpoint."""
     scenario = load_scenario(SCENARIOS / "weak.yaml")
     path = scenario.trajectory
     dense = path.sample(np.linspace(0.0, path.duration, 20_001)).pose
@@ -245,7 +245,7 @@ def distance_from(run: LoopRun, path: Any, h: float) -> float:
 
 
 def latency() -> str:
-    """Return the table of latencies as measured."""
+    """Return the table of measured latencies."""
     measured = json.loads(LATENCY.read_text("utf-8"))
     lines = [
         "| stage | ticks | median | p99 | p99.9 | p99.9, quietest tenth | maximum | memory grew |",
@@ -273,7 +273,7 @@ def latency() -> str:
 
 
 def profile() -> str:
-    """Return the table of a tick's parts as measured."""
+    """Return the table of the measured parts of a tick."""
     measured = json.loads(PROFILE.read_text("utf-8"))
     compiled, interpreted = measured["compiled"], measured["interpreted"]
     lines = ["| part of a tick | compiled, us | share | interpreted, us |", "|---|---:|---:|---:|"]
@@ -292,7 +292,7 @@ def save_figure_named(run: LoopRun, name: str) -> None:
 
 
 def picture() -> None:
-    """Write the errors of PD and computed torque on one figure."""
+    """Plot the errors of PD and computed torque in one figure."""
     scenario = load_scenario(SCENARIOS / "micro_helix.yaml")
     start = scenario.begin
     pd = Gains.placed(BANDWIDTH).times(effective_inertia(scenario.model, start))

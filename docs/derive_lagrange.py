@@ -164,7 +164,7 @@ def compiled() -> Callable[..., Mapping[str, Any]]:
 
 
 def main() -> None:
-    """Print what the derivation finds."""
+    """Print the derived terms."""
     print_checks()
     print_legs("Cylinders (Eq. 16, 21)", cylinder_energies())
     print_legs("Rods", rod_energies())
@@ -176,7 +176,7 @@ def main() -> None:
 
 
 def print_checks() -> None:
-    """Print that the equations the derivation starts from are right."""
+    """Check the equations from which the derivation starts, and print the result."""
     print("Eq. 8 less |B_i - B_j|^2 - 3 h^2:")
     for row, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
         side = TIPS[i] - TIPS[j]
@@ -189,7 +189,7 @@ def print_checks() -> None:
 
 
 def print_legs(title: str, energies: tuple[sp.Expr, sp.Expr]) -> None:
-    """Print the terms of leg 1; legs do not act on one another but through the platform."""
+    """Print the terms of leg 1; legs interact only through the platform."""
     terms = lagrange(*energies)
     print(f"\n{title}, leg 1:")
     names = (D[0], PHI[0])
@@ -202,7 +202,7 @@ def print_legs(title: str, energies: tuple[sp.Expr, sp.Expr]) -> None:
 
 
 def print_platform() -> None:
-    """Print the platform's terms: all of the translation's, the axes of the rotation's."""
+    """Print the terms of the platform."""
     speed = velocity(CENTRE)
     terms = lagrange(m * speed.dot(speed) / 2, -m * GRAVITY.dot(CENTRE))
     print("\nPlatform, translation (Eq. 13, 19), rows of leg 1; the others by turning the indices:")

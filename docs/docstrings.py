@@ -1,4 +1,4 @@
-"""What autodoc is told of our docstrings: blocks are formulas, bars are absolute values."""
+"""Sphinx extension for the docstrings: indented blocks are formulas, bars absolute values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sphinx.application import Sphinx
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Register what is done before napoleon reads a docstring's sections (at 500), and after."""
+    """Register the steps before napoleon parses a docstring (priority 500), and after."""
     app.connect("autodoc-process-docstring", fields_of_models, priority=300)
     app.connect("autodoc-process-docstring", formulas, priority=400)
     app.connect("autodoc-process-docstring", whole_sentences, priority=600)
@@ -24,7 +24,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
 def fields_of_models(
     app: Sphinx, what: str, name: str, obj: Any, options: object, lines: list[str]
 ) -> None:
-    """Give a pydantic model's docstring a list of its fields, as their descriptions say."""
+    """Add the fields of a pydantic model with their descriptions to its docstring."""
     if what == "class" and issubclass(obj, BaseModel):
         lines += ["", "Attributes", "----------"]
         for field, info in obj.model_fields.items():
@@ -42,7 +42,7 @@ def short_signature(
     signature: str | None,
     returned: str | None,
 ) -> tuple[str | None, str | None]:
-    """Leave out of a pydantic model's signature what its fields say better; aliases are names."""
+    """Shorten the signature of a pydantic model, and print type aliases by name."""
     if what == "class" and issubclass(obj, BaseModel):
         return "(**fields)", None
     alias = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")  # how autodoc prints one inside a tuple
@@ -53,7 +53,7 @@ def short_signature(
 def formulas(
     app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
 ) -> None:
-    """Keep indented blocks as they stand, and bars as they are."""
+    """Make indented blocks literal, and escape bars."""
     kept: list[str] = []
     block = -1  # how far the block is indented; -1 outside of one
     text = 0  # how far the last line of text was
@@ -74,7 +74,7 @@ def formulas(
 def whole_sentences(
     app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
 ) -> None:
-    """Undo what napoleon makes of an attribute's "Which: one or two.": a type and a text."""
+    """Restore an attribute's text "Name: text", which napoleon parses as a type."""
     kinds = [number for number, line in enumerate(lines) if line.startswith(":type: ")]
     if what in ("attribute", "property", "data") and kinds:
         which = lines[kinds[0]].removeprefix(":type: ")
@@ -82,6 +82,6 @@ def whole_sentences(
 
 
 def exact_names(app: Sphinx, doctree: nodes.document) -> None:
-    """Look names in fields up as they are, not as the end of some name anywhere."""
+    """Resolve names in fields exactly, not as suffixes of other names."""
     for reference in doctree.findall(addnodes.pending_xref):
         reference.attributes.pop("refspecific", None)

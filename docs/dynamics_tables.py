@@ -37,7 +37,7 @@ WAYS = ("closed form", "Lagrange, first kind", "virtual work")
 
 
 def main() -> None:
-    """Make everything anew."""
+    """Write all tables and pictures."""
     parts: dict[str, Callable[[], str]] = {
         "agreement": agreement,
         "trajectories": trajectories,
@@ -68,7 +68,7 @@ def shown() -> dict[str, tuple[RPSRobot, Trajectory]]:
 
 
 def agreement() -> str:
-    """Return how far the other ways are from the constraint models, a line a trajectory."""
+    """Return the differences of the methods from the constraint models, by trajectory."""
     lines = [f"| trajectory | samples | {' | '.join(WAYS)} |", "|---|---|---|---|---|"]
     for name, (robot, path) in shown().items():
         run = run_motion(robot, path, RATE)
@@ -79,7 +79,7 @@ def agreement() -> str:
 
 
 def trajectories() -> str:
-    """Return durations and peaks of the files' trajectories, as they are and fastest."""
+    """Return durations and peaks of the trajectories, as given and time-optimal."""
     micro = RPSRobot.from_preset("micro")
     head = "| file | duration (s) | peak force (N) | peak speed (m/s) "
     lines = [f"{head}| shortest (s) | peak force (N) | peak speed (m/s) |", "|---" * 7 + "|"]
@@ -91,7 +91,7 @@ def trajectories() -> str:
 
 
 def peaks(robot: RPSRobot, path: Trajectory) -> list[str]:
-    """Return duration, peak force and peak speed for reading."""
+    """Return duration, peak force and peak speed as text."""
     motion = path.sample(np.linspace(0.0, path.duration, 20_001))
     force = robot.actuator_forces(*motion)
     speed = robot.motion(*motion)[1].speed
@@ -100,7 +100,7 @@ def peaks(robot: RPSRobot, path: Trajectory) -> list[str]:
 
 
 def refused() -> str:
-    """Return what the command says of trajectories that cannot be followed."""
+    """Return the command's errors for infeasible trajectories."""
     with tempfile.TemporaryDirectory() as folder:
         texts = {
             "tilted.yaml": "kind: circle\nheight: 0.227\ntilt: 0.2\nduration: 2.0\n",
@@ -127,7 +127,7 @@ def sheet() -> str:
 
 
 def cost() -> str:
-    """Return the benchmark's least times a sample."""
+    """Return the benchmark's minimum times per sample."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report.json"
         bench = str(ROOT / "benchmarks" / "bench_actuator_forces.py")
@@ -163,13 +163,13 @@ def picture() -> None:
 
 
 def rps_pin(arguments: list[str], folder: str) -> subprocess.CompletedProcess[str]:
-    """Run the command as a person would."""
+    """Run the command and return its output."""
     command = [sys.executable, "-c", "from rps_pin.cli import main; main()", *arguments]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
 def wrapped(line: str, width: int = 96) -> list[str]:
-    """Return a long line as several."""
+    """Return a long line broken into several."""
     return re.findall(rf".{{1,{width}}}(?:\s+|$)", line.strip())
 
 

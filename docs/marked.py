@@ -1,4 +1,4 @@
-"""Pages with parts that scripts write, each between two comments that name the script."""
+"""Parts of pages that scripts write, between two comments that name the script."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def replaced(text: str, name: str, part: str) -> str:
-    """Return a page with a new part between the running script's markers of a name.
+    """Return a page with a new part between the markers of the running script and a name.
 
     Raises
     ------
@@ -24,5 +24,5 @@ def replaced(text: str, name: str, part: str) -> str:
 
 
 def block(lines: list[str]) -> str:
-    """Return lines as preformatted text."""
+    """Return lines as an indented block."""
     return "\n".join(f"    {line}".rstrip() for line in lines)

@@ -1,4 +1,4 @@
-"""A page's Python: run in order, with what each block prints, and the pictures it writes."""
+"""Python blocks of a page: run in order, with their output and pictures."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 
-#: A Python block and, if it follows at once, the block that shows what it prints.
+#: A Python block and, if it follows directly, the text block that shows its output.
 _BLOCK = re.compile(r"```python\n(.*?)```(\n\n```text\n(.*?)```)?", re.DOTALL)
 
 
 class Ran(NamedTuple):
-    """A block of a page, after it ran."""
+    """A block of a page after its run."""
 
     place: tuple[int, int]
-    """Where the text block's inside begins and ends in the page; equal where there is none."""
+    """Start and end of the text block's content in the page; equal if there is none."""
     shown: str | None
-    """What the page says that it prints, if it says so."""
+    """Output shown in the page, or None."""
     printed: str
-    """What it printed."""
+    """Output of the run."""
 
 
 def run(text: str, folder: Path) -> Iterator[Ran]:
     """Run a page's Python blocks in order, in an empty folder with the repository's URDFs."""
     (folder / "urdf").symlink_to(ROOT / "urdf")
     names: dict[str, Any] = {}
-    with contextlib.chdir(folder):  # what the blocks write does not litter the checkout
+    with contextlib.chdir(folder):  # files of the blocks are not written to the checkout
         for number, block in enumerate(_BLOCK.finditer(text), start=1):
             code = compile(block[1], f"block {number}", "exec")
             with contextlib.redirect_stdout(io.StringIO()) as printed:

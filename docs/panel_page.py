@@ -1,6 +1,6 @@
 """Write the rates and the picture of docs/panel.md.
 
-Run it from the checkout, on a machine with nothing else to do, in an environment with the
+Run it from the checkout, on an idle machine, in an environment with the
 development dependencies and a Chromium (half a minute):
 
     .venv/bin/python -m docs.panel_page
@@ -18,7 +18,7 @@ PAGE = HERE / "panel.md"
 
 
 def main() -> None:
-    """Make both anew."""
+    """Measure and write both."""
     text = replaced(PAGE.read_text("utf-8"), "rate", block(measured()))
     PAGE.write_text(text, "utf-8")
     with opened(1000) as (_, page):

@@ -1,4 +1,4 @@
-"""Write the tables of docs/simulation.md: the same robot simulated here and in MuJoCo, in one run.
+"""Write the tables of docs/simulation.md: one robot simulated by rps_pin and by MuJoCo.
 
 Run it from the checkout, in an environment with the development dependencies (a few minutes):
 
@@ -32,7 +32,7 @@ START = [0.41, 0.1, -0.05], [0.1, 0.3, -0.2], [0.0, 0.0, 0.0]  # pose, rate, acc
 
 
 class Result(NamedTuple):
-    """A line of a table."""
+    """A row of a table."""
 
     name: str
     step: float
@@ -45,7 +45,7 @@ class Result(NamedTuple):
 
 
 def main() -> None:
-    """Run everything and write the page's tables."""
+    """Run the simulations and write the tables."""
     robot = comparable_robot()
     mechanism = sprung(robot)
     text = PAGE.read_text("utf-8")
@@ -76,9 +76,9 @@ def main() -> None:
 
 
 def comparable_robot() -> RPSRobot:
-    """Return the sokolov preset, with what MuJoCo demands of bodies.
+    """Return the sokolov preset with bodies that MuJoCo accepts.
 
-    Its rods need a mass, and the platform an inertia that a rigid body can have.
+    The rods have a mass, and the platform an inertia that satisfies the triangle inequality.
     """
     given = RPSParameters.from_preset("sokolov")
     fields = {name: getattr(given, name) for name in type(given).model_fields}
@@ -96,7 +96,7 @@ def sprung(robot: RPSRobot, stiffness: float = STIFFNESS) -> ClosedLoopModel:
 
 
 def rest(robot: RPSRobot, stiffness: float) -> dict[str, float]:
-    """Where the springs are without force, m."""
+    """Return the lengths at which the springs have no force, m."""
     carried = robot.mechanism.inverse_dynamics(*robot.state([0.4, 0, 0], [0, 0, 0], [0, 0, 0])).tau
     lengths = robot.inverse_kinematics([0.4, 0, 0]).length + carried / stiffness
     return dict(zip(LEGS, lengths.tolist(), strict=True))
@@ -106,7 +106,7 @@ def rest(robot: RPSRobot, stiffness: float) -> dict[str, float]:
 
 
 def our(mechanism: ClosedLoopModel, robot: RPSRobot, step: float, **options: Any) -> Result:
-    """Simulate it here; the time is that of the fastest run, records included."""
+    """Simulate with rps_pin; the time is that of the fastest run, with recording."""
     q, v, _ = robot.state(*START)
     spent = np.inf
     for _ in range(REPEATS):
@@ -127,7 +127,7 @@ def drift(kinetic: Array, energy: Array) -> float:
 def in_mujoco(
     mechanism: ClosedLoopModel, robot: RPSRobot, step: float, integrator: str, stiff: bool
 ) -> Result:
-    """Simulate it there; the time is that of `mj_step` in the fastest run, records left out."""
+    """Simulate with MuJoCo; the time is that of `mj_step` in the fastest run."""
     runs = [_in_mujoco(mechanism, robot, step, integrator, stiff) for _ in range(REPEATS)]
     return min(runs, key=lambda result: result.seconds)
 
@@ -161,7 +161,7 @@ def _in_mujoco(
 
 
 def mujoco_model(robot: RPSRobot, step: float, integrator: str, stiff: bool) -> Any:
-    """Return the same URDF with springs, its loops closed by equality connects of sites."""
+    """Return the URDF in MuJoCo, with springs and equality connects."""
     tree = etree.fromstring(robot.urdf)
     options = {"balanceinertia": "false", "boundmass": "0", "boundinertia": "0"}
     options |= {"discardvisual": "true"}
@@ -192,7 +192,7 @@ def mujoco_model(robot: RPSRobot, step: float, integrator: str, stiff: bool) -> 
 
 
 def put(mechanism: ClosedLoopModel, model: Any, data: Any, q: Array, v: Array) -> None:
-    """Give MuJoCo the state: quaternions (w, x, y, z), free velocities linear in world axes."""
+    """Set MuJoCo's state: quaternions (w, x, y, z), linear free velocities in world axes."""
     for name, joint in list(zip(mechanism.model.names, mechanism.model.joints, strict=True))[1:]:
         address = model.joint(name)
         place, dof = int(address.qposadr[0]), int(address.dofadr[0])
@@ -207,7 +207,7 @@ def put(mechanism: ClosedLoopModel, model: Any, data: Any, q: Array, v: Array) -
 
 
 def stiffer(robot: RPSRobot, stiffness: float) -> str:
-    """Return a line of energy drifts over ten seconds."""
+    """Return a row of energy drifts over ten seconds."""
     mechanism = sprung(robot, stiffness)
     q, v, _ = robot.state(*START)
     runs: list[Callable[[], Any]] = [
@@ -224,7 +224,7 @@ def stiffer(robot: RPSRobot, stiffness: float) -> str:
 
 
 def row(result: Result, unit: float) -> str:
-    """Return a line of the table; times as multiples of a unit."""
+    """Return a row of the table, with times relative to a unit."""
     return (
         f"| {result.name} | {result.step * 1e3:g} | {result.gap:.0e} | {result.drift:.0e} | "
         f"{result.seconds / unit:.2g} |"

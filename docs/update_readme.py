@@ -1,4 +1,4 @@
-"""Write what the README shows: its pictures, and the output of its command and its Python lines.
+"""Write the README's pictures and the output of its command and its first Python block.
 
 Run it from the checkout, in an environment with the development dependencies and a Chromium:
 
@@ -25,7 +25,7 @@ IMAGES = ROOT / "docs" / "images"
 
 
 def main() -> None:
-    """Make everything anew."""
+    """Write all tables and pictures."""
     text = README.read_text("utf-8")
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", "from rps_pin.cli import main; main()", "helix"]
@@ -42,12 +42,12 @@ def main() -> None:
 
 
 def quoted(output: str) -> str:
-    """Return what was printed as preformatted text."""
+    """Return output as an indented block."""
     return block(output.strip("\n").splitlines())
 
 
 def photograph(picture: Path) -> None:
-    """Take a picture of the paper's robot half-way along its helix, as viewer.html shows it."""
+    """Save a picture of the paper's robot half-way along its helix."""
     robot = RPSRobot.from_preset("sokolov")
     path = helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4)
     title, layers = "3-RPS sokolov along a helix", ["trail", "forces"]

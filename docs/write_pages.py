@@ -1,7 +1,6 @@
-"""Write what the pages' Python prints into the pages, and the pictures that it makes.
+"""Run the Python blocks of pages, and write their output and pictures into the pages.
 
-Run it from the checkout, in an environment with the development dependencies; with names of pages,
-only those:
+Run it from the checkout, in an environment with the development dependencies. Arguments are pages:
 
     .venv/bin/python docs/write_pages.py docs/tutorial.md
 """
@@ -37,7 +36,7 @@ def main() -> None:
 
 
 def wrapped(printed: str) -> str:
-    """Return what was printed with long lines broken, but for tables."""
+    """Return output with long lines broken, except in tables."""
     lines = []
     for line in printed.rstrip().splitlines():
         table = len(line) <= WIDTH or line.strip()[0] in "│┃┏┡├└"
