@@ -236,7 +236,7 @@ def test_a_fault_that_can_be_made_can_be_used(changes: dict[str, Any]) -> None:
         fault = Fault(**(arguments | changes))
     except InputError:
         return
-    Faults([fault]).reading(0.0, READINGS[0])
+    assert np.shape(Faults([fault]).reading(0.0, READINGS[0])) == (3,)
 
 
 def test_words() -> None:

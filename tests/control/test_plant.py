@@ -299,4 +299,11 @@ def test_arguments_that_do_not_fit_are_refused(
 
 
 def test_numpy_s_whole_numbers_are_whole_numbers() -> None:
-    Plant(RPSRobot.from_preset("micro"), [0.223, 0.0, 0.0], substeps=np.int64(3), delay=np.int64(1))
+    robot = RPSRobot.from_preset("micro")
+    positions = []
+    for whole in (int, np.int64):
+        plant = Plant(robot, [0.223, 0.0, 0.0], substeps=whole(3), delay=whole(1))
+        for _ in range(3):
+            plant.step((0.0, 0.0, 0.0))
+        positions.append(plant.pose)
+    np.testing.assert_array_equal(*positions)

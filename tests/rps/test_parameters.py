@@ -391,7 +391,8 @@ def test_inertia_of_any_set_of_points_is_legal(data: st.DataObject) -> None:
 
 def test_plates_and_bars_are_rigid_bodies() -> None:
     for principal in ([1.0, 1.0, 2.0], [1.0, 2.0, 3.0], [0.0, 1.0, 1.0]):
-        legal(platform_inertia=turned(principal))
+        inertia = turned(principal)
+        np.testing.assert_array_equal(legal(platform_inertia=inertia).platform_inertia, inertia)
 
 
 @pytest.mark.parametrize("entry", [(0, 1), (1, 2), (2, 0)])
