@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rps_pin.files import whole_file
+from rps_pin.errors import InputError
+from rps_pin.files import opened, whole_file
 
 
 def test_finished_file_stands_at_its_path_and_nothing_else_remains(tmp_path: Path) -> None:
@@ -71,4 +72,19 @@ def test_umask_stays_as_it_was(tmp_path: Path) -> None:
 
 def test_missing_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError), whole_file(tmp_path / "no" / "a.txt"):
+        pass
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_bytes(b"\xff\xfe")
+    reasons = {tmp_path / "no": "No such file", tmp_path: "directory", "a\0b": "null"}
+    for path, why in reasons.items():
+        words = f"cannot read the table .*: .*{why}"
+        with pytest.raises(InputError, match=words), opened(path, "table"):
+            pass
+    words = r"cannot read the table .*a.txt: not a UTF-8 text"
+    with pytest.raises(InputError, match=words), opened(tmp_path / "a.txt", "table") as file:
+        file.read().decode()
+    words = "a table is given by its path, not by 3"
+    with pytest.raises(InputError, match=words), opened(3, "table"):
         pass

@@ -12,7 +12,6 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, NoReturn, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -21,6 +20,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from rps_pin.errors import InputError, MechanismError, did_you_mean, shown
+from rps_pin.files import opened
 
 #: Larger files are refused: descriptions are written by hand, and reading takes 20 s a megabyte.
 LARGEST_FILE = 200_000
@@ -205,16 +205,10 @@ def read_yaml(path: str | os.PathLike[str], what: str) -> YamlFile:
         If the file cannot be read, is larger than `LARGEST_FILE`, or is not such a mapping; with
         the line where that shows.
     """
-    if not isinstance(path, (str, os.PathLike)):
-        raise InputError(f"a {what} is given by its path, not by {path!r}")
-    origin = os.fspath(path)
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
+    with opened(path, what) as file:
+        content = file.read(LARGEST_FILE + 1)
         text = content[:LARGEST_FILE].decode("utf-8-sig")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not a UTF-8 text"
-        raise InputError(f"cannot read the {what} {origin}: {reason}") from None
+    origin = os.fspath(path)
     if len(content) > LARGEST_FILE:
         raise InputError(
             f"{what} {origin} has more than {LARGEST_FILE} bytes, the most that is read"

@@ -1,4 +1,4 @@
-"""Files written whole or not at all."""
+"""Files: read with errors that name them, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -7,6 +7,39 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
+
+from rps_pin.errors import InputError, shown
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str], what: str) -> Iterator[BinaryIO]:
+    """Open a file for reading.
+
+    Parameters
+    ----------
+    path
+        The file.
+    what
+        Its kind, for messages: ``"trajectory file"``.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or the block finds that it is not UTF-8.
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputError(f"a {what} is given by its path, not by {shown(path)}")
+    try:
+        with Path(path).open("rb") as file:
+            yield file
+    except InputError:
+        raise
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        if isinstance(error, UnicodeDecodeError):
+            reason = "not a UTF-8 text"
+        raise InputError(f"cannot read the {what} {os.fspath(path)}: {reason}") from None
 
 
 @contextmanager

@@ -20,13 +20,13 @@ from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from pathlib import Path
 from typing import BinaryIO, NoReturn
 
 import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
+from rps_pin.files import opened
 from rps_pin.trajectories.derivative_check import disagreement
 from rps_pin.trajectories.sampled_path import FEWEST_POSES, Ends, SampledPath
 from rps_pin.validation import positive_number
@@ -109,7 +109,8 @@ def read_csv(
     """
     if max_step is not None:
         positive_number(max_step, "max_step", "seconds")
-    table = _read_table(path)
+    with opened(path, "trajectory file") as file:
+        table = _table(_lines(file, os.fspath(path)), os.fspath(path))
     _refuse_few(table, FEWEST_POSES if ends == "free" else 2)
     _refuse_times(table, max_step)
     _refuse_implausible(table)
@@ -158,20 +159,6 @@ class _Table:
         """Return the values of a quantity in SI units."""
         column = self.columns[quantity]
         return column.values * column.factor
-
-
-def _read_table(path: str | os.PathLike[str]) -> _Table:
-    if not isinstance(path, (str, os.PathLike)):
-        raise InputError(f"a trajectory file is given by its path, not by {shown(path)}")
-    origin = os.fspath(path)
-    try:
-        with Path(path).open("rb") as file:
-            return _table(_lines(file, origin), origin)
-    except InputError:
-        raise
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot read the trajectory file {origin}: {reason}") from None
 
 
 def _lines(file: BinaryIO, origin: str) -> Iterator[tuple[int, str]]:

@@ -1,4 +1,4 @@
-"""What a description of a mechanism comes to: the ingredients of a `ClosedLoopModel`."""
+"""Parts of a mechanism: what every reader returns, and a `ClosedLoopModel` is made of."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure
 
-#: What acts at joints beside inertia, by what a description calls it.
+#: Effects at joints, by their names in a description.
 EFFECTS = ("damping", "friction", "stiffness", "rest")
 
 
 @dataclass(frozen=True)
 class MechanismParts:
-    """An open tree, what closes its loops, what drives it, and where it may stand.
+    """An open tree, its closures, its actuated joints, effects at joints, and a home.
 
     Attributes
     ----------

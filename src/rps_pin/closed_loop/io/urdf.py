@@ -1,13 +1,12 @@
-"""Open trees from URDF files, and the text of any XML file.
+"""Open trees from URDF files, and the text of URDF and MJCF files.
 
-A file is data: it is refused if it declares a document type (no robot needs one, and
-entities are declared there), and read without reaching for anything outside itself.
+Files are data: a document type, which could declare entities, is refused, and nothing outside the
+file is read.
 """
 
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import pinocchio as pin
@@ -16,8 +15,10 @@ from lxml import etree
 from rps_pin.closed_loop.io.parts import MechanismParts
 from rps_pin.closed_loop.io.urdf_check import refuse_mistakes
 from rps_pin.errors import InputError, MechanismError
+from rps_pin.files import opened
+from rps_pin.validation import choice
 
-#: How the root link of a tree may stand in the world.
+#: Whether the root link of a tree is fixed in the world.
 ROOTS = ("fixed", "free")
 
 
@@ -29,7 +30,7 @@ def model_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") ->
     path_or_xml
         The file, or its text.
     root
-        ``"fixed"``: the root link stands in the world. ``"free"``: it floats, on a free-flyer
+        ``"fixed"``: the root link is fixed in the world. ``"free"``: it is on a free-flyer joint
         called ``"root_joint"``.
 
     Raises
@@ -37,10 +38,9 @@ def model_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") ->
     InputError
         If the file cannot be read, or the root is neither of the two.
     MechanismError
-        If it is no URDF; with the line where that shows.
+        If it is not a valid URDF; with the line.
     """
-    if root not in ROOTS:
-        raise InputError(f"root = {root!r}: it must be {' or '.join(map(repr, ROOTS))}")
+    choice(root, "root", ROOTS)
     text, origin = xml_text(path_or_xml, "URDF")
     refuse_mistakes(xml_root(text, origin, "URDF"), origin)
     try:
@@ -70,14 +70,14 @@ def parts_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") ->
 
 
 def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
-    """Return an XML text, and how to name it in messages.
+    """Return an XML text and its name for messages.
 
     Parameters
     ----------
     path_or_xml
         A file's path, or the text itself (which begins with ``<``).
     form
-        What the text should be: ``"URDF"`` or ``"MJCF"``.
+        ``"URDF"`` or ``"MJCF"``.
 
     Raises
     ------
@@ -86,16 +86,11 @@ def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
     """
     if not isinstance(path_or_xml, (str, os.PathLike)):
         raise InputError(f"a {form} is given by its path or its text, not by {path_or_xml!r}")
-    text = os.fspath(path_or_xml).lstrip("\ufeff")  # a byte-order mark is no part of the text
+    text = os.fspath(path_or_xml).lstrip("\ufeff")  # without a byte-order mark
     if text.lstrip().startswith("<"):
         return text.strip(), f"the {form} text"
-    origin = text
-    try:
-        text = Path(origin).read_text("utf-8-sig")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not a UTF-8 text"
-        raise InputError(f"cannot read the {form} {origin}: {reason}") from None
-    return text.strip(), origin
+    with opened(text, form) as file:
+        return file.read().decode("utf-8-sig").strip(), text
 
 
 def xml_root(text: str, origin: str, form: str) -> Any:
@@ -104,7 +99,7 @@ def xml_root(text: str, origin: str, form: str) -> Any:
     Raises
     ------
     MechanismError
-        If it is no XML, or declares a document type.
+        If it is not XML, or declares a document type.
     """
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
     try:

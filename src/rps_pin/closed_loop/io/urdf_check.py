@@ -1,8 +1,8 @@
-"""What is looked at in a URDF before Pinocchio reads it.
+"""Mistakes in URDF files, found before Pinocchio reads them.
 
-Pinocchio's parser prints its complaints to standard error, and goes on without an element that it
-cannot read: a link of which an inertia is misspelt loses its mass. Here such mistakes are refused,
-with the line where they stand. What the elements mean is left to Pinocchio.
+Pinocchio's parser prints its errors to standard error and drops an element that it cannot read: a
+link with a misspelt inertia loses its mass. Here such mistakes are refused, with their line.
+(yourdfpy's validation does not serve: it reads missing elements as zero and knows no lines.)
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "pla
 
 
 def refuse_mistakes(robot: Any, origin: str) -> None:
-    """Refuse a URDF's usual mistakes.
+    """Refuse frequent mistakes.
 
     Parameters
     ----------
     robot
         Its root element.
     origin
-        How messages name it.
+        Its name in messages.
 
     Raises
     ------
     MechanismError
-        If a number is none, or one of too many; a mass or a moment of inertia is missing or
+        If an attribute does not hold its numbers; a mass or a moment of inertia is missing or
         negative; a joint's type, parent or child is unknown; or more than one link has no parent.
     """
     for element in robot.iter(*_NUMBERS):
@@ -82,7 +82,7 @@ def _check_inertial(inertial: Any, origin: str) -> None:
         _refuse(inertia, origin, f"link {link!r}: its inertia has no {', '.join(missing)}")
     if float(mass.get("value")) < 0:
         _refuse(mass, origin, f"link {link!r}: mass = {mass.get('value')} kg is negative")
-    for name in ("ixx", "iyy", "izz"):  # a tensor that is slightly off is common, and passes
+    for name in ("ixx", "iyy", "izz"):  # slightly wrong tensors are common, and accepted
         if float(inertia.get(name)) < -_ROUNDING:
             value = inertia.get(name)
             _refuse(inertia, origin, f"link {link!r}: {name} = {value} kg m^2 is negative")
@@ -108,7 +108,7 @@ def _check_tree(robot: Any, origin: str) -> None:
 
 
 def _misspelt(robot: Any) -> str:
-    """Return a remark on elements that look like a link or a joint and are none."""
+    """Return a remark on elements that look like a misspelt link or joint."""
     for element in robot.iterchildren("*"):
         near = get_close_matches(str(element.tag), ("link", "joint"), n=1)
         if near and element.tag not in near:
