@@ -44,13 +44,17 @@ def finite_number(value: object, name: str, unit: str = "") -> float:
     return number
 
 
-def positive_number(value: object, name: str, unit: str = "") -> float:
-    """Return a number from `SMALLEST` to `LARGEST`; `unit` is named in the error."""
+def positive_number(value: object, name: str, unit: str = "", *, infinite: bool = False) -> float:
+    """Return a number from `SMALLEST` to `LARGEST`, or infinity if that is allowed.
+
+    `unit` is named in the error.
+    """
     number = real(value)
-    if not SMALLEST <= number <= LARGEST:
+    if not SMALLEST <= number <= LARGEST and not (infinite and number == math.inf):
         wanted = f"a positive number{unit and f' of {unit}'}"
+        kind = "or infinite" if infinite else "finite"
         raise InputError(
-            f"{name} = {shown(value)}: it must be {wanted}, finite, from {SMALLEST} to {LARGEST}"
+            f"{name} = {shown(value)}: it must be {wanted}, {kind}, from {SMALLEST} to {LARGEST}"
         )
     return number
 

@@ -1,15 +1,15 @@
-"""One axis of the discrete control loop as a linear system: its curve L and its poles.
+"""Loop transfer function L(z) and poles of one axis of the discrete control loop.
 
-With the inverse dynamics exact, an axis is a double integrator whose acceleration is held between
-ticks. With T the period, z = exp(j t) where t = 2 pi f T, and d ticks from reading to force,
+With exact inverse dynamics an axis is a double integrator whose acceleration is held between ticks.
+With T the period, z = exp(j t) where t = 2 pi f T, and d ticks from reading to force,
 
     L(z) = (believed / true inertia) z^-d [P_x (Kp + Ki T z / (z - 1)) + Kd D],
     P_x = T^2 (z + 1) / (2 (z - 1)^2),    P_v = T / (z - 1),
     D = P_v with measured speed,
     D = P_x (s / T) (z - 1) / (z - (1 - s)),  s = 1 - exp(-2 pi cut_off T),  with `SpeedFilter`,
 
-opened at the force and closed as 1 + L(z) = 0. Written with z - 1 = 2j sin(t / 2) exp(j t / 2), no
-digit is lost near z = 1, where the poles are.
+opened at the force and closed as 1 + L(z) = 0. L is evaluated with z - 1 = 2j sin(t / 2)
+exp(j t / 2), which avoids cancellation near z = 1, where the poles are.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ from typing import NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array, ComplexArray
-from rps_pin.errors import InputError, shown
+from rps_pin.errors import InputError
+from rps_pin.validation import non_negative_number, positive_number, whole_number
 
 _LONGEST_DELAY = 200
-_SLOWEST = 1e-11  # 1 / tick: poles closer to z = 1 are hidden by rounding
+_SLOWEST = 1e-11  # 1 / tick: rounding hides poles closer to z = 1
 
 
 class AxisLoop(NamedTuple):
-    """The loop with the tick as unit of time; what is left has the unit of the position."""
+    """The loop with the tick as unit of time."""
 
     kp: float
     """Kp T^2, times the inertia factor as kd and ki are."""
@@ -70,7 +71,7 @@ class AxisLoop(NamedTuple):
         integral = integral + self.ki * x
         command = -(self.kp * x + self.kd * (v if self.share is None else filtered) + integral)
         a, *waiting = [*now[5:], command]
-        if not self.ki:  # nor any state: it would stay where it is, a pole at 1 that nothing moves
+        if not self.ki:  # a constant integral would be a pole at 1
             integral = 0 * integral
         if self.share is None:
             filtered = 0 * filtered
@@ -82,11 +83,11 @@ class AxisLoop(NamedTuple):
         return min([*rates, self.ki / self.kp] if self.ki else rates)
 
     def grid(self) -> Array:
-        """Return angles up to pi: by ratio around L's corners, evenly for the delay's turns."""
+        """Return angles up to pi: geometric for L's corners, even for the turns of the delay."""
         corners = [1.0, self.kd, math.sqrt(self.kp), math.cbrt(self.ki), self.share or 0.0]
         corners += [self.kp / self.kd, math.sqrt(self.ki / self.kd)] if self.kd else []
         corners += [self.ki / self.kp] if self.kp else []
-        # No corner that matters is below the slowest pole: see `axis_loop`.
+        # No relevant corner is below the slowest pole: see `axis_loop`.
         lowest = 1e-3 * max(min(corner for corner in corners if corner > 0), _SLOWEST)
         even = np.linspace(0, np.pi, 64 * (self.delay + 8) + 1)[1:]
         ratio = np.geomspace(lowest, np.pi, 200 * math.ceil(math.log10(np.pi / lowest)))
@@ -103,22 +104,21 @@ def axis_loop(
     inertia: float,
 ) -> AxisLoop:
     """Return the loop of one axis; parameters and errors as `loop_margins`."""
-    kp = _number("proportional", proportional, zero=True)
-    kd = _number("derivative", derivative, zero=True)
-    ki = _number("integral", integral, zero=True)
-    T, k = _number("period", period), _number("inertia", inertia)
-    if isinstance(delay, bool) or not isinstance(delay, int | np.integer):
-        raise InputError(f"delay = {shown(delay)}: it must be a whole number of ticks")
-    if not 0 <= delay <= _LONGEST_DELAY:
-        raise InputError(f"delay = {delay} ticks: it must be from 0 to {_LONGEST_DELAY}")
+    kp = non_negative_number(proportional, "proportional", "1/s^2")
+    kd = non_negative_number(derivative, "derivative", "1/s")
+    ki = non_negative_number(integral, "integral", "1/s^3")
+    T, k = positive_number(period, "period", "s"), positive_number(inertia, "inertia")
+    if whole_number(delay, "delay", 0) > _LONGEST_DELAY:
+        raise InputError(f"delay = {delay} ticks: it must be at most {_LONGEST_DELAY}")
     share = None
     if cut_off is not None:
-        share = -math.expm1(-2 * math.pi * _number("cut_off", cut_off, infinite=True) * T)
+        rate = 2 * math.pi * positive_number(cut_off, "cut_off", "Hz", infinite=True)
+        share = -math.expm1(-rate * T)
     axis = AxisLoop(k * kp * T * T, k * kd * T, k * ki * T * T * T, int(delay), share)
     if not max(axis[:3]) < 1e12:
         raise InputError(
             f"Kp T^2, Kd T, Ki T^3, times the inertia factor, = {axis.kp:.3g}, {axis.kd:.3g}, "
-            f"{axis.ki:.3g}: a stable loop is of the order of 1 at most, more than 1e12 is refused"
+            f"{axis.ki:.3g}: stable loops have at most about 1, more than 1e12 is refused"
         )
     slowest = min(axis.slowest() if axis.kp else 1.0, 1.0 if share is None else share)
     if slowest < _SLOWEST:
@@ -127,19 +127,3 @@ def axis_loop(
             f"than {_SLOWEST:.3g}: raise that gain (or cut-off), make it zero, or lengthen the tick"
         )
     return axis
-
-
-def _number(name: str, value: object, *, zero: bool = False, infinite: bool = False) -> float:
-    try:
-        if isinstance(value, bool | str | bytes):
-            raise TypeError
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError) as error:
-        message = f"{name} = {shown(value)}: it must be one number; call once for each axis"
-        raise InputError(message) from error
-    enough = number >= 0 if zero else number > 0
-    if not enough or (math.isinf(number) and not infinite):
-        rule = "not negative" if zero else "positive"
-        rule += "" if infinite else " and finite"
-        raise InputError(f"{name} = {shown(value)}: it must be {rule}")
-    return number

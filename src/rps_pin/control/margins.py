@@ -1,12 +1,12 @@
 """Stability margins of one axis of the discrete control loop, opened at its force.
 
-The margins are those of the curve L(exp(j t)), 0 < t <= pi, of `AxisLoop`; whether the loop is
-stable is read from the poles.
+The margins are those of the curve L(exp(j t)), 0 < t <= pi, of `AxisLoop`; stability is decided by
+the poles.
 
-python-control's `stability_margins` (0.10.2) is not used: it takes roots of polynomials that have
-four to six of their roots at z = 1 and calls some of these crossings (gain margins of 1e-8; by
-its method "poly" a phase margin of 16 deg where 59 deg is right), its other method finds modulus
-margins of 1e5 near z = 1, and it leaves out t = pi, where a loop with measured speed ends.
+python-control's `stability_margins` (0.10.2) is not accurate here. It computes roots of polynomials
+with four to six roots at z = 1 and counts some of these as crossings (gain margins of 1e-8; with
+its method "poly" a phase margin of 16 deg instead of 59 deg). Its other method gives modulus
+margins of 1e5 near z = 1, and it omits t = pi, where the curve of a loop with measured speed ends.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ Response = Callable[[Array], ComplexArray]
 
 
 class LoopMargins(NamedTuple):
-    """What a loop tolerates; of an unstable loop the factors are 1 and every other margin is 0."""
+    """Margins of a loop; for an unstable loop the factors are 1 and all other margins 0."""
 
     stable: bool
-    """Whether every pole of the closed loop is inside the unit circle."""
+    """Whether all poles of the closed loop are inside the unit circle."""
     gain_up: float
-    """Factor below which the loop gain may rise (``inf``: any)."""
+    """Factor up to which the loop gain may rise (``inf``: any)."""
     gain_down: float
-    """Factor above which the loop gain may fall (0: any)."""
+    """Factor down to which the loop gain may fall (0: any)."""
     phase: float
-    """Phase margin, rad: the least turn of L, either way, that brings it to -1."""
+    """Phase margin, rad: the least rotation of L, in either direction, that moves it to -1."""
     delay: float
-    """Further delay below which the loop stays stable, s; exact for whole ticks."""
+    """Additional delay up to which the loop stays stable, s; exact for whole ticks."""
     modulus: float
     """Modulus (vector) margin: least distance of L from -1, 1 / max |sensitivity|."""
     crossover: float
@@ -83,33 +83,34 @@ def loop_margins(
     Returns
     -------
     LoopMargins
-        The loop is opened at the force. Without a proportional gain no loop is called stable: the
+        The loop is opened at the force. A loop without proportional gain is not stable: the
         position drifts.
 
     Raises
     ------
     InputError
-        A number is not finite or out of range, or a gain is so small that rounding hides its pole.
+        If a number is not finite or out of range, or a gain is so small that rounding hides its
+        pole.
 
     Notes
     -----
     K. J. Astrom, R. M. Murray, *Feedback Systems*, section 10.3 (margins); K. J. Astrom,
     B. Wittenmark, *Computer-Controlled Systems*, section 3.3 (Nyquist's criterion in discrete
-    time). The position is taken as the double integral of the commanded acceleration: flexible
-    legs, force lag and coupling between the axes are not in it.
+    time). The position is modelled as the double integral of the commanded acceleration, without
+    flexible legs, force lag and coupling between the axes.
     """
     axis = axis_loop(proportional, derivative, integral, period, delay, cut_off, inertia)
     t = axis.grid()
     value = axis.response(t)
     nyquist = 0.5 / period
     crossings = _unit_gain(axis.response, t, value)
-    if crossings.size == 0:  # only without gains is the whole curve inside the unit circle
+    if crossings.size == 0:  # the whole curve is inside the unit circle: all gains are zero
         return LoopMargins(False, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     crossover = float(nyquist * crossings[-1] / np.pi)
     if axis.kp == 0 or np.abs(np.linalg.eigvals(axis.matrix())).max() >= 1:
         return LoopMargins(False, 1.0, 1.0, 0.0, 0.0, 0.0, crossover, 0.0)
     factors = _critical_factors(axis.response, t, value)
-    lag = np.angle(axis.response(crossings))  # of -L: how far L is ahead of -1
+    lag = np.angle(axis.response(crossings))  # of -L: the angle by which L leads -1
     return LoopMargins(
         stable=True,
         gain_up=float(np.min(factors[factors > 1], initial=np.inf)),
@@ -123,7 +124,7 @@ def loop_margins(
 
 
 def _roots(function: Callable[[Array], Array], t: Array, values: Array) -> Array:
-    """Angles where a real function of the angle changes sign, refined."""
+    """Return the angles where a real function of the angle changes sign."""
     below = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
 
     def scalar(angle: float) -> float:
@@ -133,13 +134,13 @@ def _roots(function: Callable[[Array], Array], t: Array, values: Array) -> Array
 
 
 def _unit_gain(response: Response, t: Array, value: ComplexArray) -> Array:
-    """Angles where abs(L) = 1, rising; t = pi too where the curve ends outside the unit circle."""
+    """Return the angles where abs(L) = 1, rising; also pi if abs(L) is at least 1 there."""
     roots = _roots(lambda angle: np.abs(response(angle)) - 1, t, np.abs(value) - 1)
     return np.append(roots, np.pi) if abs(value[-1]) >= 1 else roots
 
 
 def _critical_factors(response: Response, t: Array, value: ComplexArray) -> Array:
-    """Factors of the loop gain that put a pole on the unit circle: 1 / abs(L) where L < 0."""
+    """Return the factors of the gain with a pole on the unit circle: 1 / abs(L) where L < 0."""
     roots = _roots(lambda angle: response(angle).imag, t, value.imag)
     real = response(np.append(roots, np.pi)).real
     factors: Array = 1 / real[real > 0]
@@ -159,7 +160,7 @@ def _modulus(response: Response, t: Array, value: ComplexArray) -> float:
 
 
 def _bandwidth(response: Response, t: Array, value: ComplexArray) -> float:
-    """First angle where abs(L / (1 + L)) = 1 / sqrt(2); pi if it never falls so far."""
+    """Return the first angle where abs(L / (1 + L)) = 1 / sqrt(2); pi if there is none."""
 
     def excess(minus_l: ComplexArray) -> Array:
         gain: Array = np.abs(minus_l / (1 - minus_l)) - math.sqrt(0.5)

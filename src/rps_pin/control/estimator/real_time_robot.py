@@ -18,7 +18,6 @@ from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, thre
 from rps_pin.control.estimator.output_arrays import Answers
 from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.estimator.state_estimate import state_estimate
-from rps_pin.control.estimator.warm_up import warm_up
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.status import STATUSES, Status
@@ -30,6 +29,7 @@ from rps_pin.validation import positive_number
 # Flags as integers: operations on enumerations take microseconds.
 _BAD_INPUT, _JUMP, _NOT_CONVERGED = 1, 2, 4
 _NEAR_SINGULAR, _BEYOND_LIMIT = 8, 16
+_ZERO = (0.0, 0.0, 0.0)
 #: Largest length in radii: powers of longer ones leave the range of floats.
 _LARGEST_LENGTH = 1e6
 #: Below this determinant of Eq. 8 half of the forces' digits are lost.
@@ -110,13 +110,16 @@ class RealTimeRobot:
         self._limits = RobotLimits(p)
         self.dynamics, self._singular_value = ConstrainedForces(robot), LeastSingularValue()
         self._period = positive_number(period, "period", "s")
-        self._filter = SpeedFilter(_positive(cut_off, "cut_off"))
+        self._filter = SpeedFilter(positive_number(cut_off, "cut_off", "Hz", infinite=True))
         self._near = positive_number(near_singular, "near_singular")
-        self._jump = _positive(largest_jump, "largest_jump")
+        self._jump = positive_number(largest_jump, "largest_jump", "m", infinite=True)
         self._most = int(positive_number(most_steps, "most_steps"))
         self.answers = Answers.new() if answers is None else answers.checked()
         self.reset(near)
-        warm_up(self.state, self._g, self._h)
+        # Functions are compiled in their first calls, here and not in the loop.
+        self.estimate(self.state.geometry.length, _ZERO)
+        self.inverse_dynamics(self.state.geometry.pose, _ZERO, _ZERO)
+        self.reset(near)
 
     def reset(self, near: ArrayLike) -> None:
         """Start again from a pose, at rest and without forces. Raises as the constructor does."""
@@ -126,7 +129,7 @@ class RealTimeRobot:
         self.determinant = 0.0
         self._length: Triple | None = d
         self._geometry_flags = 0
-        self.status = self._accept(d, way, (0.0, 0.0, 0.0))
+        self.status = self._accept(d, way, _ZERO)
         self._filter.reset()
         self.force_status, self.force_age, self.force_determinant = Status.OK, 0, 0.0
         self._pose: Triple | None = None
@@ -357,11 +360,6 @@ class RealTimeRobot:
         self.force_age += 1
         self.force_status = status = STATUSES[number]
         return status
-
-
-def _positive(value: float, name: str) -> float:
-    """Return a positive float, which may be infinite."""
-    return value if value == math.inf else positive_number(value, name)
 
 
 def _text(values: Triple | None) -> str:

@@ -172,6 +172,11 @@ class Controller(ABC):
         self._near, self._stop = near_singular, stop_singular
         self.forces: Array = np.zeros(3)
         self.reset(near)
+        # Functions are compiled in their first calls, here and not in the loop.
+        state = self._extrapolated(self.estimate.state, 0.0) or self.estimate.state
+        self._law(state, self._setpoints.current, period)
+        self._command_error(state, _ZERO, _ZERO)
+        self.reset(near)
 
     def reset(self, near: ArrayLike) -> None:
         """Start again at rest in a pose. Raises as the constructor does."""

@@ -64,8 +64,7 @@ class Fault:
     def __post_init__(self) -> None:
         choice(self.kind, "fault kind", get_args(Kind))
         non_negative_number(self.start, "fault start", "s")
-        if self.duration != math.inf:
-            positive_number(self.duration, "fault duration", "s")
+        positive_number(self.duration, "fault duration", "s", infinite=True)
         if self.leg is not None and (whole_number(self.leg, "fault leg") > 3):
             raise InputError(f"fault leg = {self.leg}: legs are 1, 2 and 3")
         if self.leg is not None and self.kind not in _LEG_KINDS:
