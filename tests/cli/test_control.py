@@ -85,7 +85,7 @@ def test_the_report_says_what_ran_and_what_came_of_it(finished: tuple[Path, str]
     for words in (
         *("# 3-RPS micro, weekday.yaml", "500 ticks of 1 ms", "masses 1.1", "bandwidth 15"),
         *("proportional: ", "gain", "phase", "nan of leg 2 from t = 0.3 s", "bad input"),
-        f"| centre | {summary['centre_rms']:.4g} |",
+        f"| error of the centre | {summary['centre_rms']:.4g} |",
     ):
         assert words in text
     for picture in re.findall(r"\]\((\S+\.png)\)", text):

@@ -128,7 +128,7 @@ def test_gains_in_the_law_s_own_units(tmp_path: Path) -> None:
     scenario = load_scenario(written(tmp_path, text))
     rows = scenario.controller().gains.rows
     assert rows == ((1.0, 2.0, 3.0), (4.0, 4.0, 4.0), (5.0, 5.0, 5.0))
-    with pytest.raises(InputError, match="alike for all three"):
+    with pytest.raises(InputError, match="equal for all three"):
         scenario.margins()
 
 

@@ -41,7 +41,6 @@ from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.loop.filters import SetpointRateFilter
 from rps_pin.control.loop.force_limits import ForceLimits
 from rps_pin.control.loop.gains import Gains
-from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.setpoints import Setpoint, Setpoints
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.errors import InputError, SingularityError
@@ -158,14 +157,7 @@ class Controller(ABC):
         self._kp, self._kd, self._ki = gains.rows
         self._tracking_rate = tuple(1.0 / time for time in gains.tracking_time)
         self._g, self._h = float(p.base_radius), float(p.platform_radius)
-        self._setpoints = Setpoints(
-            RobotLimits(p),
-            self._g,
-            self._h,
-            near_singular,
-            1e6 * (self._g + self._h),
-            p.actuator_speed_limit,
-        )
+        self._setpoints = Setpoints(p, near_singular)
         self._limits = ForceLimits(_force_limit(robot, force_limit))
         self._inertia = TaskSpaceInertia(robot)
         self._rate_filter = SetpointRateFilter(cut_off)

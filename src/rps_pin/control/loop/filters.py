@@ -23,48 +23,13 @@ from rps_pin.rps.kinematics.tracking import Triple
 _ZERO = (0.0, 0.0, 0.0)
 
 
-class SpeedFilter:
-    """Filtered speeds of three legs, zero until the second reading.
+class _LowPass:
+    """A first-order low-pass filter of three numbers, at rest after `reset`.
 
     Parameters
     ----------
     cut_off
-        f, Hz; infinite for the unfiltered difference.
-    """
-
-    def __init__(self, cut_off: float) -> None:
-        self._rate = 2 * math.pi * cut_off
-        self.reset()
-
-    def reset(self) -> None:
-        """Discard all readings."""
-        self._last: Triple | None = None
-        self.speed: Triple = _ZERO
-
-    def after(self, length: Triple, elapsed: float) -> Triple:
-        """Return the speeds (m/s) at lengths (m), a time (s) after the last; changes nothing."""
-        if self._last is None:
-            return self.speed
-        share = -math.expm1(-self._rate * elapsed)
-        (d1, d2, d3), (e1, e2, e3), (s1, s2, s3) = length, self._last, self.speed
-        return (
-            s1 + share * ((d1 - e1) / elapsed - s1),
-            s2 + share * ((d2 - e2) / elapsed - s2),
-            s3 + share * ((d3 - e3) / elapsed - s3),
-        )
-
-    def update(self, length: Triple, speed: Triple) -> None:
-        """Set the last reading and its speeds, measured or from `after`."""
-        self._last, self.speed = length, speed
-
-
-class SetpointRateFilter:
-    """Filtered rates of three coordinates, starting at rest.
-
-    Parameters
-    ----------
-    cut_off
-        f, Hz; infinite for the mean of two ticks.
+        f, Hz; infinite for no filter.
     """
 
     def __init__(self, cut_off: float) -> None:
@@ -73,17 +38,39 @@ class SetpointRateFilter:
 
     def reset(self) -> None:
         """Start again at rest."""
-        self._last: Triple = _ZERO
-        self._filtered: Triple = _ZERO
+        self._last: Triple | None = None
+        self.speed: Triple = _ZERO
+
+    def _filtered(self, u: Triple, elapsed: float) -> Triple:
+        """Return s + (1 - exp(-2 pi f T)) (u - s)."""
+        share = -math.expm1(-self._rate * elapsed)
+        (u1, u2, u3), (s1, s2, s3) = u, self.speed
+        return s1 + share * (u1 - s1), s2 + share * (u2 - s2), s3 + share * (u3 - s3)
+
+
+class SpeedFilter(_LowPass):
+    """Filtered speeds of three legs, zero until the second reading."""
+
+    def after(self, length: Triple, elapsed: float) -> Triple:
+        """Return the speeds (m/s) at lengths (m), a time (s) after the last; changes nothing."""
+        if self._last is None:
+            return self.speed
+        (d1, d2, d3), (e1, e2, e3) = length, self._last
+        change = ((d1 - e1) / elapsed, (d2 - e2) / elapsed, (d3 - e3) / elapsed)
+        return self._filtered(change, elapsed)
+
+    def update(self, length: Triple, speed: Triple) -> None:
+        """Set the last reading and its speeds, measured or from `after`."""
+        self._last, self.speed = length, speed
+
+
+class SetpointRateFilter(_LowPass):
+    """Filtered rates of three coordinates, starting at rest."""
 
     def after(self, rate: Triple, elapsed: float) -> Triple:
         """Return the filtered rates, a time (s) after the last call."""
-        share = -math.expm1(-self._rate * elapsed)
-        (x1, x2, x3), (y1, y2, y3), (s1, s2, s3) = rate, self._last, self._filtered
+        (x1, x2, x3), (y1, y2, y3) = rate, self._last or _ZERO
         self._last = rate
-        self._filtered = filtered = (
-            s1 + share * ((x1 + y1) / 2.0 - s1),
-            s2 + share * ((x2 + y2) / 2.0 - s2),
-            s3 + share * ((x3 + y3) / 2.0 - s3),
-        )
+        mean = ((x1 + y1) / 2.0, (x2 + y2) / 2.0, (x3 + y3) / 2.0)
+        self.speed = filtered = self._filtered(mean, elapsed)
         return filtered

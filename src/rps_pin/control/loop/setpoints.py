@@ -22,8 +22,11 @@ from rps_pin.control.estimator.loop_arguments import three_floats
 from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.rejoining import Rejoining, rejoining_time
 from rps_pin.rps.kinematics.tracking import Triple
+from rps_pin.rps.parameters import RPSParameters
 
 _ZERO = (0.0, 0.0, 0.0)
+#: In radii.
+_LARGEST_LENGTH = 1e6
 
 
 class Setpoint(NamedTuple):
@@ -39,29 +42,18 @@ class Setpoints:
 
     Parameters
     ----------
-    limits
-        The robot's.
-    g, h
-        Radii of base and platform, m.
+    parameters
+        The robot's. Half of its actuators' speed limit is used for the return to a target.
     near_singular
         Least absolute value of Eq. 8's determinant, 0 to 1.
-    largest
-        Largest height, and largest entry of rate and acceleration; m, m/s, rad/s, m/s^2, rad/s^2.
-    speed_limit
-        Of the actuators, m/s: half of it is used for the return to a target.
     """
 
-    def __init__(
-        self,
-        limits: RobotLimits,
-        g: float,
-        h: float,
-        near_singular: float,
-        largest: float,
-        speed_limit: float,
-    ) -> None:
-        self._limits, self._g, self._h = limits, g, h
-        self._near, self._largest, self._speed_limit = near_singular, largest, speed_limit
+    def __init__(self, parameters: RPSParameters, near_singular: float) -> None:
+        self._limits, self._near = RobotLimits(parameters), near_singular
+        self._g, self._h = float(parameters.base_radius), float(parameters.platform_radius)
+        self._speed_limit = parameters.actuator_speed_limit
+        # Of the height and of entries of rate and acceleration, in SI units.
+        self._largest = _LARGEST_LENGTH * (self._g + self._h)
 
     def reset(self, geometry: LegGeometry) -> None:
         """Start at rest in a pose, the setpoint until there is a target."""

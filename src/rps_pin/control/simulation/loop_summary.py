@@ -141,18 +141,26 @@ class LoopSummary:
         """Return the figures as plain data."""
         return asdict(self)
 
+    def rows(self) -> list[list[str]]:
+        """Return name, RMS, largest, last and unit of the errors and forces."""
+        rows = (
+            ("error of the centre", (self.centre_rms, self.centre_max, self.centre_end), "um"),
+            ("error of the orientation", (self.turn_rms, self.turn_max, self.turn_end), "urad"),
+            ("error of the leg lengths", (self.length_rms, self.length_max, None), "um"),
+            ("force of an actuator", (self.force_rms, self.force_peak, None), "N"),
+        )
+        return [
+            [name, *("" if figure is None else f"{figure:.4g}" for figure in figures), unit]
+            for name, figures, unit in rows
+        ]
+
     def table(self) -> Table:
         """Return the figures for a terminal."""
         table = Table("", "RMS", "largest", "at the end", "unit")
         for column in table.columns[1:4]:
             column.justify = "right"
-        for name, unit, figures in (
-            ("error of the centre", "um", (self.centre_rms, self.centre_max, self.centre_end)),
-            ("error of the orientation", "urad", (self.turn_rms, self.turn_max, self.turn_end)),
-            ("error of the leg lengths", "um", (self.length_rms, self.length_max)),
-            ("force of an actuator", "N", (self.force_rms, self.force_peak)),
-        ):
-            table.add_row(name, *(f"{f:.4g}" for f in figures), *[""] * (3 - len(figures)), unit)
+        for row in self.rows():
+            table.add_row(*row)
         table.add_section()
         table.add_row("ticks at a force limit", f"{self.saturated:.2%}")
         table.add_row("smallest distance to type II", f"{self.minimum_type_ii:.4g}")

@@ -38,7 +38,15 @@ def report(
     lines += _rows("controller", entry.controller.model_dump(exclude_none=True))
     lines += _rows("plant", entry.plant.model_dump(exclude_none=True))
     lines += ["", "## Gains and margins", "", *_gains(scenario), "", _margins(scenario), ""]
-    lines += [f"## Errors, over {summary.ticks} ticks", "", *_errors(summary), ""]
+    lines += [f"## Errors, over {summary.ticks} ticks", ""]
+    lines += ["| | RMS | largest | at the end | |", "|---|---:|---:|---:|---|"]
+    lines += [f"| {' | '.join(row)} |" for row in summary.rows()]
+    lines += [
+        "",
+        f"Ticks at a force limit: {summary.saturated:.2%}. Smallest distance to type II: "
+        f"{summary.minimum_type_ii:.4g}. Largest gap of the plant's loops: {summary.gap:.2g} m.",
+        "",
+    ]
     lines += ["## Statuses", "", *_statuses(run, summary), ""]
     if scenario.faults:
         lines += ["Faults:", "", *(f"- {fault}" for fault in scenario.faults), ""]
@@ -72,21 +80,6 @@ def _margins(scenario: Scenario) -> str:
         return f"One axis, by the model: {scenario.margins()}."
     except InputError as error:
         return f"Margins are not available: {error}."
-
-
-def _errors(summary: LoopSummary) -> list[str]:
-    s = summary
-    return [
-        "| | RMS | largest | at the end | |",
-        "|---|---:|---:|---:|---|",
-        f"| centre | {s.centre_rms:.4g} | {s.centre_max:.4g} | {s.centre_end:.4g} | um |",
-        f"| orientation | {s.turn_rms:.4g} | {s.turn_max:.4g} | {s.turn_end:.4g} | urad |",
-        f"| leg lengths | {s.length_rms:.4g} | {s.length_max:.4g} | | um |",
-        f"| actuator force | {s.force_rms:.4g} | {s.force_peak:.4g} | | N |",
-        "",
-        f"Ticks at a force limit: {s.saturated:.2%}. Smallest distance to type II: "
-        f"{s.minimum_type_ii:.4g}. Largest gap of the plant's loops: {s.gap:.2g} m.",
-    ]
 
 
 def _statuses(run: LoopRun, summary: LoopSummary) -> list[str]:

@@ -1,4 +1,4 @@
-"""Control scenarios from files: a robot, a controller, a plant that is not quite it, and faults.
+"""Control scenarios from YAML files: a robot, a controller, a plant that may differ, and faults.
 
     robot: micro
     trajectory: {kind: helix, radius: 0.0005, pitch: 0.00033, height: 0.223, duration: 1.0}
@@ -6,8 +6,8 @@
     plant: {masses: 1.2, delay: 1, encoder_resolution: 5.0e-8}
     faults: [{kind: lost, start: 1.5, duration: 0.0005}]
 
-`rps_pin.control.simulation.scenario_schema` has all keys; those of the controller and the plant are
-the arguments of what they make.
+`rps_pin.control.simulation.scenario_schema` lists all keys; those of the controller and the plant
+are arguments of their classes.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from rps_pin.config import YamlFile, read_config
 from rps_pin.control.estimator.effective_inertia import effective_inertia
@@ -46,16 +44,16 @@ _OF_PLANT = {"payload", "delay", "substeps", "encoder_resolution", "encoder_nois
 
 @dataclass(frozen=True)
 class Scenario:
-    """What a file describes, ready to run; each run starts anew.
+    """A scenario, ready to run; each run starts from the beginning.
 
     Attributes
     ----------
     entry : ScenarioEntry
         The file's values.
     model : RPSRobot
-        The robot as its controller believes it to be.
+        The controller's model of the robot.
     machine : RPSRobot
-        As it is.
+        The plant's robot.
     trajectory : Trajectory
         The targets.
     gains : Gains
@@ -93,7 +91,7 @@ class Scenario:
         )
 
     def run(self, progress: Callable[[float], object] | None = None) -> LoopRun:
-        """Return what the controller makes of the plant; see `run_loop`."""
+        """Return a run of the controller with the plant; see `run_loop`."""
         return run_loop(
             self.controller(),
             self.plant(),
@@ -107,20 +105,23 @@ class Scenario:
         )
 
     def margins(self) -> LoopMargins:
-        """Return the margins of an axis as far as its inertia is what the law takes it for.
+        """Return the margins of an axis with the inertia of the controller's model.
 
-        Computed torque makes all three axes alike where its gains are. Of PD it is so at the start,
-        for its gains were multiplied by the inertia there.
+        With computed torque they are those of all three axes, in every pose. With PD control they
+        hold at the start, where the gains were multiplied by the inertia.
 
         Raises
         ------
         InputError
-            If gains differ from axis to axis, or are forces' own.
+            If gains differ from axis to axis, or are given in units of force.
         """
         entry = self.entry.controller
-        (kp, *_), (kd, *_), (ki, *_) = rows = self._placed().rows
+        gains = _placed(self.entry)
+        if gains is None and entry.law == "pd":
+            raise InputError("margins of gains in N/m need an inertia, which is not given")
+        (kp, *_), (kd, *_), (ki, *_) = rows = (gains or self.gains).rows
         if any(len(set(row)) > 1 for row in rows):
-            raise InputError("the margins of one axis need gains that are alike for all three")
+            raise InputError("the margins of one axis need gains that are equal for all three")
         return loop_margins(
             kp,
             kd,
@@ -130,23 +131,14 @@ class Scenario:
             cut_off=None if entry.speeds == "measured" else entry.cut_off or 100.0,
         )
 
-    def _placed(self) -> Gains:
-        """Return the gains that command accelerations."""
-        entry = self.entry.controller
-        if entry.gains is not None and entry.law == "pd":
-            raise InputError("gains in N/m have margins by an inertia that is not theirs to say")
-        if entry.gains is not None:
-            return self.gains
-        return _placed(self.entry)
-
 
 def load_scenario(path: str | os.PathLike[str]) -> Scenario:
-    """Read a scenario; names of files in it count from its folder.
+    """Read a scenario; file names in it are relative to its folder.
 
     Raises
     ------
     InputError
-        If the file cannot be read or does not describe a scenario; with the line where that shows.
+        If the file cannot be read or does not describe a scenario; with the line.
     RPSPinError
         If the robot or the trajectory cannot be made.
     """
@@ -177,18 +169,20 @@ def _changed(
         return RPSRobot(wrong_parameters(nominal.parameters, **changes))
 
 
-def _placed(entry: ScenarioEntry) -> Gains:
+def _placed(entry: ScenarioEntry) -> Gains | None:
+    """Return the gains placed by a bandwidth, which command accelerations."""
     given = entry.controller
-    assert given.bandwidth is not None  # the schema's rule
+    if given.bandwidth is None:
+        return None
     settings = given.model_dump(include={"damping", "integral"}, exclude_none=True)
     return Gains.placed(given.bandwidth, **settings)
 
 
 def _gains(entry: ScenarioEntry, model: RPSRobot, trajectory: Trajectory) -> Gains:
-    given = entry.controller
-    if given.gains is not None:
-        return Gains(**{name: np.array(value) for name, value in given.gains.model_dump().items()})
-    placed = _placed(entry)
+    given, placed = entry.controller, _placed(entry)
+    if placed is None:
+        assert given.gains is not None  # by the schema
+        return Gains(**given.gains.model_dump())
     if given.law == "computed_torque":
         return placed
     space = given.space or "actuator"
