@@ -10,10 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rps_pin import RPSParameters, RPSRobot
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError, UnreachableError
-from rps_pin.rps.kinematics.legs import leg_motion
+from rps_pin.rps.kinematics.legs import cone_angles, leg_motion
+from rps_pin.rps.kinematics.rates import leg_jacobians
 from rps_pin.rps.workspace import Reason, Workspace, leg_grid, pose_grid, workspace
-from rps_pin.rps.workspace.jacobian import leg_jacobian
+from rps_pin.rps.workspace.evaluate import evaluate
 from rps_pin.rps.workspace.measures import measures
 from tests.strategies import random_motions, random_parameters
 
@@ -43,28 +45,42 @@ def by_lengths(micro: RPSParameters) -> Workspace:
 # The Jacobian and its measures --------------------------------------------------------------------
 
 
-def test_the_jacobian_is_that_of_the_legs_motion() -> None:
+def scaled_jacobian(p: RPSParameters, pose: Array) -> Array:
+    """d(length)/d(z, h tilt_x, h tilt_y), shape (..., 3 legs, 3)."""
+    h = p.platform_radius
+    return leg_jacobians(p, pose).length_jacobian / [1.0, h, h]
+
+
+@pytest.mark.parametrize("rest_angle", [0.0, 0.2])
+def test_fields_are_those_of_the_kinematics_and_of_linear_algebra(rest_angle: float) -> None:
     rng = np.random.default_rng(1)
-    p = random_parameters(rng)
-    g, h = p.base_radius, p.platform_radius
+    p = random_parameters(rng).replace(spherical_cone_limit=0.6, spherical_rest_angle=rest_angle)
     pose, _, _ = random_motions(rng, p, 300, largest_tilt=3.0)
     pose[0, 1:], pose[1, 1:] = 0.0, [0.0, 1e-9]
-    found = leg_jacobian(pose, g, h)
-    for j in range(3):
-        rate = np.zeros_like(pose)
-        rate[:, j] = 1.0
-        legs = leg_motion(pose, rate, np.zeros_like(pose), h, g)
-        scale = 1.0 if j == 0 else h
-        assert np.allclose(found.jacobian[..., j], legs.speed / scale, rtol=0, atol=1e-13)
-        assert np.allclose(found.length, legs.length, rtol=1e-14)
-        assert np.allclose(found.angle, legs.angle, rtol=0, atol=1e-13)
+    found = evaluate(p, pose.reshape(20, 15, 3), 1.0)
+    legs = leg_motion(pose, 0 * pose, 0 * pose, p.platform_radius, p.base_radius)
+    place, rotation = RPSRobot(p).platform_placement(pose)
+    K = scaled_jacobian(p, pose)
+    for field, expected in (
+        (found.length, legs.length),
+        (found.angle, legs.angle),
+        (found.position, place),
+        (found.determinant, np.linalg.det(K)),
+    ):
+        assert np.allclose(field.reshape(expected.shape), expected, rtol=1e-9, atol=1e-12)
+    conditioning = 1 / np.linalg.cond(K)  # in closed form, equal singular values lose digits
+    assert np.allclose(found.conditioning.ravel(), conditioning, rtol=1e-6, atol=1e-8)
+    cone = cone_angles(legs.angle, rotation, rest_angle)
+    beyond = (found.reason.reshape(-1, 1) >> np.array([9, 10, 11])) & 1
+    assert np.array_equal(beyond, cone > 0.6)
+    assert 0 < beyond.sum() < beyond.size
 
 
 def test_the_measures_are_those_of_linear_algebra() -> None:
     K = np.random.default_rng(2).normal(size=(500, 3, 3))
     K[0] = np.eye(3)
     K[1, 2] = K[1, 0] + 1e-9 * K[1, 1]  # all but singular
-    found = measures(K)
+    found = measures(np.moveaxis(K, 0, -1))
     assert np.allclose(found.determinant, np.linalg.det(K), rtol=0, atol=1e-13)
     assert np.allclose(found.conditioning, 1 / np.linalg.cond(K), rtol=1e-6)
     assert np.allclose(found.conditioning, 1 / np.linalg.cond(K), rtol=0, atol=1e-8)
@@ -74,7 +90,7 @@ def test_the_measures_are_those_of_linear_algebra() -> None:
 
 def test_a_singular_jacobian_measures_zero_and_not_nan() -> None:
     K = np.stack([np.zeros((3, 3)), np.ones((3, 3)), np.diag([1.0, 1.0, 0.0])])
-    found = measures(K)
+    found = measures(np.moveaxis(K, 0, -1))
     for values in found:
         assert np.allclose(values, 0.0, rtol=0, atol=1e-12)
 
@@ -85,7 +101,7 @@ def test_no_unit_load_asks_more_force_than_the_transmission_says(by_lengths: Wor
     load = rng.normal(size=(4000, 3))
     load /= np.linalg.norm(load, axis=1, keepdims=True)
     for index in [(0, 0, 20), (10, 10, 10), (3, 17, 8)]:
-        K = leg_jacobian(by_lengths.pose[index], p.base_radius, p.platform_radius).jacobian
+        K = scaled_jacobian(p, by_lengths.pose[index])
         force = np.linalg.solve(K.T, load.T)
         bound = 1 / by_lengths.transmission[index]
         assert 0.98 * bound < np.abs(force).max() <= bound * (1 + 1e-12)
@@ -125,21 +141,21 @@ def test_the_mode_continues_the_start_pose(micro: RPSParameters) -> None:
 def test_the_mode_is_the_one_a_straight_walk_reaches() -> None:
     """An independent walk: 600 steps dpose = K^-1 dlength, corrected; far beyond singularities."""
     p = RPSParameters.from_preset("micro").replace(base_radius=0.2)
-    g, h = p.base_radius, p.platform_radius
+    h = p.platform_radius
     space = workspace(p, leg_grid(p, 8, limits=(0.09, 0.5)), start=[0.2, 0.0, 0.0])
     goal = space.grid.points().reshape(-1, 3)
     pose = np.tile(space.start, (len(goal), 1))
-    begin = leg_jacobian(pose, g, h)
-    side = np.linalg.det(begin.jacobian)
+    begin = leg_jacobians(p, pose)
+    side = np.linalg.det(begin.length_jacobian)
     clear = np.ones(len(goal), dtype=bool)
     for step in np.linspace(0, 1, 601)[1:]:
         target = begin.length + step * (goal - begin.length)
         for _ in range(2):
-            legs = leg_jacobian(pose, g, h)
-            safe = np.where(clear[:, None, None], legs.jacobian, np.eye(3))
+            legs = leg_jacobians(p, pose)
+            safe = np.where(clear[:, None, None], scaled_jacobian(p, pose), np.eye(3))
             move = np.linalg.solve(safe, (target - legs.length)[..., None])[..., 0]
             pose = np.where(clear[:, None], pose + move / [1, h, h], pose)
-        K = leg_jacobian(pose, g, h).jacobian
+        K = scaled_jacobian(p, pose)
         with np.errstate(divide="ignore"):
             clear &= (np.linalg.det(K) * side > 0) & (1 / np.linalg.cond(K) > 0.01)
         clear &= np.abs(pose[:, 1:]).max(axis=-1) < 3
@@ -261,7 +277,7 @@ def test_beyond_a_singularity_is_singular(micro: RPSParameters) -> None:
     assert (space.reason[:2] == Reason.SINGULAR).all()
     assert space.conditioning[1, 0, 0] == 0.0
     expected = space.pose[2, 0, 0, 0] / math.hypot(0.1, 0.12)  # sin phi, (1, sqrt 1/2) below
-    K = leg_jacobian(space.pose[2, 0, 0], 0.24, 0.12).jacobian
+    K = scaled_jacobian(free, space.pose[2, 0, 0])
     assert np.allclose(K[:, 0], expected)
 
 
@@ -310,7 +326,7 @@ def test_bad_grids_are_refused_with_numbers(micro: RPSParameters) -> None:
         (lambda: workspace(micro, "grid"), "leg_grid"),  # type: ignore[arg-type]
         (lambda: workspace("micro"), "RPSRobot|robot"),  # type: ignore[arg-type]
         (lambda: workspace(micro, start=[0.2, 0.0]), r"\(2,\)|3"),
-        (lambda: workspace(micro, start=[[0.2, 0.0, 0.0]]), "one pose"),
+        (lambda: workspace(micro, start=[[0.2, 0.0, 0.0]]), r"\(3,\)"),
         (lambda: workspace(micro, leg_grid(micro, 400)), "workspace_to_file"),
         (lambda: workspace(micro, min_conditioning=2.0), "from 0 to 1"),
     ]:

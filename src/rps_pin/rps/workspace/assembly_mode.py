@@ -1,13 +1,13 @@
-"""Direct kinematics of a whole grid of leg lengths in one assembly mode.
+"""The assembly mode of a whole grid of leg lengths.
 
 Lengths allow several assembly modes; a workspace is that of one. Its mode here is the one that the
 robot keeps when its legs go *straight*, in the space of leg lengths, from a start pose to the
-lengths asked for, without meeting a parallel singularity.
+lengths wanted, without meeting a parallel singularity.
 
-A coarse map of the grid is made that way, in short steps, each solved by Newton's method on Eq. 8
-(`rps_pin.rps.kinematics.leg_equations`). Every other point starts Newton's method from the coarse
-map's angles, interpolated, and must end beside them; the few that cannot are followed from the
-start themselves.
+A coarse map of the grid is made that way by `rps_pin.rps.kinematics.forward_kinematics`. Every
+other point starts Newton's method on Eq. 8 (`rps_pin.rps.kinematics.leg_equations`) from the coarse
+map's angles, interpolated, and must end beside them; those that do not are followed from the start
+themselves.
 """
 
 from __future__ import annotations
@@ -18,17 +18,14 @@ import numpy as np
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import SingularityError
+from rps_pin.rps.kinematics.forward_kinematics import forward_kinematics
 from rps_pin.rps.kinematics.leg_equations import determinant, placement_from_angles, solve_angles
+from rps_pin.rps.kinematics.legs import geometry_of_pose
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.grids import WHOLE, Block, Grid
-from rps_pin.rps.workspace.jacobian import leg_jacobian
 
 #: Points per axis of the coarse map: at most, and at least where the grid has as many.
 _COARSE, _FEWEST = 17, 5
-#: Longest step of a leg while the mode is followed, in platform radii.
-_STEP = 0.05
-#: Largest turn of a leg in such a step, rad: a larger one is a jump to another mode.
-_JUMP = 0.3
 #: How far from its interpolated start a point may end, rad.
 _BESIDE = 0.02
 #: Newton's method converges in four steps where there is a solution near; more do not help.
@@ -69,9 +66,9 @@ class AssemblyMode:
     def __init__(self, parameters: RPSParameters, start: Array, grid: Grid) -> None:
         self._radii = (parameters.base_radius, parameters.platform_radius)
         self._tolerance = _TOLERANCE * parameters.platform_radius
-        legs = leg_jacobian(start, *self._radii)
-        self._length, self._angle = legs.length, legs.angle
-        self._side = float(determinant(self._length, self._angle, *self._radii))
+        self._start = start
+        legs = geometry_of_pose(start[None], *self._radii)
+        self._side = float(determinant(legs.length, legs.angle, *self._radii)[0])
         if abs(self._side) < _SINGULAR_START:
             raise SingularityError(
                 f"the start pose {tuple(start.tolist())} is singular, so that it decides no "
@@ -86,31 +83,21 @@ class AssemblyMode:
         self._map, self._known = self.follow(nodes)
 
     def follow(self, length: Array) -> tuple[Array, Bools]:
-        """Return leg angles (..., 3) reached straight from the start, and where that works.
-
-        A point is given up where Newton's method does not converge, where a leg turns too far in
-        one step, or where the determinant changes its sign: a singularity was met.
-        """
-        goal = length.reshape(-1, 3)
-        angle = np.broadcast_to(self._angle, goal.shape).copy()
-        travel = goal - self._length
-        farthest = float(np.abs(travel).max(initial=0.0))
-        steps = max(1, int(np.ceil(farthest / (_STEP * self._radii[1]))))
-        alive = np.arange(len(goal))
-        for step in range(1, steps + 1):
-            target = self._length + step / steps * travel[alive]
-            new, kept = self._solve(target, angle[alive], _JUMP)
-            alive = alive[kept]
-            angle[alive] = new[kept]
-        found = np.zeros(len(goal), dtype=bool)
-        found[alive] = True
-        return angle.reshape(length.shape), found.reshape(length.shape[:-1])
+        """Return leg angles (..., 3) reached straight from the start, and where that works."""
+        ways = forward_kinematics(length, self._start, *self._radii, errors="mask")
+        return ways.angle, ways.reached
 
     def angles(self, length: Array, block: Block = WHOLE) -> tuple[Array, Bools]:
         """Return leg angles (..., 3) of a block of the grid, and whether there are any."""
         start, known = self._interpolated(block)
-        angle, found = self._solve(length, start, _BESIDE)
-        found &= known
+        solution = solve_angles(
+            length, start, *self._radii, tolerance=self._tolerance, iterations=_ITERATIONS
+        )
+        angle = solution.angle
+        turn = np.abs(angle - start)
+        turn = np.minimum(turn, 2 * np.pi - turn).max(axis=-1)  # angles come from (-pi, pi]
+        found = known & solution.converged & (turn < _BESIDE)
+        found &= solution.determinant * self._side > 0
         lost = ~found
         if lost.any():
             angle[lost], found[lost] = self.follow(length[lost])
@@ -120,24 +107,13 @@ class AssemblyMode:
         """Return the poses of a block of the grid, whose points are `length`."""
         angle, found = self.angles(length, block)
         pose = np.zeros(length.shape)
-        if found.all():
-            placement = placement_from_angles(length, angle, *self._radii)
-            pose[...], found = placement.pose, placement.in_plane_mode
-        elif found.any():
-            placement = placement_from_angles(length[found], angle[found], *self._radii)
-            pose[found] = placement.pose
-            found[found] = placement.in_plane_mode
+        if found.any():
+            where = ... if found.all() else found  # the usual case copies nothing
+            placement = placement_from_angles(length[where], angle[where], *self._radii)
+            pose[where] = placement.pose
+            found[where] = placement.in_plane_mode
         pose[~found] = 0.0
         return ModePoses(pose, found)
-
-    def _solve(self, length: Array, start: Array, farthest: float) -> tuple[Array, Bools]:
-        solution = solve_angles(
-            length, start, *self._radii, tolerance=self._tolerance, iterations=_ITERATIONS
-        )
-        turn = np.abs(solution.angle - start)
-        turn = np.minimum(turn, 2 * np.pi - turn).max(axis=-1)  # angles come from (-pi, pi]
-        same_side = solution.determinant * self._side > 0
-        return solution.angle, solution.converged & same_side & (turn < farthest)
 
     def _interpolated(self, block: Block) -> tuple[Array, Bools]:
         """Return angles interpolated in the coarse map, and where all its corners are known."""

@@ -1,4 +1,4 @@
-"""`workspace`: by discretised leg lengths as in the paper's Section 3, or on a grid of poses."""
+"""The workspace by discretised leg lengths, as in the paper's Section 3, or on a grid of poses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError, UnreachableError
-from rps_pin.rps.kinematics.pose import checked_pose
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.assembly_mode import AssemblyMode
 from rps_pin.rps.workspace.evaluate import (
@@ -22,6 +21,7 @@ from rps_pin.rps.workspace.evaluate import (
 )
 from rps_pin.rps.workspace.grids import WHOLE, Block, Grid, checked_grid, leg_grid
 from rps_pin.rps.workspace.result import Workspace
+from rps_pin.validation import real, real_vector
 
 if TYPE_CHECKING:
     from rps_pin.rps.robot import RPSRobot
@@ -102,7 +102,9 @@ class GridJob:
     ) -> None:
         self.parameters = parameters_of(robot)
         self.grid = leg_grid(self.parameters) if grid is None else checked_grid(grid)
-        self.min_conditioning = checked_fraction(min_conditioning, "min_conditioning")
+        self.min_conditioning = real(min_conditioning)
+        if not 0 <= self.min_conditioning <= 1:
+            raise InputError(f"min_conditioning = {min_conditioning}; it must be from 0 to 1")
         self.start = checked_start(self.parameters, self.grid, start)
         self._side = side_of_singularity(self.parameters, self.start)
         if self._side == 0:
@@ -172,10 +174,7 @@ def level_pose(parameters: RPSParameters, length: float) -> Array:
 def checked_start(parameters: RPSParameters, grid: Grid, start: ArrayLike | None) -> Array:
     """Return the pose (3,) that decides the assembly mode; see `workspace`."""
     if start is not None:
-        pose = checked_pose(start, "start")
-        if pose.shape != (3,):
-            raise InputError(f"start has shape {pose.shape}; it must be one pose, (3,)")
-        return pose
+        return real_vector(start, 3, "start")
     if grid.kind == "leg lengths":
         ends = [(axis[0], axis[-1]) for axis in grid.axes]
         return level_pose(parameters, float(np.mean(ends)))
@@ -184,14 +183,3 @@ def checked_start(parameters: RPSParameters, grid: Grid, start: ArrayLike | None
         return level_pose(parameters, (shortest + longest) / 2)
     z = grid.axes[0]
     return np.array([(z[0] + z[-1]) / 2, 0.0, 0.0])
-
-
-def checked_fraction(value: float, name: str) -> float:
-    """Return a number from 0 to 1, or refuse it."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a number") from None
-    if not 0 <= number <= 1:
-        raise InputError(f"{name} = {number:.6g}; it must be from 0 to 1")
-    return number

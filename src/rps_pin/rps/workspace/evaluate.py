@@ -1,15 +1,18 @@
-"""Everything a workspace knows of a batch of poses: its fields, and why each point is out."""
+"""Fields of a batch of poses: legs, measures, and the reasons why a pose is outside."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rps_pin.arrays import Array, Bools
-from rps_pin.rps.kinematics.pose import position
+from rps_pin.rps.kernels import legs as kernels
+from rps_pin.rps.kernels import tips as ring
+from rps_pin.rps.kinematics.legs import leg_geometry
+from rps_pin.rps.kinematics.pose import components, stacked, tilt_of
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.workspace.jacobian import leg_jacobian
 from rps_pin.rps.workspace.measures import measures
 from rps_pin.rps.workspace.reasons import Flags, Reason, broken_limits
 
@@ -39,16 +42,8 @@ class Fields(NamedTuple):
 
     def part(self, where: tuple[slice, ...]) -> Fields:
         """Return the fields of a part of the points."""
-        return Fields(
-            self.reason[where],
-            self.pose[where],
-            self.position[where],
-            self.length[where],
-            self.angle[where],
-            self.determinant[where],
-            self.conditioning[where],
-            self.transmission[where],
-        )
+        parts: list[Any] = [field[where] for field in self]
+        return Fields(*parts)
 
     def fill(self, where: tuple[slice, ...], values: Fields) -> None:
         """Copy the fields of a part of the points into these."""
@@ -56,10 +51,58 @@ class Fields(NamedTuple):
             getattr(self, name)[where] = getattr(values, name)
 
 
+class _Legs(NamedTuple):
+    """Legs of n poses, and how their lengths change with the pose; legs come first."""
+
+    length: Array
+    """d, shape (3 legs, n), m."""
+    angle: Array
+    """phi, shape (3 legs, n), rad."""
+    jacobian: list[tuple[Array, Array, Array]]
+    """Rows of d(length)/d(z, h tilt_x, h tilt_y), dimensionless; zero for a leg of no length."""
+    position: Array
+    """Of the platform's centre, shape (n, 3), m."""
+    cone: Array | None
+    """Angles of the spherical joints, shape (3 legs, n), rad; None where they have no limit."""
+
+
+def _legs(parameters: RPSParameters, pose: Array) -> _Legs:
+    """Return the legs of poses (n, 3): the kernels on contiguous arrays."""
+    g, h = parameters.base_radius, parameters.platform_radius
+    z, _, _ = components(pose)
+    x, y, tilt = tilt_of(pose)
+    radial, height = ring.tips(z, x, y, tilt, h)
+    tips = np.asarray(ring.at_legs(radial)), np.asarray(ring.at_legs(height))
+    d, cosine, sine, vanishing = leg_geometry(*tips, g)
+    if vanishing.any():  # the leg has no direction
+        cosine, sine = np.where(vanishing, 0.0, cosine), np.where(vanishing, 0.0, sine)
+    by_x, by_y, *heights = ring.tip_slopes(x, y, tilt)
+    columns = [
+        kernels.along_leg(cosine, sine, ring.at_legs(out), ring.at_legs(up))
+        for out, up in zip((by_x, by_y), heights, strict=True)
+    ]
+    cone = None
+    if parameters.spherical_cone_limit < math.pi:
+        r = parameters.spherical_rest_angle
+        along, across = ring.at_legs((0.0, x, y)), ring.at_legs((0.0, y, -x))
+        axis = kernels.rest_axis(along, across, tilt, math.cos(r), math.sin(r))
+        angles = (
+            kernels.cone_sine(cosine, sine, *axis),
+            kernels.cone_cosine(cosine, sine, *axis[::2]),
+        )
+        cone = np.arctan2(*angles)
+    return _Legs(
+        d,
+        np.arctan2(sine, cosine),
+        list(zip(sine, *columns, strict=True)),
+        stacked(0.5 * radial[1], 0.5 * radial[2], z),
+        cone,
+    )
+
+
 def side_of_singularity(parameters: RPSParameters, start: Array) -> float:
     """Return the determinant of the scaled Jacobian at a pose (3,); its sign is the side."""
-    legs = leg_jacobian(start, parameters.base_radius, parameters.platform_radius)
-    return float(measures(legs.jacobian).determinant)
+    return float(measures(_legs(parameters, start[None]).jacobian).determinant[0])
 
 
 def evaluate(
@@ -85,24 +128,24 @@ def evaluate(
     min_conditioning
         Least 1/cond that is not singular.
     """
-    p = parameters
-    legs = leg_jacobian(pose, p.base_radius, p.platform_radius)
-    measure = measures(legs.jacobian)
-    reason = broken_limits(p, pose, legs.length, legs.angle)
-    singular = (measure.conditioning < min_conditioning) | (measure.determinant * side <= 0)
+    legs = _legs(parameters, pose.reshape(-1, 3))
+    determinant, conditioning, transmission = measures(legs.jacobian)
+    reason = broken_limits(parameters, legs.length, legs.angle, legs.cone)
+    singular = (conditioning < min_conditioning) | (determinant * side <= 0)
     reason |= np.uint16(Reason.SINGULAR) * singular
+    shape = pose.shape[:-1]
     fields = Fields(
-        reason,
+        reason.reshape(shape),
         pose,
-        position(pose, p.platform_radius),
-        legs.length,
-        legs.angle,
-        measure.determinant,
-        measure.conditioning,
-        measure.transmission,
+        legs.position.reshape(pose.shape),
+        np.ascontiguousarray(legs.length.T).reshape(pose.shape),
+        np.ascontiguousarray(legs.angle.T).reshape(pose.shape),
+        determinant.reshape(shape),
+        conditioning.reshape(shape),
+        transmission.reshape(shape),
     )
     if found is not None and not found.all():
         for field in fields:
             field[~found] = 0
-        reason[~found] = Reason.UNREACHABLE
+        fields.reason[~found] = Reason.UNREACHABLE
     return fields

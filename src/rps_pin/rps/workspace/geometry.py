@@ -21,6 +21,7 @@ from rps_pin.files import whole_file
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
 from rps_pin.rps.workspace.result import Workspace
+from rps_pin.validation import choice, whole_number
 
 Space = Literal["position", "pose"]
 MESH_FORMATS = (".stl", ".ply", ".obj")
@@ -93,8 +94,7 @@ def boundary(workspace: Workspace, space: Space = "position") -> trimesh.Trimesh
     InputError
         If the grid is a slice, no cell is inside, or there is no such space.
     """
-    if space not in ("position", "pose"):
-        raise InputError(f"space = {space!r}; it must be 'position' or 'pose'")
+    choice(space, "space", ("position", "pose"))
     _refuse_slices(workspace)
     quads = _outer_faces(workspace.inside)
     if not len(quads):
@@ -132,8 +132,7 @@ def theoretical_cylinder(
     """
     if not (math.isfinite(lower) and math.isfinite(upper) and lower < upper):
         raise InputError(f"heights {lower} to {upper} m must be finite and in order")
-    if sections < 3:
-        raise InputError(f"sections = {sections}; it must be at least 3")
+    whole_number(sections, "sections", least=3)
     cylinder: trimesh.Trimesh = trimesh.creation.cylinder(
         radius=parameters.platform_radius,
         sections=sections,

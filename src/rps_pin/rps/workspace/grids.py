@@ -1,4 +1,4 @@
-"""Regular grids of leg lengths, and of poses: what a workspace is computed on."""
+"""Regular grids of leg lengths and of poses, on which workspaces are computed."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.rps.parameters import RPSParameters
+from rps_pin.validation import positive_number, real, real_array, whole_number
 
 GridKind = Literal["leg lengths", "poses"]
 
@@ -91,24 +92,23 @@ def leg_grid(
     InputError
         If the grid would be empty, or a limit is infinite, not positive or out of order.
     """
-    shortest, longest = _numbers(parameters.leg_length_limits if limits is None else limits)
+    ends = parameters.leg_length_limits if limits is None else limits
+    if np.shape(ends) != (2,):
+        raise InputError(f"limits = {ends!r}; they must be two numbers")
+    shortest, longest = map(real, ends)
     if not (0 < shortest < longest < math.inf):
         raise InputError(
             f"leg lengths from {shortest:.6g} to {longest:.6g} m make no grid: both ends must be "
             "positive, finite and in order; set leg_length_limits, or give limits"
         )
     if step is not None:
-        (size,) = _numbers((step,))
-        if not 0 < size < math.inf:
-            raise InputError(f"step = {size:.6g} m; it must be positive and finite")
-        points = math.ceil((longest - shortest) / size - 1e-9) + 1
-    counts = (points, points, points) if isinstance(points, int) else points
-    whole = isinstance(counts, tuple) and all(isinstance(n, (int, np.integer)) for n in counts)
-    if not whole or len(counts) != 3 or min(counts) < 2:
-        raise InputError(
-            f"points = {points!r}; it must be a whole number, or three, of at least 2 per leg"
-        )
-    first, second, third = (np.linspace(shortest, longest, int(n)) for n in counts)
+        points = math.ceil((longest - shortest) / positive_number(step, "step", "m") - 1e-9) + 1
+    counts = points if isinstance(points, tuple) else (points,) * 3
+    if len(counts) != 3:
+        raise InputError(f"points = {points!r}; it must be a whole number, or three")
+    first, second, third = (
+        np.linspace(shortest, longest, whole_number(n, "points", least=2)) for n in counts
+    )
     return Grid("leg lengths", (first, second, third))
 
 
@@ -157,21 +157,9 @@ def checked_grid(grid: object) -> Grid:
 
 
 def _axis(values: ArrayLike, name: str) -> Array:
-    try:
-        axis = np.atleast_1d(np.asarray(values, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers of shape (n,)") from None
+    axis = np.atleast_1d(real_array(values, name))
     if axis.ndim != 1 or not len(axis):
         raise InputError(f"{name} has shape {axis.shape}; it must be (n,) with n at least 1")
-    if not np.isfinite(axis).all():
-        raise InputError(f"{name} must be finite")
     if not (np.diff(axis) > 0).all():
         raise InputError(f"{name} must increase from value to value")
     return axis
-
-
-def _numbers(values: tuple[float, ...]) -> tuple[float, ...]:
-    try:
-        return tuple(float(value) for value in values)
-    except (TypeError, ValueError):
-        raise InputError(f"{values!r} must be numbers") from None

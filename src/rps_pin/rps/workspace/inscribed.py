@@ -1,4 +1,4 @@
-"""The largest set of full tilt: a range of heights over which every tilt up to a size is free."""
+"""Cylinders and boxes of full tilt: heights at which every tilt up to a size is inside."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, UnreachableError
+from rps_pin.numerics.bisection import bisected
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import checked_start, parameters_of
 from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, evaluate, side_of_singularity
 from rps_pin.rps.workspace.grids import pose_grid
+from rps_pin.validation import choice, whole_number
 
 if TYPE_CHECKING:
     from rps_pin.rps.robot import RPSRobot
@@ -22,7 +24,8 @@ Shape = Literal["cylinder", "box"]
 
 #: Steps in which a ray of tilts is searched for its first way out, before bisection.
 _RAY_STEPS = 64
-_BISECTIONS = 40
+#: Width of the brackets of its end, over the step.
+_BRACKET = 2.0**-40
 _LEVEL_SAMPLES = 2001
 
 
@@ -77,8 +80,7 @@ def free_tilt(
     InputError
         If an argument is not what it should be.
     """
-    if shape not in ("cylinder", "box"):
-        raise InputError(f"shape = {shape!r}; it must be 'cylinder' or 'box'")
+    choice(shape, "shape", ("cylinder", "box"))
     if directions < 24 or directions % 24:
         raise InputError(f"directions = {directions}; it must be a multiple of 24")
     if not 0 < largest <= math.pi:
@@ -101,12 +103,14 @@ def free_tilt(
     count = unbroken.sum(axis=-1)
     low = sizes[np.maximum(count - 1, 0)]
     high = sizes[np.minimum(count, _RAY_STEPS)]
-    height, angle = np.meshgrid(heights, way, indexing="ij")
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2
-        good = inside(height, angle, middle)
-        low, high = np.where(good, middle, low), np.where(good, high, middle)
-    low = np.where(count == 0, 0.0, low)  # not even the level pose
+    height, angle = (a.ravel() for a in np.meshgrid(heights, way, indexing="ij"))
+    ends, _ = bisected(
+        lambda size, ray: inside(height[ray], angle[ray], size),
+        low.ravel(),
+        high.ravel(),
+        sizes[1] * _BRACKET,
+    )
+    low = np.where(count == 0, 0.0, ends.reshape(low.shape))  # 0: not even the level pose
     # The size of the box whose side the ray's end lies on.
     gauge = np.maximum(np.abs(np.cos(way)), np.abs(np.sin(way))) if shape == "box" else 1.0
     free: Array = (low * gauge).min(axis=-1)
@@ -145,8 +149,7 @@ def largest_tilt_range(
         If no level pose is in the workspace.
     """
     parameters = parameters_of(robot)
-    if points < 3:
-        raise InputError(f"points = {points}; it must be at least 3")
+    whole_number(points, "points", least=3)
     z = np.linspace(*_level_heights(parameters, start, min_conditioning), points)
     tilt = free_tilt(parameters, z, shape, start=start, min_conditioning=min_conditioning)
     area = math.pi if shape == "cylinder" else 4.0
@@ -186,9 +189,10 @@ def _level_heights(
     for limit in (-longest, longest):
         z = np.linspace(first[0], limit, _LEVEL_SAMPLES)
         out = np.flatnonzero(~inside(z))
-        good, bad = (z[out[0] - 1], z[out[0]]) if len(out) else (z[-1], z[-1])
-        for _ in range(_BISECTIONS):
-            middle = (good + bad) / 2
-            good, bad = (middle, bad) if inside(np.array([middle])).all() else (good, middle)
-        ends.append(float(good))
+        last = out[0] - 1 if len(out) else len(z) - 1
+        bad = z[last + 1 : last + 2] if len(out) else z[-1:]
+        good, _ = bisected(
+            lambda z, _: inside(z), z[last : last + 1], bad, abs(z[1] - z[0]) * _BRACKET
+        )
+        ends.append(float(good[0]))
     return ends[0], ends[1]

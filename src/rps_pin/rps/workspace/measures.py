@@ -1,4 +1,4 @@
-"""How well the legs command the platform: determinant, conditioning and force transmission.
+"""Measures of the scaled Jacobian: determinant, conditioning and force transmission.
 
 All three come from the dimensionless Jacobian K = d(length)/d(z, h tilt_x, h tilt_y) and are zero
 exactly at a parallel (type II) singularity, where the platform can move with its legs locked.
@@ -6,15 +6,17 @@ exactly at a parallel (type II) singularity, where the platform can move with it
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from rps_pin.arrays import Array
+from rps_pin.rps.kernels.platform import cross
 
 
 class Measures(NamedTuple):
-    """Distances from a parallel singularity, each dimensionless and of shape (...)."""
+    """Measures of K, each dimensionless and of shape (...); zero at a type II singularity."""
 
     determinant: Array
     """det K; its sign tells the two sides of a singularity apart."""
@@ -25,8 +27,8 @@ class Measures(NamedTuple):
     pose's coordinates, asks at most 1/transmission N of any actuator."""
 
 
-def measures(jacobian: Array) -> Measures:
-    """Return determinant, conditioning and force transmission of K, shape (..., 3, 3).
+def measures(jacobian: Array | Sequence[Sequence[Array]]) -> Measures:
+    """Return determinant, conditioning and force transmission of K, shape (3 legs, 3, ...).
 
     The actuator forces f that hold a load w satisfy K' f = w. Actuator i's largest force for
     |w| = 1 is the norm of column i of K^-1, |k_j x k_k| / |det K| with k the rows of K, so that
@@ -37,8 +39,8 @@ def measures(jacobian: Array) -> Measures:
     (the trigonometric solution of the cubic) for the two large ones, and s_3 = |det K|/(s_1 s_2),
     which does not lose digits near a singularity.
     """
-    k1, k2, k3 = (tuple(jacobian[..., i, j] for j in range(3)) for i in range(3))
-    normal = (_cross(k2, k3), _cross(k3, k1), _cross(k1, k2))
+    k1, k2, k3 = ((row[0], row[1], row[2]) for row in jacobian)
+    normal = (cross(k2, k3), cross(k3, k1), cross(k1, k2))
     determinant = _dot(k1, normal[0])
     largest_area = np.sqrt(np.maximum.reduce([_dot(n, n) for n in normal]))
 
@@ -70,14 +72,6 @@ def _ratio(numerator: Array, denominator: Array) -> Array:
     out = np.zeros_like(numerator)
     np.divide(numerator, denominator, out=out, where=denominator > 0)
     return out
-
-
-def _cross(u: tuple[Array, ...], v: tuple[Array, ...]) -> tuple[Array, ...]:
-    return (
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    )
 
 
 def _dot(u: tuple[Array, ...], v: tuple[Array, ...]) -> Array:

@@ -1,21 +1,18 @@
-"""Why a point is out of the workspace: one bit a reason, so that a point can have several."""
+"""Reasons why a point is outside the workspace: one bit each, so that a point can have several."""
 
 from __future__ import annotations
 
+import math
 from enum import IntFlag
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rps_pin.arrays import Array
-from rps_pin.rps.kinematics.legs import cone_angles
-from rps_pin.rps.kinematics.pose import rotation
+from rps_pin.rps.kernels.limits import within
 from rps_pin.rps.parameters import RPSParameters
 
 Flags = NDArray[np.uint16]
-
-#: Limits are kept to rounding error, m or rad, as `RPSRobot.inverse_kinematics` keeps them.
-ROUNDING = 1e-12
 
 
 class Reason(IntFlag):
@@ -64,31 +61,30 @@ class Reason(IntFlag):
         return ", ".join(parts)
 
 
-def broken_limits(parameters: RPSParameters, pose: Array, length: Array, angle: Array) -> Flags:
-    """Return the limits of the legs and joints that each pose breaks, shape (...).
+def broken_limits(
+    parameters: RPSParameters, length: Array, angle: Array, cone: Array | None
+) -> Flags:
+    """Return the limits of the legs and joints that each pose breaks, shape (n,).
 
     Parameters
     ----------
     parameters
         The robot; `RPSParameters.leg_length_limits` and its like are the limits.
-    pose
-        Shape (..., 3), m and rad.
     length, angle
-        Of the legs in that pose, shape (..., 3) each, m and rad.
+        Of the legs, shape (3 legs, n) each, m and rad.
+    cone
+        Angles of the spherical joints, shape (3 legs, n), rad; None where they have no limit.
     """
-    p = parameters
-    shortest, longest = p.leg_length_limits
-    least, greatest = p.leg_angle_limits
+    shortest, longest = parameters.leg_length_limits
     checks = [
-        (Reason.LEG_1_SHORT, length < shortest - ROUNDING),
-        (Reason.LEG_1_LONG, length > longest + ROUNDING),
-        (Reason.LEG_1_ANGLE, (angle < least - ROUNDING) | (angle > greatest + ROUNDING)),
+        (Reason.LEG_1_SHORT, within(length, shortest, math.inf)),
+        (Reason.LEG_1_LONG, within(length, -math.inf, longest)),
+        (Reason.LEG_1_ANGLE, within(angle, *parameters.leg_angle_limits)),
     ]
-    if p.spherical_cone_limit < np.pi:
-        cone = cone_angles(angle, rotation(pose), p.spherical_rest_angle)
-        checks.append((Reason.LEG_1_SPHERICAL, cone > p.spherical_cone_limit + ROUNDING))
-    flags = np.zeros(length.shape[:-1], dtype=np.uint16)
-    for leg_1, broken in checks:
+    if cone is not None:
+        checks.append((Reason.LEG_1_SPHERICAL, within(cone, 0.0, parameters.spherical_cone_limit)))
+    flags = np.zeros(length.shape[1:], dtype=np.uint16)
+    for leg_1, kept in checks:
         for leg in range(3):  # the bits of legs 2 and 3 follow that of leg 1
-            flags |= np.uint16(leg_1 << leg) * broken[..., leg]
+            flags |= np.uint16(leg_1 << leg) * ~kept[leg]
     return flags

@@ -1,4 +1,4 @@
-"""Workspaces too large for memory: block by block, on every core, straight into a file."""
+"""Workspaces too large for memory: computed block by block on every core, written to a file."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from loky import ProcessPoolExecutor
+from loky import ProcessPoolExecutor, cpu_count
 from numpy.typing import ArrayLike
 
-from rps_pin.errors import InputError
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import BLOCK, GridJob, Progress
 from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, Fields
@@ -28,6 +27,7 @@ from rps_pin.rps.workspace.storage import (
     checked_fields,
     new_workspace_file,
 )
+from rps_pin.validation import whole_number
 
 if TYPE_CHECKING:
     from rps_pin.rps.robot import RPSRobot
@@ -134,11 +134,8 @@ def workspace_to_file(
 def checked_workers(workers: int | None) -> int:
     """Return the number of processes to use: as given, or the cores this process may run on."""
     if workers is None:
-        affinity = getattr(os, "sched_getaffinity", None)  # Linux only
-        return len(affinity(0)) if affinity else os.cpu_count() or 1
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-        raise InputError(f"workers = {workers!r}; it must be a whole number, at least 1")
-    return workers
+        return int(cpu_count())
+    return whole_number(workers, "workers")
 
 
 def _computed(

@@ -31,9 +31,10 @@ from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.evaluate import Fields, evaluate
-from rps_pin.rps.workspace.grids import Block, Grid, checked_grid
+from rps_pin.rps.workspace.grids import WHOLE, Block, Grid, checked_grid
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
+from rps_pin.validation import choice
 
 FORMAT = "rps_pin workspace 1"
 DType = Literal["float32", "float64"]
@@ -96,8 +97,7 @@ def new_workspace_file(
     """
     target = Path(path)
     names = checked_fields(fields)
-    if dtype not in ("float32", "float64"):
-        raise InputError(f"dtype = {dtype!r}; it must be 'float32' or 'float64'")
+    choice(dtype, "dtype", ("float32", "float64"))
     if not target.parent.is_dir():
         raise InputError(f"{target.parent} is not a folder: {target.name} cannot be written there")
     if target.exists() and not overwrite:
@@ -146,17 +146,11 @@ def save_workspace(
         As `new_workspace_file`.
     """
     w = workspace
+    options: Any = {"fields": fields, "dtype": dtype, "overwrite": overwrite}
     with new_workspace_file(
-        path,
-        w.parameters,
-        w.grid,
-        w.start,
-        w.min_conditioning,
-        fields=fields,
-        dtype=dtype,
-        overwrite=overwrite,
+        path, w.parameters, w.grid, w.start, w.min_conditioning, **options
     ) as file:
-        file.write((slice(None), slice(None)), w.fields)
+        file.write(WHOLE, w.fields)
 
 
 def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> Workspace:
@@ -174,7 +168,7 @@ def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> 
     InputError
         If there is no such file, or it does not hold a complete workspace.
     """
-    planes, rows = block or (slice(None), slice(None))
+    planes, rows = block or WHOLE
     try:
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != FORMAT or not file.attrs.get("complete", False):
