@@ -104,17 +104,46 @@ def select(condition: Number, yes: Number, no: Number) -> Number:
     return _casadi().if_else(condition, yes, no)
 
 
-@kernel
+def _greatest(a: float, b: float, c: float) -> float:
+    return max(a, b, c)
+
+
+@kernel_for_floats(_greatest)
 def greatest(a: Number, b: Number, c: Number) -> Number:
     """Return the greatest of three numbers."""
+    if type(a) is float and type(b) is float and type(c) is float:
+        return max(a, b, c)
+    if is_real_array(a):
+        return np.maximum(np.maximum(a, b), c)
     most = select(less(a, b), b, a)
     return select(less(most, c), c, most)
 
 
 @kernel
-def absolute(x: Number) -> Number:
-    """Return x or -x, the one that is not negative."""
-    return select(less(x, 0.0), -x, x)
+def clamp(x: Number, lower: Number, upper: Number) -> Number:
+    """Return x, or the bound that it passes; the lower one of NaN."""
+    bounded = select(less(lower, x), x, lower)
+    return select(less(bounded, upper), bounded, upper)
+
+
+@kernel_for_floats(lambda condition, yes, no: yes if condition else no)
+def select_all(condition: Number, yes: tuple[Number, ...], no: tuple[Number, ...]) -> Any:
+    """Return one of two tuples of numbers: `select` of each."""
+    if isinstance(condition, (bool, np.bool_)):
+        return yes if condition else no
+    return tuple(select(condition, one, other) for one, other in zip(yes, no, strict=True))
+
+
+@kernel_for_floats(lambda condition: condition)
+def always(condition: Number) -> bool:
+    """Return whether a condition holds, of arrays everywhere."""
+    return bool(condition) if isinstance(condition, (bool, np.bool_)) else bool(condition.all())
+
+
+@kernel_for_floats(lambda condition: not condition)
+def never(condition: Number) -> bool:
+    """Return whether a condition does not hold, of arrays nowhere."""
+    return not (condition if isinstance(condition, (bool, np.bool_)) else condition.any())
 
 
 def is_real_array(x: Number) -> bool:

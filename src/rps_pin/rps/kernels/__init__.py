@@ -10,7 +10,8 @@ Compiled functions call kernels too (see `rps_pin.numerics.compiled`).
 - `tips`: the spherical joints, their slopes, rates and accelerations
 - `legs`: length, direction, rates, the cone of the spherical joint
 - `limits`: the tolerance of limits
-- `leg_equations`: Eq. 8, its slopes, Newton's step, the Newton-Kantorovich bound
+- `leg_equations`: Eq. 8, its slopes, Newton's step
+- `continuation`: an assembly mode followed while the leg lengths change
 - `placement`: centre, axes and tilt from the tips
 - `forces`: virtual work of legs and platform, and its solution
 """

@@ -12,7 +12,8 @@ Each equation has two of the three angles in it: the Jacobian is
     [  0 b2 b3 ]     determinant  a1 b2 c3 + a2 b3 c1.
     [ c1  0 c3 ]
 
-Norms are the greatest sum of a row's sizes, angles in rad.
+Norms are the greatest sum of a row's sizes, angles in rad. They judge, and are not differentiated:
+of complex numbers they take the modulus.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from __future__ import annotations
 import math
 
 from rps_pin.numerics.compiled import kernel
-from rps_pin.numerics.elementary import Number, absolute, greatest, sqrt
-from rps_pin.rps.kernels.tips import Three
+from rps_pin.numerics.elementary import Number, greatest, sqrt
+from rps_pin.rps.kernels.tips import Ring, Three
 
 #: a1, a2, b2, b3, c3, c1.
 Slopes = tuple[Number, Number, Number, Number, Number, Number]
@@ -32,7 +33,7 @@ _ROOT_3 = math.sqrt(3.0)
 
 
 @kernel
-def constants(d: Three, g: Number, h: Number) -> Three:
+def constants(d: Three, g: Number, h: Number) -> Ring:
     """Return what of f_12, f_23 and f_31 does not change with the angles, m^2."""
     square_1, square_2, square_3 = d[0] * d[0], d[1] * d[1], d[2] * d[2]
     rest = 6.0 * g * g + 3.0 * h * h
@@ -40,7 +41,7 @@ def constants(d: Three, g: Number, h: Number) -> Three:
 
 
 @kernel
-def residuals(w: Three, z: Three, g: Number, constant: Three) -> Three:
+def residuals(w: Three, z: Three, g: Number, constant: Three) -> Ring:
     """Return f_12, f_23 and f_31, m^2."""
     m1, m2, m3 = 3.0 * g - w[0], 3.0 * g - w[1], 3.0 * g - w[2]
     return (
@@ -92,7 +93,7 @@ def adjugate(by_angle: Slopes) -> Matrix:
 
 
 @kernel
-def matrix_times(matrix: Matrix, f: Three, scale: Number) -> Three:
+def matrix_times(matrix: Matrix, f: Three, scale: Number) -> Ring:
     """Return a matrix times three residuals, times a number."""
     m11, m12, m13, m21, m22, m23, m31, m32, m33 = matrix
     f12, f23, f31 = f
@@ -118,7 +119,7 @@ def unit_length(w: Number, z: Number) -> tuple[Number, Number]:
 
 
 @kernel
-def distance_errors(w: Three, z: Three, g: Number, h: Number) -> Three:
+def distance_errors(w: Three, z: Three, g: Number, h: Number) -> Ring:
     """Return |B_i - B_j| - sqrt(3) h for each pair, m, without the cancellation of Eq. 8."""
     r1, r2, r3 = g - w[0], g - w[1], g - w[2]
     z12, z23, z31 = z[0] - z[1], z[1] - z[2], z[2] - z[0]
@@ -134,9 +135,7 @@ def distance_errors(w: Three, z: Three, g: Number, h: Number) -> Three:
 def jacobian_norm(by_angle: Slopes) -> Number:
     """Return the norm of the Jacobian, m^2."""
     a1, a2, b2, b3, c3, c1 = by_angle
-    return greatest(
-        absolute(a1) + absolute(a2), absolute(b2) + absolute(b3), absolute(c3) + absolute(c1)
-    )
+    return greatest(abs(a1) + abs(a2), abs(b2) + abs(b3), abs(c3) + abs(c1))
 
 
 @kernel
@@ -144,16 +143,16 @@ def matrix_norm(matrix: Matrix) -> Number:
     """Return the norm of a full matrix."""
     m11, m12, m13, m21, m22, m23, m31, m32, m33 = matrix
     return greatest(
-        absolute(m11) + absolute(m12) + absolute(m13),
-        absolute(m21) + absolute(m22) + absolute(m23),
-        absolute(m31) + absolute(m32) + absolute(m33),
+        abs(m11) + abs(m12) + abs(m13),
+        abs(m21) + abs(m22) + abs(m23),
+        abs(m31) + abs(m32) + abs(m33),
     )
 
 
 @kernel
 def largest(values: Three) -> Number:
     """Return the largest size of three numbers."""
-    return greatest(absolute(values[0]), absolute(values[1]), absolute(values[2]))
+    return greatest(abs(values[0]), abs(values[1]), abs(values[2]))
 
 
 @kernel

@@ -14,6 +14,9 @@ from rps_pin.numerics.elementary import Number, atan2, less, select, sqrt
 from rps_pin.rps.kernels.platform import Vector
 from rps_pin.rps.kernels.tips import Three
 
+#: Cosines, then sines, of the three leg angles.
+Direction = tuple[Number, Number, Number, Number, Number, Number]
+
 _ROOT_3 = math.sqrt(3.0)
 
 
@@ -60,3 +63,13 @@ def tilt_of_axes(
     # beta / sin(beta/2), which tends to 2.
     factor = select(level, 2.0, 2.0 * atan2(half_sine, q_w) / half_sine)
     return q_x * factor, q_y * factor
+
+
+@kernel
+def pose_of_legs(d: Three, direction: Direction, g: Number, h: Number) -> Vector:
+    """Return (z, tilt_x, tilt_y) of legs that close the robot: their lengths and directions."""
+    c1, c2, c3, s1, s2, s3 = direction
+    rho = (g - d[0] * c1, g - d[1] * c2, g - d[2] * c3)
+    centre, u, v = platform_axes(rho, (d[0] * s1, d[1] * s2, d[2] * s3), h)
+    x, y = tilt_of_axes(u[0], u[1], u[2], v[1], v[2])
+    return centre[2], x, y

@@ -29,11 +29,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.errors import InputError
-from rps_pin.rps.kinematics import leg_equations as eq
+from rps_pin.rps.kernels import leg_equations as eq
 from rps_pin.rps.kinematics.leg_equations import (
+    WITHIN,
     checked_lengths,
     checked_radii,
+    closing_tolerance,
+    cosines_determinant,
+    determinant,
+    jacobian,
+    newton,
     placement_from_angles,
+    residuals,
 )
 
 #: The triple each candidate belongs to, (m,), and its tips w and z, (3, m) each.
@@ -305,17 +312,17 @@ def _candidates(length: Array, x: Array, g: float, h: float) -> Candidates:
 def _polished(length: Array, owner: Indices, w: Array, z: Array, g: float, h: float) -> Candidates:
     """Return the candidates that Newton's method turns into solutions."""
     d = length[owner].T
-    tolerance = eq.closing_tolerance(d, g, h)
+    tolerance = closing_tolerance(d, g, h)
     # Stop at the tolerance: beside a double solution, more steps would lead away again. Then take
     # as many as make it better.
-    eq.newton(d, w, z, g, h, 0.5 * tolerance / eq.WITHIN, _STEPS)
+    newton(d, w, z, g, h, 0.5 * tolerance / WITHIN, _STEPS)
     error = eq.largest(eq.distance_errors(w, z, g, h))
     closed = np.flatnonzero(error <= tolerance)
     owner, d, w, z, error = owner[closed], d[:, closed], w[:, closed], z[:, closed], error[closed]
     better = np.flatnonzero(error > _ROUNDING * (g + h))
     for _ in range(_POLISHING_STEPS):
         w_next, z_next = w[:, better], z[:, better]
-        eq.newton(d[:, better], w_next, z_next, g, h, 0.0, 1)
+        newton(d[:, better], w_next, z_next, g, h, 0.0, 1)
         error_next = eq.largest(eq.distance_errors(w_next, z_next, g, h))
         gain = error_next < error[better]
         better = better[gain]
@@ -334,16 +341,16 @@ def _twins(length: Array, owner: Indices, w: Array, z: Array, g: float, h: float
     """
     d = length[owner].T
     angle = np.arctan2(z, w)
-    det = eq.cyclic_determinant(eq.slopes(w, z, g)) / eq.determinant_scale(d, h)
+    det = cosines_determinant(d, w, z, g, h)
     near = np.abs(det) < _FOLD_BELOW
     owner, d, angle = owner[near], d[:, near], angle[:, near]
     if not len(owner):
         return owner, d, d
-    u, sigma, v = np.linalg.svd(eq.jacobian(d.T, angle.T, g, h))
+    u, sigma, v = np.linalg.svd(jacobian(d.T, angle.T, g, h))
     left, small, right = u[:, :, 2], sigma[:, 2], v[:, 2, :]
     step = 1e-4
     ahead, behind = (
-        np.einsum("nij,nj->ni", eq.jacobian(d.T, angle.T + side * step * right, g, h), right)
+        np.einsum("nij,nj->ni", jacobian(d.T, angle.T + side * step * right, g, h), right)
         for side in (1, -1)
     )
     bend = np.einsum("ni,ni->n", left, ahead - behind) / (2 * step)
@@ -357,7 +364,7 @@ def _twins(length: Array, owner: Indices, w: Array, z: Array, g: float, h: float
 def _flat(length: Array, g: float, h: float) -> Candidates:
     """Return the solutions with all tips on the base plane: highly singular, so tried directly."""
     w = length.T[:, :, None] * _SIDES[:, None, :]
-    tolerance = eq.closing_tolerance(length.T, g, h)
+    tolerance = closing_tolerance(length.T, g, h)
     closed = eq.largest(eq.distance_errors(w, 0 * w, g, h)) <= tolerance[:, None]
     owner, side = np.nonzero(closed)
     w = w[:, owner, side]
@@ -378,7 +385,7 @@ def _distinct(
     first = np.where(raised[0] != 0, raised[0], np.where(raised[1] != 0, raised[1], raised[2]))
     height = z.sum(axis=0)
     z = np.where(np.where(np.abs(height) > 1e-9 * size, height, first) < 0, -z, z)
-    det = eq.cyclic_determinant(eq.slopes(w, z, g)) / eq.determinant_scale(d, h)
+    det = cosines_determinant(d, w, z, g, h)
 
     # Flat ones first, then the best closed, so that of those that coincide the best is kept.
     error = eq.largest(eq.distance_errors(w, z, g, h))
@@ -445,8 +452,8 @@ def _described(length: Array, angle: Array, mirror: Indices, g: float, h: float)
     d = np.broadcast_to(length[:, None], angle.shape)[exists]
     phi = angle[exists]
     place = placement_from_angles(d, phi, g, h)
-    det = eq.determinant(d, phi, g, h)
-    residual = np.abs(eq.residuals(d, phi, g, h)).max(axis=-1, initial=0.0)
+    det = determinant(d, phi, g, h)
+    residual = np.abs(residuals(d, phi, g, h)).max(axis=-1, initial=0.0)
 
     def padded(values: NDArray[Any], fill: float | bool) -> NDArray[Any]:
         whole = np.full((*exists.shape, *values.shape[1:]), fill)

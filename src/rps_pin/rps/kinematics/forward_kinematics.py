@@ -1,19 +1,10 @@
-"""The direct kinematics that matters: the pose that continues a known one (Eq. 8, followed).
+"""Forward kinematics: the pose of given leg lengths that continues a known one.
 
 Leg lengths alone leave up to 16 poses open (`rps_pin.rps.kinematics.assembly_modes`); a robot that
 moves stays in the one it is in. So the leg angles are followed from the lengths of a known pose to
-those wanted, on the straight way between them, in steps that the Newton-Kantorovich theorem allows.
-With the Jacobian J of Eq. 8 at the angles so far and at the lengths of the step's end,
-
-    beta = |J^-1|,  eta = |J^-1 f|,  L >= |f''|,     beta L eta <= 1/2  (here 1/4)
-
-there is exactly one solution within 2 eta, J is regular all the way to it, and Newton's method
-finds it. All norms are the greatest row sum (angles in rad), and
-
-    L = max over (i, j) of 3 g (d_i + d_j) + 8 d_i d_j.
-
-At a parallel singularity beta grows without bound and the steps shrink to nothing: the way ends
-there, or crosses to where the lengths no longer tell which way the platform goes. It is refused.
+those wanted, on the straight line between them, in steps that the Newton-Kantorovich theorem
+allows: see `rps_pin.rps.kernels.continuation`. Where the line meets a parallel singularity it ends,
+or crosses to where the lengths no longer tell which way the platform goes. It is refused.
 """
 
 from __future__ import annotations
@@ -27,32 +18,25 @@ from scipy.optimize import least_squares
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import ClosureError, InputError, SingularityError
-from rps_pin.rps.kinematics import leg_equations as eq
+from rps_pin.rps.kernels.continuation import follow_legs, newton_step
 from rps_pin.rps.kinematics.assembly_modes import assembly_modes, longest_leg
 from rps_pin.rps.kinematics.leg_equations import (
     checked_lengths,
-    checked_positive,
     checked_radii,
     placement_from_angles,
+    residuals,
 )
-from rps_pin.rps.kinematics.legs import leg_angles_and_lengths, tips
-from rps_pin.rps.kinematics.pose import checked_pose, position, rotation
-from rps_pin.rps.kinematics.tracking import (
-    TRUST,
-    Lengths,
-    Way,
-    condition_of,
-    direction_of_legs,
-    follow,
-    pose_of,
-)
+from rps_pin.rps.kinematics.legs import geometry_of_pose, refuse_vanishing
+from rps_pin.rps.kinematics.pose import checked_pose
+from rps_pin.rps.kinematics.rates import check_errors_option
+from rps_pin.rps.kinematics.tracking import Lengths, Way, condition_of, follow, pose_of
+from rps_pin.validation import one_shape, positive_number, whole_number
 
 #: Largest condition number of Eq. 8's Jacobian through which a pose is followed.
 CONDITION_LIMIT = 1e6
 #: Steps tried before the way counts as ending in a singularity: towards one that ends it, each
 #: covers about a tenth of what is left.
 _MOST_STEPS = 1000
-_MOST_NEWTON = 12
 _SQRT3 = math.sqrt(3.0)
 
 
@@ -109,15 +93,16 @@ def forward_kinematics(
     UnreachableError
         If a leg has no length in a pose of `near`.
     """
-    if errors not in ("raise", "mask"):
-        raise InputError(f"errors = {errors!r}; it must be 'raise' or 'mask'")
+    check_errors_option(errors)
     g, h = checked_radii(base_radius, platform_radius)
-    limit = checked_positive(condition_limit, "condition_limit")
-    wanted, start = _together(checked_lengths(length), checked_pose(near, "near"))
+    limit = positive_number(condition_limit, "condition_limit")
+    wanted, start = one_shape(length=checked_lengths(length), near=checked_pose(near, "near"))
     shape = wanted.shape
     goal, pose = wanted.reshape(-1, 3), start.reshape(-1, 3)
-    begin, angle = leg_angles_and_lengths(tips(position(pose, h), rotation(pose), h), g)
-    angle, fraction, condition = _followed(begin.T, goal.T, angle.T, g, h, limit)
+    begin, *legs = _legs_of(pose, g, h)
+    direction = np.concatenate(legs, axis=-1).T
+    direction, fraction, condition = follow_many(begin.T, goal.T, direction, (g, h), limit)
+    angle = np.arctan2(direction[3:], direction[:3]).T
     reached = fraction == 1.0
     if errors == "raise" and not reached.all():
         first = int(np.argmin(reached))
@@ -152,9 +137,8 @@ def start_of(
     pose = checked_pose(near, "near")
     if pose.shape != (3,):
         raise InputError(f"near has shape {pose.shape}; it must be (3,)")
-    length, angle = leg_angles_and_lengths(tips(position(pose, h), rotation(pose), h), g)
-    (d1, d2, d3), (phi1, phi2, phi3) = length.tolist(), angle.tolist()
-    d, way = (d1, d2, d3), direction_of_legs((phi1, phi2, phi3))
+    (d1, d2, d3), (c1, c2, c3), (s1, s2, s3) = (array.tolist() for array in _legs_of(pose, g, h))
+    d, way = (d1, d2, d3), (c1, c2, c3, s1, s2, s3)
     condition = condition_of(d, way, g, h)
     if condition > limit:
         raise SingularityError(
@@ -208,8 +192,8 @@ class EncoderTracker:
         most_steps: int = 100,
     ) -> None:
         self._g, self._h = checked_radii(base_radius, platform_radius)
-        self._limit = checked_positive(condition_limit, "condition_limit")
-        self._most = int(checked_positive(most_steps, "most_steps"))
+        self._limit = positive_number(condition_limit, "condition_limit")
+        self._most = whole_number(most_steps, "most_steps")
         self._pose = np.empty(3)
         self.reset(near)
 
@@ -269,106 +253,58 @@ class EncoderTracker:
         return out
 
 
+def _legs_of(pose: Array, g: float, h: float) -> tuple[Array, Array, Array]:
+    """Return lengths, cosines and sines of the legs, or refuse a leg without length."""
+    legs = geometry_of_pose(pose, g, h)
+    refuse_vanishing(legs.length, legs.vanishing)
+    return legs.length, legs.cosine, legs.sine
+
+
 # Many at once -------------------------------------------------------------------------------------
 
 
-def _followed(
-    begin: Array, goal: Array, angle: Array, g: float, h: float, limit: float
+def follow_many(
+    begin: Array, goal: Array, direction: Array, radii: tuple[float, float], limit: float
 ) -> tuple[Array, Array, Array]:
-    """Return angles (n, 3), the part of the way gone (n,) and the condition there (n,)."""
-    n = begin.shape[1]
-    cosine, sine = np.cos(angle), np.sin(angle)
-    done, share = np.zeros(n), np.ones(n)
-    condition, sign = _condition_and_sign(begin, cosine, sine, g)
-    going = np.flatnonzero(condition <= limit)
-    for _ in range(_MOST_STEPS):
-        if not len(going):
-            break
-        to = np.minimum(1.0, done[going] + share[going])
-        start, end = begin[:, going], goal[:, going]
-        d = np.where(to == 1.0, end, start + to * (end - start))
-        w, z = d * cosine[:, going], d * sine[:, going]
-        small, kantorovich, moved = _trusted(d, w, z, g, h, sign[going])
-        good = np.flatnonzero(small)
-        w, z, d_good = w[:, good], z[:, good], d[:, good]
-        before = cosine[:, going[good]], sine[:, going[good]]
-        tolerance = eq.closing_tolerance(d_good, g, h)
-        eq.newton(d_good, w, z, g, h, tolerance, _MOST_NEWTON)
-        error = eq.largest(eq.distance_errors(w, z, g, h))
-        w, z = w / d_good, z / d_good
-        shift = np.abs(np.arcsin(np.clip(z * before[0] - w * before[1], -1, 1))).max(axis=0)
-        there, same = _condition_and_sign(d_good, w, z, g)
-        # To rounding: a step of nothing moves by nothing.
-        right = (error <= tolerance) & (shift <= 2 * moved[good] + 1e-12)
-        right &= (there <= limit) & (same == sign[going[good]])
-        accepted = good[right]
-        share[going] *= np.clip(0.8 * TRUST / np.maximum(kantorovich, 1e-300), 0.02, 0.5)
-        at = going[accepted]
-        cosine[:, at], sine[:, at] = w[:, right], z[:, right]
-        gained = to[accepted] - done[at]
-        done[at], condition[at] = to[accepted], there[right]
-        growth = np.clip(0.8 * TRUST / np.maximum(kantorovich[accepted], 1e-300), 0.5, 4.0)
-        share[at] = gained * growth
-        ended = (done[going] == 1.0) | (share[going] < 1e-14)
-        going = going[~ended]
-    return np.arctan2(sine, cosine).T, done, condition
+    """Return directions, the part of each line gone and the condition there.
 
+    Parameters
+    ----------
+    begin, goal
+        Leg lengths at both ends of the lines, shape (3, n), m.
+    direction
+        Of the legs at the beginning: cosines, then sines, shape (6, n).
+    radii
+        The paper's g and h, m.
+    limit
+        Largest condition number that is followed through.
 
-def _trusted(
-    d: Array, w: Array, z: Array, g: float, h: float, sign: Array
-) -> tuple[Bools, Array, Array]:
-    """Return whether Newton's method is sure to converge, beta L eta, and eta, (n,) each."""
-    f12, f23, f31 = eq.left_sides(w, z, g, eq.constants(d, g, h))
-    by_angle = eq.slopes(w, z, g)
-    det = eq.cyclic_determinant(by_angle)
-    turned = np.abs(det) > 0
-    inverse = _adjugate(by_angle) / np.where(turned, det, 1.0)
-    beta = np.abs(inverse).sum(axis=1).max(axis=0)
-    f = np.stack([f12, f23, f31])
-    eta = np.abs((inverse * f).sum(axis=1)).max(axis=0)
-    kantorovich = np.where(turned, beta * eta * _bend(d, g), np.inf)
-    return (kantorovich <= TRUST) & (np.sign(det) == sign), kantorovich, eta
-
-
-def _condition_and_sign(d: Array, cosine: Array, sine: Array, g: float) -> tuple[Array, Array]:
-    """Return the condition number of the Jacobian, and its determinant's sign, (n,) each."""
-    (a1, a2), (b2, b3), (c3, c1) = by_angle = eq.slopes(d * cosine, d * sine, g)
-    det = eq.cyclic_determinant(by_angle)
-    size = eq.largest((np.abs(a1) + np.abs(a2), np.abs(b2) + np.abs(b3), np.abs(c1) + np.abs(c3)))
-    inverse = np.abs(_adjugate(by_angle)).sum(axis=1).max(axis=0)
-    regular = np.abs(det) > 0
-    return np.where(regular, size * inverse / np.where(regular, np.abs(det), 1.0), np.inf), np.sign(
-        det
-    )
-
-
-def _adjugate(by_angle: tuple[tuple[Array, Array], ...]) -> Array:
-    """Return the adjugate of the cyclic Jacobian, shape (3, 3, n)."""
-    (a1, a2), (b2, b3), (c3, c1) = by_angle
-    return np.array(
-        [
-            [b2 * c3, -a2 * c3, a2 * b3],
-            [b3 * c1, a1 * c3, -a1 * b3],
-            [-b2 * c1, a2 * c1, a1 * b2],
-        ]
-    )
-
-
-def _bend(d: Array, g: float) -> Array:
-    """Return L: f_ij'' is m_j w_i + 2 z_i z_j and its like, and twice z_i z_j - 2 w_i w_j."""
-    first, second, third = (3 * g * (d[i] + d[j]) + 8 * d[i] * d[j] for i, j in eq.PAIRS)
-    return eq.largest((first, second, third))
-
-
-def _together(lengths: Array, near: Array) -> tuple[Array, Array]:
-    try:
-        wanted, start = np.broadcast_arrays(lengths, near)
-    except ValueError:
-        raise InputError(
-            f"length and near have shapes {lengths.shape} and {near.shape}, which do not go "
-            "together"
-        ) from None
-    return wanted, start
+    Returns
+    -------
+    direction, fraction, condition : arrays
+        Shapes (6, n), (n,) and (n,).
+    """
+    direction = direction.copy()
+    with np.errstate(all="ignore"):  # where a step is not trusted, its numbers are not used
+        condition = np.array(newton_step(begin, tuple(direction), *radii)[2])
+        done, share = np.zeros_like(condition), np.ones_like(condition)
+        going = np.flatnonzero(condition <= limit)
+        for _ in range(_MOST_STEPS):
+            if not len(going):
+                break
+            found, progress = follow_legs(
+                begin[:, going],
+                tuple(direction[:, going]),
+                goal[:, going],
+                radii,
+                limit,
+                (done[going], share[going], condition[going]),
+                1,
+            )
+            direction[:, going] = found
+            done[going], share[going], condition[going] = progress
+            going = going[(done[going] < 1.0) & (share[going] >= 1e-14)]
+    return direction, done, condition
 
 
 def _refuse(
@@ -403,7 +339,7 @@ def _refuse(
 
 
 def _residuals_of(angle: Array, length: Array, g: float, h: float) -> Array:
-    return eq.residuals(length, angle, g, h)
+    return residuals(length, angle, g, h)
 
 
 def _reading(length: ArrayLike) -> Lengths:
