@@ -67,9 +67,8 @@ class BrowserPanel:
         try:
             # A page can ask viser for a tunnel to the internet: not from here.
             self._server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
-            self._server.gui.configure_theme(
-                control_layout="collapsible", show_logo=False, show_share_button=False
-            )
+            self._server.gui.configure_theme(show_logo=False, show_share_button=False)
+            self._server.gui.main_panel.dock_right()
             self.url = f"http://{HOST}:{self._server.get_port()}"
             self._server.gui.add_markdown(f"## {title}")
             self._sliders = {
@@ -92,7 +91,8 @@ class BrowserPanel:
 
     def close(self) -> None:
         """End the server."""
-        self._server.stop()
+        with contextlib.redirect_stdout(io.StringIO()):  # viser prints that it stops
+            self._server.stop()
 
     def __enter__(self) -> Self:
         return self
