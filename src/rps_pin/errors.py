@@ -180,7 +180,7 @@ class InfeasibleError(RPSPinError, ArithmeticError):
         of the least sum. Empty where no limit is the reason.
     unproduced : (nv,) array or None
         Where the actuators cannot do it even without limits: the smallest generalised force that
-        would have to be added (see `least_effort.unproduced_force`).
+        would have to be added (see `least_effort.residual_force`).
     """
 
     def __init__(

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, InputError, JointEffects, SingularityError
+from rps_pin.closed_loop.dynamics.forward_dynamics import forward_dynamics
+from rps_pin.closed_loop.dynamics.inverse_dynamics import inverse_dynamics
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import FOUR_BAR, five_bar, values
 from tests.closed_loop.random_mechanisms import ALL_KINDS, Case, case, slopes, worst_error
@@ -41,7 +43,7 @@ def check_inverse(c: Case) -> None:
     mechanism, count = c.mechanism, c.mechanism.actuated_indices.size
 
     def tau(q: Array, v: Array, a: Array) -> Array:
-        return mechanism.inverse_dynamics(q, v, a, wrenches=c.wrenches).tau
+        return inverse_dynamics(mechanism.system, q, v, a, c.wrenches, closed=False).tau
 
     found = mechanism.inverse_dynamics_derivatives(c.q, c.v, c.a, wrenches=c.wrenches)
     none = np.zeros(count)
@@ -70,7 +72,7 @@ def check_forward(c: Case) -> None:
     tau = mechanism.inverse_dynamics(c.q, c.v, c.a, wrenches=c.wrenches).tau
 
     def a(q: Array, v: Array, force: Array = tau) -> Array:
-        return mechanism.forward_dynamics(q, v, force, wrenches=c.wrenches)
+        return forward_dynamics(mechanism.system, q, v, force, c.wrenches, closed=False)
 
     found = mechanism.forward_dynamics_derivatives(c.q, c.v, tau, wrenches=c.wrenches)
     none = np.zeros(at.size)

@@ -122,19 +122,17 @@ def test_equals_pinocchio_where_masses_are_regular(
     tau = forces(c, seed)
     expected = pinocchio_s(c, full(c, tau))
     assert worst_error(c.mechanism.forward_dynamics(c.q, c.v, tau), expected) < 1e-9
-    own = c.mechanism.forward_dynamics(c.q, c.v, tau, method="proximal")
-    assert worst_error(own, expected) < 1e-9
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_both_methods_agree_on_effects_and_wrenches(seed: int) -> None:
+def test_equals_pinocchio_with_effects_and_wrenches(seed: int) -> None:
     c = case(seed, kinds=["spherical", "rigid"], effects=True, armature=True)
-    tau = forces(c, seed)
-    reduced, proximal = (
-        c.mechanism.forward_dynamics(c.q, c.v, tau, wrenches=c.wrenches, method=method)
-        for method in ("reduced", "proximal")
-    )
-    assert worst_error(proximal, reduced) < 1e-9
+    mechanism, tau = c.mechanism, forces(c, seed)
+    assert mechanism.effects is not None
+    resisting = resisting_force(mechanism.model, mechanism.effects, c.q, c.v)
+    expected = pinocchio_s(c, full(c, tau) - resisting + external_force(c))
+    found = mechanism.forward_dynamics(c.q, c.v, tau, wrenches=c.wrenches)
+    assert worst_error(found, expected) < 1e-9
 
 
 # Gauss's principle, and the KKT equations ---------------------------------------------------------
@@ -278,20 +276,19 @@ def test_motion_without_mass_is_refused() -> None:
     assert np.isfinite(c.mechanism.forward_dynamics(c.q, c.v, forces(c))).all()
 
 
-def test_proximal_method_says_what_it_takes() -> None:
-    c = case(0, kinds=["revolute"])
-    with pytest.raises(MechanismError, match="spherical and rigid closures only"):
-        c.mechanism.forward_dynamics(c.q, c.v, forces(c), method="proximal")
-    massless_rods = mechanisms.three_rps()
-    q, v, _ = mechanisms.state(massless_rods)
-    with pytest.raises(MechanismError, match="mass matrix of the open tree is singular"):
-        massless_rods.forward_dynamics(q, v, np.zeros(3), method="proximal")
+def test_proximal_method_is_deprecated_and_computes_the_same() -> None:
+    """Of a massless tree too, which it did not take."""
+    mechanism = mechanisms.three_rps()
+    q, v, _ = mechanisms.state(mechanism)
+    with pytest.warns(DeprecationWarning, match="method='proximal' is deprecated"):
+        found = mechanism.forward_dynamics(q, v, np.ones(3), method="proximal")
+    np.testing.assert_array_equal(found, mechanism.forward_dynamics(q, v, np.ones(3)))
 
 
 def test_wrong_arguments_are_refused_by_name() -> None:
     c = case(0)
     mechanism, tau = c.mechanism, forces(c)
-    with pytest.raises(InputError, match="method = 'sparse'; it must be 'reduced' or 'proximal'"):
+    with pytest.raises(InputError, match="method = 'sparse': it must be 'reduced' or 'proximal'"):
         mechanism.forward_dynamics(c.q, c.v, tau, method="sparse")
     with pytest.raises(InputError, match="tau has shape"):
         mechanism.forward_dynamics(c.q, c.v, [*tau, 1.0])

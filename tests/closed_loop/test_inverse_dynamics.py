@@ -1,4 +1,4 @@
-"""The algebra of constrained inverse dynamics: ranks, null spaces, the two ways to solve."""
+"""Constrained inverse dynamics: the null-space solution, and its agreement with factorisations."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, RPSRobot, SingularityError
-from rps_pin.closed_loop.dynamics.null_space_solution import solve_by_allowed_motions
+from rps_pin.closed_loop.dynamics.inverse_dynamics import null_space_solution
 from rps_pin.numerics.linear_algebra import null_space
 from tests import strategies
 from tests.closed_loop import mechanisms
@@ -28,8 +28,8 @@ def test_answer_satisfies_the_kkt_equations(rank: int) -> None:
     jacobian, force = matrix(rank, 4, 5), np.arange(1.0, 6)
     actuated = np.arange(5 - rank)
     scale = np.array([1, 2, 0.5, 1, 3.0])
-    tau, multipliers, unproduced = solve_by_allowed_motions(jacobian, actuated, force, scale)
-    assert unproduced is None
+    tau, multipliers, remaining = null_space_solution(jacobian, actuated, force, scale)
+    assert remaining is None
     total = jacobian.T @ multipliers
     total[actuated] += tau
     np.testing.assert_allclose(total, force, rtol=0, atol=1e-12)
@@ -40,7 +40,7 @@ def test_answer_satisfies_the_kkt_equations(rank: int) -> None:
 def test_answer_does_not_depend_on_the_scale() -> None:
     jacobian, force = matrix(3, 4, 5), np.arange(1.0, 6)
     answers = [
-        solve_by_allowed_motions(jacobian, np.arange(2), force, scale)[0]
+        null_space_solution(jacobian, np.arange(2), force, scale)[0]
         for scale in (np.ones(5), np.array([1, 1e3, 1e-2, 1, 5.0]))
     ]
     np.testing.assert_allclose(*answers, rtol=1e-11)
@@ -49,8 +49,8 @@ def test_answer_does_not_depend_on_the_scale() -> None:
 def test_more_actuators_than_mobility_share_with_least_norm() -> None:
     jacobian, force = matrix(3, 3, 5), np.arange(1.0, 6)
     scale = np.array([1, 2, 0.5, 1, 3.0])
-    tau, multipliers, unproduced = solve_by_allowed_motions(jacobian, np.arange(4), force, scale)
-    assert unproduced is None
+    tau, multipliers, remaining = null_space_solution(jacobian, np.arange(4), force, scale)
+    assert remaining is None
     total = jacobian.T @ multipliers
     total[:4] += tau
     np.testing.assert_allclose(total, force, rtol=0, atol=1e-11)
@@ -63,24 +63,24 @@ def test_what_too_few_actuators_leave_is_told() -> None:
     """It is zero where actuators act, and the smallest such force."""
     jacobian, force = matrix(3, 3, 5), np.arange(1.0, 6)
     scale = np.array([1, 2, 0.5, 1, 3.0])
-    tau, multipliers, unproduced = solve_by_allowed_motions(jacobian, np.arange(1), force, scale)
-    assert unproduced is not None
-    total = jacobian.T @ multipliers + unproduced
+    tau, multipliers, remaining = null_space_solution(jacobian, np.arange(1), force, scale)
+    assert remaining is not None
+    total = jacobian.T @ multipliers + remaining
     total[:1] += tau
     np.testing.assert_allclose(total, force, rtol=0, atol=1e-11)
     # Least in the scaled norm: orthogonal to all that the actuator and the closures produce.
     products = np.vstack([np.eye(5)[:1], jacobian])
-    np.testing.assert_allclose(products @ (scale**2 * unproduced), 0, rtol=0, atol=1e-11)
-    assert np.linalg.norm(unproduced) > 0.1
+    np.testing.assert_allclose(products @ (scale**2 * remaining), 0, rtol=0, atol=1e-11)
+    assert np.linalg.norm(remaining) > 0.1
 
 
 def test_actuators_that_cannot_move_the_mechanism_are_refused() -> None:
     """One coordinate, held by the closure, is driven; the free one is not."""
     with pytest.raises(SingularityError):
-        solve_by_allowed_motions(np.array([[1.0, 0.0]]), np.array([0]), np.ones(2), np.ones(2))
+        null_space_solution(np.array([[1.0, 0.0]]), np.array([0]), np.ones(2), np.ones(2))
 
 
-# The two ways agree -------------------------------------------------------------------------------
+# The solutions agree ------------------------------------------------------------------------------
 
 
 def three_rps() -> tuple[ClosedLoopModel, list[tuple[Array, Array, Array]]]:
@@ -102,7 +102,7 @@ def spatial() -> tuple[ClosedLoopModel, list[tuple[Array, Array, Array]]]:
 
 
 @pytest.mark.parametrize("make", [three_rps, spatial])
-def test_square_way_equals_the_way_by_allowed_motions(make) -> None:
+def test_factorisation_and_null_space_agree(make) -> None:
     mechanism, states = make()
     model = mechanism.model
     data = model.createData()
@@ -112,7 +112,7 @@ def test_square_way_equals_the_way_by_allowed_motions(make) -> None:
         if mechanism.condition(q) > 1e4:
             continue
         found = mechanism.inverse_dynamics(q, v, a)
-        tau, multipliers, _ = solve_by_allowed_motions(
+        tau, multipliers, _ = null_space_solution(
             loop_jacobian(mechanism, q),
             mechanism.actuated_indices,
             pin.rnea(model, data, q, v, a),

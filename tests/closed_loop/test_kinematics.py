@@ -498,7 +498,7 @@ def test_wrong_names_are_refused_with_those_there_are() -> None:
         mechanism.frame_jacobian(q, "hand")
     with pytest.raises(MechanismError, match="independent joint 'left_joint' is named twice"):
         mechanism.motion_basis(q, ["left_joint", "left_joint"])
-    with pytest.raises(InputError, match="axes = 'body'; it must be 'world' or 'frame'"):
+    with pytest.raises(InputError, match="axes = 'body': it must be 'world' or 'frame'"):
         mechanism.frame_jacobian(q, "left_tip", axes="body")
 
 

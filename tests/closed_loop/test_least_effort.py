@@ -10,7 +10,7 @@ from rps_pin import SingularityError
 from rps_pin.closed_loop.dynamics.least_effort import (
     least_effort,
     refuse_nearly_singular,
-    unproduced_force,
+    residual_force,
 )
 
 Array = NDArray[np.float64]
@@ -49,11 +49,11 @@ def test_too_few_actuators_leave_the_residual_of_scaled_least_squares(
     directions = np.linalg.svd(jacobian * scale)[2][nc:] if nc else np.eye(nv)
     motions = scale[:, None] * directions.T
     found = least_effort(motions[actuated], motions.T @ force)
-    unproduced = unproduced_force(motions, found.missing, scale)
+    remaining = residual_force(motions, found.missing, scale)
     np.testing.assert_allclose(found.tau, both[:na], rtol=1e-9, atol=1e-11)
-    np.testing.assert_allclose(unproduced, expected, rtol=1e-9, atol=1e-11)
-    np.testing.assert_allclose(unproduced[actuated], 0, atol=1e-12)
-    np.testing.assert_allclose(motions.T @ unproduced, found.missing, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(remaining, expected, rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(remaining[actuated], 0, atol=1e-12)
+    np.testing.assert_allclose(motions.T @ remaining, found.missing, rtol=1e-9, atol=1e-12)
 
 
 def test_actuators_that_all_move_by_the_same_motion_share_its_force() -> None:

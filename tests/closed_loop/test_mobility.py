@@ -47,11 +47,20 @@ def test_too_many_and_too_few_actuators_are_told() -> None:
     assert many.describe().actuation == "redundant"
     assert "3 actuators, 1 more than needed" in str(many.describe())
     few = homed(mechanisms.five_bar(actuated=["left_joint"]))
-    assert few.describe().actuation == "lacking"
-    assert "1 of 2 motions are driven by nothing" in str(few.describe())
+    assert few.describe().actuation == "underactuated"
+    assert "actuation underactuated: 1 of 2 motions have no actuator" in str(few.describe())
 
 
-def test_actuators_enough_in_number_may_lack_all_the_same() -> None:
+def test_the_former_name_of_underactuated_still_compares_equal() -> None:
+    few = homed(mechanisms.five_bar(actuated=["left_joint"])).describe()
+    enough = homed(mechanisms.five_bar()).describe()
+    assert few.actuation == "lacking"
+    assert enough.actuation not in {"lacking", "underactuated"}
+    assert {few.actuation: 1}["underactuated"] == 1
+    assert few.as_dict()["actuation"] == "underactuated"
+
+
+def test_actuators_enough_in_number_may_not_determine_the_motion() -> None:
     """Two joints of one open chain, one of them driven twice over by a coupling."""
     model = pin.Model()
     for index, axis in enumerate("xyz"):
@@ -61,7 +70,7 @@ def test_actuators_enough_in_number_may_lack_all_the_same() -> None:
         model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
     found = ClosedLoopModel(model, [JointCoupling("y", "x", ratio=2.0)], ["x", "y"]).describe()
     assert (found.mobility, found.actuated_velocities, found.actuated_rank) == (2, 2, 1)
-    assert found.actuation == "lacking"
+    assert found.actuation == "underactuated"
     assert found.closures[0].kind == "coupling"
     assert found.closures[0].between == ("y", "x")
 

@@ -279,7 +279,7 @@ def test_wrong_arguments_are_refused_by_name() -> None:
     mechanism = five_bar()
     q, v, a = mechanisms.state(mechanism)
     forces = np.zeros(mechanism.constraint_size)
-    with pytest.raises(InputError, match="axes = 'body'; it must be 'joint' or 'world'"):
+    with pytest.raises(InputError, match="axes = 'body': it must be 'world' or 'joint'"):
         mechanism.joint_wrenches(q, v, a, forces, axes="body")
     with pytest.raises(InputError, match="constraint_forces has shape"):
         mechanism.joint_wrenches(q, v, a, forces[1:])

@@ -7,7 +7,7 @@ Nothing here draws, controls or plans in time: those are `rps_pin.viewer`, `rps_
 """
 
 from rps_pin.closed_loop.constraints.closures import JointCoupling, LoopClosure
-from rps_pin.closed_loop.constraints.loops import LoopErrors
+from rps_pin.closed_loop.constraints.equations import LoopErrors
 from rps_pin.closed_loop.describe import MechanismDescription
 from rps_pin.closed_loop.dynamics.force_bounds import ForceBound, friction_pyramid
 from rps_pin.closed_loop.dynamics.force_distribution import DistributedForces, ForceDistribution

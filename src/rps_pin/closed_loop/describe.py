@@ -1,28 +1,27 @@
-"""What a mechanism is made of and how it can move: joints, rows, rank, mobility, actuation.
+"""Description of a mechanism: joints, closures, rank, mobility, redundant rows, actuation.
 
 With the closures' Jacobian J of rank r at a regular configuration (one where the rank is the
-largest there is nearby), nv - r motions are allowed (the mobility), and nc - r rows say what others
-say already. The actuators determine the motion if none of the allowed motions leaves them all at
-rest: if S N has full column rank, N a basis of those motions.
+largest nearby), nv - r motions are allowed (the mobility), and nc - r rows are redundant. The
+actuators determine the motion if no allowed motion leaves them all at rest: if S N has full column
+rank, N a basis of the null space of J.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.assembly.closing import close
 from rps_pin.closed_loop.constraints.closures import Closure, LoopClosure
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.closed_loop.kinematics import allowed_motions
 from rps_pin.errors import ClosureError
 from rps_pin.numerics.linear_algebra import rank, singular_values
-
-if TYPE_CHECKING:
-    from rps_pin.closed_loop.model import ClosedLoopModel
-
 
 #: Where a regular configuration is looked for: so many random steps of this length (rad).
 _TRIES, _STEP = 10, 0.15
@@ -38,6 +37,19 @@ _JOINT_KINDS = {
     "JointModelTranslation": "translation",
     "JointModelComposite": "composite",
 }
+
+
+class Actuation(str):
+    """Value of `MechanismDescription.actuation`; "lacking" is the deprecated "underactuated"."""
+
+    __slots__ = ()
+    __hash__ = str.__hash__
+
+    def __eq__(self, other: object) -> bool:
+        return str.__eq__(self, "underactuated" if other == "lacking" else other) is True
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
 
 
 class JointDescription(NamedTuple):
@@ -62,12 +74,12 @@ class ClosureDescription(NamedTuple):
     """The two frames, or joints."""
     rows: int
     needed: int
-    """How far the rank falls without it: the rows that no other closure stands in for."""
+    """How far the rank falls without it: the rows that no other closure replaces."""
 
 
 @dataclass(frozen=True, eq=False)
 class MechanismDescription:
-    """What `ClosedLoopModel.describe` finds; ``str()`` of it is a table.
+    """Result of `ClosedLoopModel.describe`; ``str()`` of it is a table.
 
     Attributes
     ----------
@@ -88,7 +100,8 @@ class MechanismDescription:
         How many velocities are driven, and how many allowed motions they determine.
     actuation : str
         ``"sufficient"``: as many as the mobility, and they determine the motion; ``"redundant"``:
-        more than that; ``"lacking"``: mobility - actuated_rank motions are driven by nothing.
+        more than that; ``"underactuated"``: mobility - actuated_rank motions have no actuator.
+        (Compares equal to ``"lacking"``, its former name, too.)
     condition : float
         Condition number of the passive joints' Jacobian there.
     """
@@ -114,7 +127,7 @@ class MechanismDescription:
 
     @property
     def redundant_rows(self) -> int:
-        """Number of rows that say what others say already."""
+        """Number of rows that depend on others."""
         return self.rows - self.rank
 
     @property
@@ -123,11 +136,12 @@ class MechanismDescription:
         return tuple(joint.name for joint in self.joints if not joint.actuated)
 
     @property
-    def actuation(self) -> Literal["sufficient", "redundant", "lacking"]:
-        """Whether the actuators determine the motion, and no more than that."""
+    def actuation(self) -> Actuation:
+        """``"sufficient"``, ``"redundant"`` or ``"underactuated"``."""
         if self.actuated_rank < self.mobility:
-            return "lacking"
-        return "redundant" if self.actuated_velocities > self.mobility else "sufficient"
+            return Actuation("underactuated")
+        redundant = self.actuated_velocities > self.mobility
+        return Actuation("redundant" if redundant else "sufficient")
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it as plain data, ready for JSON (infinities as None)."""
@@ -152,7 +166,7 @@ class MechanismDescription:
             "passive": list(self.passive),
             "actuated_velocities": self.actuated_velocities,
             "actuated_rank": self.actuated_rank,
-            "actuation": self.actuation,
+            "actuation": str(self.actuation),
             "condition": _plain([self.condition])[0],
         }
 
@@ -178,70 +192,68 @@ class MechanismDescription:
             f"condition number of the passive joints' part: {self.condition:.4g}",
         ]
         if self.home_is_singular:
-            lines.append("the home configuration is singular: all this holds beside it")
+            lines.append("the home configuration is singular: all this holds next to it")
         return "\n".join(lines)
 
     def verdict(self) -> str:
         """Return the actuation in words."""
         driven, left = self.actuated_velocities, self.mobility - self.actuated_rank
-        if self.actuation == "lacking":
-            return f"lacking: {left} of {self.mobility} motions are driven by nothing"
+        if self.actuation == "underactuated":
+            return f"underactuated: {left} of {self.mobility} motions have no actuator"
         if self.actuation == "redundant":
             return f"redundant: {driven} actuators, {driven - self.mobility} more than needed"
         return f"sufficient: {driven} actuator{'s' if driven > 1 else ''}"
 
 
-def describe(mechanism: ClosedLoopModel, q: Array | None) -> MechanismDescription:
-    """Return what a mechanism is made of, at q or at a regular configuration near home."""
-    at, singular = (q, False) if q is not None else _regular(mechanism)
-    jacobian = _scaled(mechanism, at)
-    found = _rank(jacobian)
-    motions = mechanism.allowed_motions(at)[mechanism.actuated_indices]
-    motions = motions / mechanism.velocity_scale[mechanism.actuated_indices][:, None]
-    model = mechanism.model
+def describe(
+    system: ConstraintSystem, name: str, q: Array | None, home: Callable[[], Array]
+) -> MechanismDescription:
+    """Return the description of a mechanism at q, or at a regular configuration near home."""
+    at, singular = (q, False) if q is not None else _regular(system, home())
+    model, equations, actuated = system.model, system.equations, system.actuated
+    jacobian = equations.jacobian(at).copy()
+    scaled = system.scaled(jacobian)
+    values = singular_values(scaled)
+    motions = allowed_motions(system, jacobian)[actuated]
+    motions = motions / system.column_scale[actuated][:, None]
+    found = rank(values)
     return MechanismDescription(
-        name=mechanism.name,
-        joints=tuple(_joint(model, i, mechanism.actuated) for i in range(1, model.njoints)),
-        closures=tuple(_closure(mechanism, c, jacobian, found) for c in mechanism.closures),
+        name=name,
+        joints=tuple(_joint(model, i, system.actuated_names) for i in range(1, model.njoints)),
+        closures=tuple(_closure(system, c, scaled, found) for c in equations.closures),
         configuration=at,
         home_is_singular=singular,
         nv=model.nv,
-        rows=mechanism.constraint_size,
+        rows=equations.size,
         rank=found,
-        singular_values=singular_values(jacobian),
-        actuated=mechanism.actuated,
-        actuated_velocities=mechanism.actuated_indices.size,
-        actuated_rank=_rank(motions),
-        condition=mechanism.condition(at),
+        singular_values=values,
+        actuated=system.actuated_names,
+        actuated_velocities=actuated.size,
+        actuated_rank=rank(singular_values(motions)),
+        condition=system.condition(jacobian),
     )
 
 
-def _regular(mechanism: ClosedLoopModel) -> tuple[Array, bool]:
+def _regular(system: ConstraintSystem, home: Array) -> tuple[Array, bool]:
     """Return a closed configuration near home of the largest rank met, and if home's is lower."""
-    home = q = mechanism.close(mechanism.home)
-    rng = np.random.default_rng(0)
-    ranks = [_rank(_scaled(mechanism, home))]
-    places = [home]
+    q, rng = home, np.random.default_rng(0)
+    places, ranks = [home], [_rank_at(system, home)]
     for _ in range(_TRIES):
-        motions = mechanism.allowed_motions(q)
-        step = _STEP * rng.normal(size=motions.shape[1]) * mechanism.characteristic_length
+        motions = allowed_motions(system, system.equations.jacobian(q))
+        step = _STEP * rng.normal(size=motions.shape[1]) * system.equations.length
+        moved = pin.integrate(system.model, q, motions @ step)
         try:
-            q = mechanism.close(pin.integrate(mechanism.model, q, motions @ step), restarts=0)
+            q = close(system, system.normalised(moved, "q"), restarts=0)
         except ClosureError:  # a step too far: go on from where it stood
             continue
         places.append(q)
-        ranks.append(_rank(_scaled(mechanism, q)))
+        ranks.append(_rank_at(system, q))
     best = int(np.argmax(ranks))
     return places[best], ranks[0] < ranks[best]
 
 
-def _scaled(mechanism: ClosedLoopModel, q: Array) -> Array:
-    scaled: Array = mechanism.row_scale[:, None] * mechanism.jacobian(q) * mechanism.velocity_scale
-    return scaled
-
-
-def _rank(matrix: Array) -> int:
-    return rank(singular_values(matrix))
+def _rank_at(system: ConstraintSystem, q: Array) -> int:
+    return rank(singular_values(system.scaled(system.equations.jacobian(q))))
 
 
 def _joint(model: pin.Model, index: int, actuated: tuple[str, ...]) -> JointDescription:
@@ -265,14 +277,15 @@ def _joint(model: pin.Model, index: int, actuated: tuple[str, ...]) -> JointDesc
 
 
 def _closure(
-    mechanism: ClosedLoopModel, closure: Closure, jacobian: Array, found: int
+    system: ConstraintSystem, closure: Closure, scaled: Array, found: int
 ) -> ClosureDescription:
-    others = np.delete(jacobian, mechanism.rows(closure.name), axis=0)
+    others = np.delete(scaled, system.equations.rows(closure.name), axis=0)
     if isinstance(closure, LoopClosure):
         kind, between = str(closure.kind), (closure.frame_a, closure.frame_b)
     else:
         kind, between = "coupling", (closure.joint, closure.other)
-    return ClosureDescription(closure.name, kind, between, closure.size, found - _rank(others))
+    needed = found - rank(singular_values(others))
+    return ClosureDescription(closure.name, kind, between, closure.size, needed)
 
 
 def _plain(values: Any) -> list[float | None]:

@@ -1,51 +1,68 @@
-"""A mechanism with closed loops: an open Pinocchio tree, its loop closures, its actuated joints."""
+"""Mechanism with closed loops: an open Pinocchio tree, its loop closures, its actuated joints."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools, Indices
+from rps_pin.closed_loop.assembly.closing import close, closed_gap, complete
+from rps_pin.closed_loop.assembly.projection import project
 from rps_pin.closed_loop.constraints.closures import Closure
-from rps_pin.closed_loop.constraints.loops import Loops
+from rps_pin.closed_loop.constraints.equations import LoopErrors
+from rps_pin.closed_loop.constraints.system import MAX_CONDITION, ConstraintSystem
 from rps_pin.closed_loop.describe import MechanismDescription, describe
 from rps_pin.closed_loop.dynamics.derivatives import (
-    Following,
+    DynamicsDerivatives,
     ForwardDynamicsDerivatives,
     InverseDynamicsDerivatives,
     Linearisation,
-    Solved,
-    dynamics_slopes,
-    forward_derivatives,
-    inverse_derivatives,
     linearisation,
 )
-from rps_pin.closed_loop.dynamics.dynamics import ClosedLoopDynamics
-from rps_pin.closed_loop.dynamics.kinematics import MAX_CONDITION
+from rps_pin.closed_loop.dynamics.forward_dynamics import forward_dynamics
+from rps_pin.closed_loop.dynamics.generalised_forces import energy, required_force, tree_mass
+from rps_pin.closed_loop.dynamics.inverse_dynamics import (
+    InverseDynamics,
+    constraint_forces,
+    inverse_dynamics,
+)
 from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED, JointEffects
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
-from rps_pin.closed_loop.editing.split import split
 from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts
 from rps_pin.closed_loop.io.urdf import model_from_urdf
+from rps_pin.closed_loop.kinematics import (
+    acceleration,
+    allowed_motions,
+    motion_basis,
+    velocity,
+)
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
-from rps_pin.errors import InputError
-from rps_pin.numerics.linear_algebra import pseudo_inverse
-from rps_pin.validation import real_vector
+from rps_pin.errors import ClosureError
+from rps_pin.validation import choice, real_vector
+
+_REFERENCES = {
+    "world": pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+    "frame": pin.ReferenceFrame.LOCAL,
+}
 
 
-class ClosedLoopModel(ClosedLoopDynamics):
+class ClosedLoopModel:
     """Any mechanism: an open tree whose loops are closed by Pinocchio constraint models.
 
     Build once, call often: the scratch memory is allocated here. For that reason one object serves
     one thread; `model` itself is never written to and may be shared.
+
+    Dynamics takes closed configurations, as `close`, `project`, `complete` and `simulate` return
+    them: one with a gap above 1e-4 characteristic lengths is refused with a `ClosureError`.
 
     Parameters
     ----------
@@ -56,7 +73,9 @@ class ClosedLoopModel(ClosedLoopDynamics):
     actuated
         Names of the actuated joints; `tau` comes in this order.
     home
-        Configuration to start from, shape (nq,); Pinocchio's neutral one if left out.
+        Configuration to start from, shape (nq,); its loops are closed here (see `close`) if they
+        are open. Left out: Pinocchio's neutral one, whose loops are closed when `home` is first
+        asked for.
     effects
         Damping, friction and springs of the joints; none if left out.
     name
@@ -68,15 +87,54 @@ class ClosedLoopModel(ClosedLoopDynamics):
     max_condition
         `SingularityError` is raised where the condition number exceeds this.
 
+    Attributes
+    ----------
+    model, closures, actuated, effects, name, max_condition
+        As given; `closures` and `actuated` as tuples.
+    system : ConstraintSystem
+        What the algorithms take: the tree with its closure equations and their factorisation.
+
     Raises
     ------
     MechanismError
         If a frame or joint is unknown or named twice, or no joint is actuated.
     InputError
         If a number or an array does not fit.
+    ClosureError
+        If the loops do not close from the home that is given; says by how much, and which.
     """
 
-    _split_loops: Loops | None = None  # made when first needed
+    def __init__(
+        self,
+        model: pin.Model,
+        closures: Sequence[Closure],
+        actuated: Sequence[str],
+        *,
+        home: ArrayLike | None = None,
+        effects: JointEffects | None = None,
+        name: str = "",
+        characteristic_length: float | None = None,
+        max_condition: float = MAX_CONDITION,
+    ) -> None:
+        self.system = system = ConstraintSystem(
+            model,
+            closures,
+            actuated,
+            effects=effects,
+            characteristic_length=characteristic_length,
+            max_condition=max_condition,
+        )
+        self.model: pin.Model = model
+        self.closures = system.equations.closures
+        self.actuated = system.actuated_names
+        self.max_condition = max_condition
+        self.effects = effects
+        self.name: str = name or model.name
+        self._derivatives: DynamicsDerivatives | None = None  # made when first needed
+        self._home: Array | None = None
+        self._start: Array = pin.neutral(model)
+        if home is not None:
+            self._start = self._home = self._closed(system.normalised(home, "home"))
 
     @classmethod
     def from_urdf(
@@ -105,9 +163,11 @@ class ClosedLoopModel(ClosedLoopDynamics):
         Raises
         ------
         InputError
-            If the file cannot be read, or gravity is no finite vector.
+            If the file cannot be read, or gravity is not a finite vector.
         MechanismError
-            If it is no URDF, or as for the class.
+            If it is not a URDF, or as for the class.
+        ClosureError
+            As for the class.
         """
         model = model_from_urdf(path_or_xml)
         model.gravity.linear = real_vector(gravity, 3, "gravity")
@@ -117,16 +177,15 @@ class ClosedLoopModel(ClosedLoopDynamics):
     def load(cls, path: str | os.PathLike[str]) -> ClosedLoopModel:
         """Build a mechanism from its description, a YAML file; see `description`.
 
-        The file names a URDF or MJCF, the closures, the actuated joints, and where `home` is: the
-        loops are closed from there.
+        The file names a URDF or MJCF, the closures, the actuated joints, and `home`, from where
+        the loops are closed. Without `home` they are closed from Pinocchio's neutral configuration.
 
         Raises
         ------
         InputError, MechanismError
             If a file cannot be read, or what it says does not hold together; with file and line.
         ClosureError
-            If the loops do not close from the home that the file gives; says by how much, and
-            which.
+            If the loops do not close from there; says by how much, and which.
         """
         return cls._from_parts(parts_from_yaml(path))
 
@@ -177,14 +236,15 @@ class ClosedLoopModel(ClosedLoopDynamics):
             parts.model,
             parts.closures,
             parts.actuated,
-            home=parts.home,
             effects=effects,
             name=parts.name,
             characteristic_length=parts.characteristic_length,
             max_condition=parts.max_condition or MAX_CONDITION,
         )
-        if parts.home is not None:
-            mechanism._home = mechanism.close(parts.home)
+        if parts.home is None:
+            mechanism._home = mechanism.home  # closed, or not to be built
+        else:
+            mechanism._start = mechanism._home = mechanism.close(parts.home)
         return mechanism
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -215,15 +275,490 @@ class ClosedLoopModel(ClosedLoopDynamics):
         ClosureError
             If the loops do not close from `home`.
         """
-        return describe(self, None if q is None else real_vector(q, self.model.nq, "q"))
+        at = None if q is None else self._configuration(q)
+        return describe(self.system, self.name, at, lambda: self.home)
+
+    # Structure ------------------------------------------------------------------------------------
+
+    @property
+    def home(self) -> Array:
+        """Closed configuration to start from, shape (nq,); a copy.
+
+        The loops are closed from the home that was given, or else from Pinocchio's neutral
+        configuration; a home that was given closed is kept as it is.
+
+        Raises
+        ------
+        ClosureError
+            If none was given, and the loops do not close from the neutral configuration.
+        """
+        if self._home is None:
+            try:
+                self._home = self._closed(self._start)
+            except ClosureError as error:
+                raise ClosureError(
+                    f"no home was given, and for the neutral configuration: {error}", error.gap
+                ) from None
+        return self._home.copy()
+
+    @property
+    def constraint_size(self) -> int:
+        """Number of closure rows, nc."""
+        return self.system.equations.size
+
+    @property
+    def characteristic_length(self) -> float:
+        """Length that makes angles and lengths comparable, m."""
+        return self.system.equations.length
+
+    @property
+    def row_scale(self) -> Array:
+        """Factors that give the rows one unit (m), shape (nc,)."""
+        return self.system.row_scale.copy()
+
+    @property
+    def velocity_scale(self) -> Array:
+        """Factors that take velocities in one unit (m/s) to their own units, shape (nv,)."""
+        return self.system.column_scale.copy()
+
+    @property
+    def angular_rows(self) -> Bools:
+        """Which rows are angular (rad, N m), shape (nc,)."""
+        return self.system.equations.angular_rows.copy()
+
+    @property
+    def angular_velocities(self) -> Bools:
+        """Which velocities are angular (rad/s), shape (nv,)."""
+        return self.system.equations.angular_velocities.copy()
+
+    @property
+    def actuated_indices(self) -> Indices:
+        """Indices of the actuated joints in a velocity vector, shape (na,)."""
+        return self.system.actuated.copy()
+
+    def rows(self, closure: str) -> slice:
+        """Return the rows of a closure, by its name, in `constraint_forces` and `LoopErrors`.
+
+        Raises
+        ------
+        MechanismError
+            If there is no closure of that name; lists those there are.
+        """
+        return self.system.equations.rows(closure)
+
+    # Position -------------------------------------------------------------------------------------
+
+    def loop_errors(
+        self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
+    ) -> LoopErrors:
+        """Return the gaps of the loops, their rates and their accelerations.
+
+        Parameters
+        ----------
+        q, v, a
+            Configuration (nq,), velocity (nv,) and acceleration (nv,) as Pinocchio has them; v and
+            a are zero if left out.
+        """
+        still = np.zeros(self.model.nv)
+        state = self.system.state(q, still if v is None else v, still if a is None else a)
+        return self.system.equations.errors(*state)
+
+    def loop_gap(self, q: ArrayLike) -> float:
+        """Return the largest gap between two closed frames, m.
+
+        An angle between closed frames counts with the characteristic length as its lever.
+        """
+        equations = self.system.equations
+        return equations.largest_gap(equations.gaps(self._configuration(q)))
+
+    def close(
+        self,
+        q_guess: ArrayLike,
+        *,
+        fixed: Sequence[str] = (),
+        within_limits: bool = True,
+        restarts: int = 20,
+    ) -> Array:
+        """Return a configuration near a guess in which every loop is closed.
+
+        The loops are closed by least-norm steps from the guess (see `closing`): the result lies
+        near it, but is not in general the nearest (see `project`). Where the steps do not close
+        the loops, they start again from random configurations farther and farther away.
+
+        Parameters
+        ----------
+        q_guess
+            Configuration, shape (nq,); quaternions need not be of unit length.
+        fixed
+            Names of joints that keep the guess's values.
+        within_limits
+            Whether the result must lie within the model's joint limits. The guess need not.
+        restarts
+            How often to start again; always from the same configurations.
+
+        Returns
+        -------
+        array
+            Closed configuration, shape (nq,), gaps at most 1e-12 m (or 1e-12 characteristic
+            lengths where that is more than a metre).
+
+        Raises
+        ------
+        InputError
+            If the guess has the wrong shape, is not finite, or holds a quaternion of length zero.
+        ClosureError
+            If the loops do not close; says by how much, which, and what joints stand at a limit.
+        """
+        return close(
+            self.system,
+            self.system.normalised(q_guess, "q_guess"),
+            fixed=fixed,
+            within_limits=within_limits,
+            restarts=restarts,
+        )
+
+    def project(self, q_guess: ArrayLike, *, within_limits: bool = True) -> Array:
+        """Return the closed configuration nearest to a guess.
+
+        Nearest in the norm that makes angles lengths by `characteristic_length`; a local minimum of
+        the distance (see `projection`).
+
+        Raises
+        ------
+        InputError, ClosureError
+            As `close`; also if the steps do not settle.
+        """
+        guess = self.system.normalised(q_guess, "q_guess")
+        return project(self.system, guess, within_limits=within_limits)
+
+    def complete(
+        self,
+        values: Mapping[str, ArrayLike] | ArrayLike,
+        q_guess: ArrayLike | None = None,
+        *,
+        within_limits: bool = True,
+    ) -> Array:
+        """Return the closed configuration in which some joints have given values.
+
+        Parameters
+        ----------
+        values
+            By joint name, each with as many numbers as the joint has coordinates; or those of the
+            actuated joints in order, shape (na,) (if each has one coordinate).
+        q_guess
+            Where the other joints start, shape (nq,); selects the assembly mode. Left out: the
+            home that was given, or Pinocchio's neutral configuration.
+
+        Raises
+        ------
+        InputError, MechanismError
+            If a value has the wrong shape, or a joint is unknown.
+        ClosureError
+            If the loops do not close with these values.
+        """
+        guess = self._start if q_guess is None else q_guess
+        start = self.system.normalised(guess, "q_guess")
+        return complete(self.system, values, start, within_limits=within_limits)
+
+    # Velocity and acceleration --------------------------------------------------------------------
+
+    def jacobian(self, q: ArrayLike) -> Array:
+        """Return J, shape (nc, nv): the rates of the closures' rows are J v (see `rows`)."""
+        return self.system.equations.jacobian(self._configuration(q)).copy()
+
+    def allowed_motions(self, q: ArrayLike) -> Array:
+        """Return a basis N of the velocities that keep the loops closed, shape (nv, mobility).
+
+        J N = 0; the columns are orthonormal once angles are made lengths by
+        `characteristic_length`.
+        """
+        return allowed_motions(self.system, self.system.equations.jacobian(self._configuration(q)))
+
+    def motion_basis(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
+        """Return T, shape (nv, m): v = T u, u the velocities of m joints moving independently.
+
+        Parameters
+        ----------
+        q
+            Closed configuration, shape (nq,).
+        independent
+            Names of the joints; the actuated ones if left out.
+
+        Raises
+        ------
+        SingularityError
+            If these joints do not determine the motion, or do not move independently, here.
+        """
+        return motion_basis(
+            self.system, self._configuration(q), self.system.independent(independent)
+        )
+
+    def frame_jacobian(
+        self,
+        q: ArrayLike,
+        frame: str,
+        independent: Sequence[str] | None = None,
+        *,
+        axes: Literal["world", "frame"] = "world",
+    ) -> Array:
+        """Return the closed-loop Jacobian of a frame, shape (6, m): its twist is this times u.
+
+        Parameters
+        ----------
+        q
+            Closed configuration, shape (nq,).
+        frame
+            Name of a frame of the model.
+        independent
+            The joints that u belongs to, as for `motion_basis`.
+        axes
+            Axes of the twist (linear, then angular, of the frame's origin).
+
+        Raises
+        ------
+        MechanismError
+            If there is no such frame; lists those there are.
+        SingularityError
+            As `motion_basis`.
+        """
+        reference = _REFERENCES[choice(axes, "axes", tuple(_REFERENCES))]
+        basis = self.motion_basis(q, independent)
+        jacobian = pin.computeFrameJacobian(
+            self.model,
+            self.system.data,
+            self._configuration(q),
+            self.system.frame(frame),
+            reference,
+        )
+        product: Array = jacobian.reshape(6, self.model.nv) @ basis
+        return product
+
+    def velocity(
+        self, q: ArrayLike, v_actuated: ArrayLike, independent: Sequence[str] | None = None
+    ) -> Array:
+        """Return the velocity that keeps the loops closed while some joints move as asked.
+
+        Solves J v = 0 for the other rows: J_p v_p = -J_a v_a.
+
+        Parameters
+        ----------
+        q
+            Closed configuration, shape (nq,).
+        v_actuated
+            Velocities of the actuated joints, shape (na,), or of those named.
+        independent
+            Names of the joints that move as asked, if not the actuated ones.
+
+        Returns
+        -------
+        array
+            Velocity, shape (nv,).
+
+        Raises
+        ------
+        SingularityError
+            If these joints do not determine the motion.
+        ClosureError
+            If no motion of the mechanism has these velocities (more joints than mobility).
+        """
+        given = self.system.independent(independent)
+        rates = real_vector(v_actuated, given.size, "v_actuated")
+        return velocity(self.system, self._configuration(q), given, rates)
+
+    def acceleration(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a_actuated: ArrayLike,
+        independent: Sequence[str] | None = None,
+    ) -> Array:
+        """Return the acceleration that keeps the loops closed while some joints move as asked.
+
+        Solves J a + J' v = 0 (J' the derivative) for the other rows.
+
+        Parameters
+        ----------
+        q, v
+            Closed configuration (nq,) and a velocity that keeps it closed (nv,).
+        a_actuated
+            Accelerations of the actuated joints, shape (na,), or of those named.
+        independent
+            Names of the joints that accelerate as asked, if not the actuated ones.
+
+        Raises
+        ------
+        SingularityError, ClosureError
+            As `velocity`; also if v itself opens the loops.
+        """
+        given = self.system.independent(independent)
+        rates = real_vector(a_actuated, given.size, "a_actuated")
+        return acceleration(self.system, self._configuration(q), self._velocity(v), given, rates)
+
+    def condition(self, q: ArrayLike) -> float:
+        """Return the condition number of J_p, large near a singularity.
+
+        J_p is the closures' Jacobian with respect to the passive joints, angles made lengths with
+        `characteristic_length`. Its condition number is 1 at best and infinite where the actuators
+        no longer determine the motion, or where a closure's rows fail (a parallel, or type II, or a
+        constraint singularity). Its inverse is the relative distance to the nearest singular
+        matrix, a number between 0 and 1.
+        """
+        return self.system.condition(self.system.equations.jacobian(self._configuration(q)))
+
+    # Inverse dynamics -----------------------------------------------------------------------------
+
+    def inverse_dynamics(
+        self, q: Array, v: Array, a: Array, *, wrenches: Wrenches | None = None
+    ) -> InverseDynamics:
+        """Return the forces that make the mechanism move as asked: constrained RNEA.
+
+        q must be closed; testing that costs about 0.1 us a spherical closure, and 1 us another. v
+        and a are assumed to keep the loops closed, as `velocity` and `acceleration` return them;
+        `loop_errors` tests that.
+
+        Parameters
+        ----------
+        q, v, a
+            Configuration (nq,), velocity (nv,) and acceleration (nv,) as Pinocchio has them.
+        wrenches
+            External wrenches by frame name: (force, moment), (6,), N and N m, that the surroundings
+            exert at the frame's origin, in world axes.
+
+        Returns
+        -------
+        InverseDynamics
+            `tau` (na,), `constraint_forces` (nc,), `residual`, `condition`. With more actuators
+            than mobility, the tau of least norm, torques made forces by `characteristic_length`
+            (with limits and weights: `ForceDistribution`). With fewer, the least-squares tau,
+            and the residual force in `unproduced`.
+
+        Raises
+        ------
+        InputError
+            If an argument has the wrong shape or is not finite.
+        ClosureError
+            If q is open by more than 1e-4 characteristic lengths.
+        SingularityError
+            If the configuration is singular (condition number above `max_condition`).
+        """
+        return inverse_dynamics(self.system, q, v, a, wrenches)
+
+    def generalised_force(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Array:
+        """Return what actuators and closures together must produce, S' tau + J' lambda, (nv,).
+
+        That is ``rnea(q, v, a)`` plus the passive joint forces less the external wrenches (as in
+        `inverse_dynamics`).
+        """
+        return required_force(self.system, *self.system.state(q, v, a), wrenches)
+
+    def constraint_forces(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+    ) -> Array:
+        """Return lambda (nc,) of a motion under given actuator forces, of least norm.
+
+        Solves J' lambda = rnea(q, v, a) + passive joint forces - external forces - S' tau in the
+        least-squares sense: exact where a is what `forward_dynamics` returns.
+        """
+        state = self.system.state(q, v, a)
+        self.system.closed_jacobian(state[0])
+        return constraint_forces(self.system, *state, self._forces(tau), wrenches)
+
+    # Forward dynamics -----------------------------------------------------------------------------
+
+    def forward_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        method: Literal["reduced", "proximal"] = "reduced",
+    ) -> Array:
+        """Return the acceleration under given actuator forces, shape (nv,).
+
+        Parameters
+        ----------
+        q, v
+            Closed configuration (nq,), and a velocity that keeps it closed (nv,).
+        tau
+            Forces of the actuated joints, shape (na,).
+        wrenches
+            External wrenches, as for `inverse_dynamics`.
+        method
+            ``"reduced"``: in the motions that the closures allow (see `forward_dynamics`), exact
+            also with massless links and redundant rows. ``"proximal"`` is deprecated: it warns,
+            and computes the same.
+
+        Raises
+        ------
+        InputError
+            If an argument has the wrong shape or is not finite.
+        SingularityError
+            If a motion that the closures allow moves no mass.
+        ClosureError
+            If q is open by more than 1e-4 characteristic lengths.
+        """
+        if choice(method, "method", ("reduced", "proximal")) == "proximal":
+            warnings.warn(
+                "method='proximal' is deprecated and computed as 'reduced'; leave method out",
+                DeprecationWarning,
+                stacklevel=2,
+            )
+        q_, v_ = self._configuration(q), self._velocity(v)
+        return forward_dynamics(self.system, q_, v_, self._forces(tau), wrenches)
+
+    def mass_matrix(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
+        """Return the reduced mass matrix T' M T, shape (m, m); T of `motion_basis`.
+
+        The kinetic energy is u' (T' M T) u / 2, u the velocities of the independent joints (the
+        actuated ones if left out).
+        """
+        q_ = self._configuration(q)
+        self.system.closed_jacobian(q_)
+        basis = self.motion_basis(q_, independent)
+        mass: Array = basis.T @ tree_mass(self.system, q_) @ basis
+        return mass
+
+    def bias(self, q: ArrayLike, v: ArrayLike, independent: Sequence[str] | None = None) -> Array:
+        """Return the reduced bias T' (rnea(q, v, a_0) + passive joint forces), shape (m,).
+
+        The forces at the independent joints that keep them from accelerating: a_0 is the
+        acceleration with w = 0. Includes gravity, Coriolis forces, damping, friction and springs.
+        """
+        q_ = self._configuration(q)
+        self.system.closed_jacobian(q_)
+        basis = self.motion_basis(q_, independent)
+        a = self.acceleration(q_, v, np.zeros(basis.shape[1]), independent)
+        bias: Array = basis.T @ self.generalised_force(q_, v, a)
+        return bias
+
+    def gravity_forces(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
+        """Return the forces T' g at the independent joints that carry the weight, shape (m,)."""
+        q_ = self._configuration(q)
+        self.system.closed_jacobian(q_)
+        basis = self.motion_basis(q_, independent)
+        forces: Array = basis.T @ pin.computeGeneralizedGravity(self.model, self.system.data, q_)
+        return forces
+
+    def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
+        """Return kinetic energy, rotors included, and potential energy, springs included, J."""
+        return energy(self.system, self._configuration(q), self._velocity(v))
 
     # Wrenches -------------------------------------------------------------------------------------
 
     def closure_wrenches(self, q: ArrayLike, constraint_forces: ArrayLike) -> dict[str, Array]:
         """Return the wrench in each closure of frames, by name.
 
-        What frame b's side exerts on frame a's side: (force, moment), shape (6,), N and N m, at
-        frame a's origin, in world axes.
+        The wrench that frame b's side exerts on frame a's side: (force, moment), shape (6,), N and
+        N m, at frame a's origin, in world axes.
 
         Parameters
         ----------
@@ -233,7 +768,7 @@ class ClosedLoopModel(ClosedLoopDynamics):
             lambda, shape (nc,), as `inverse_dynamics` returns it.
         """
         multipliers = real_vector(constraint_forces, self.constraint_size, "constraint_forces")
-        return closure_wrenches(self._loops, real_vector(q, self.model.nq, "q"), multipliers)
+        return closure_wrenches(self.system.equations, self._configuration(q), multipliers)
 
     def joint_wrenches(
         self,
@@ -247,25 +782,26 @@ class ClosedLoopModel(ClosedLoopDynamics):
     ) -> dict[str, Array]:
         """Return the wrench that each joint of the tree carries, by name.
 
-        What the link before the joint exerts on the link after it: (force, moment), shape (6,), N
-        and N m, at the origin of the joint's frame (which moves with the link after it), in that
-        frame's axes or the world's. Actuator, damping, friction and spring are parts of it.
+        The wrench that the link before the joint exerts on the link after it: (force, moment),
+        shape (6,), N and N m, at the origin of the joint's frame (which moves with the link after
+        it), in that frame's axes or the world's; actuator, damping, friction and spring included.
 
         Parameters
         ----------
         q, v, a, constraint_forces, wrenches
-            A motion, and the answer of `inverse_dynamics` or `constraint_forces` to it.
+            A motion, and the result of `inverse_dynamics` or `constraint_forces` for it.
         axes
             ``"joint"`` or ``"world"``.
         """
-        if axes not in ("joint", "world"):
-            raise InputError(f"axes = {axes!r}; it must be 'joint' or 'world'")
-        q_, v_, a_ = self._checked_state(q, v, a)
+        choice(axes, "axes", ("world", "joint"))
+        q_, v_, a_ = self.system.state(q, v, a)
         on_closures = self.closure_wrenches(q_, constraint_forces)
-        model, data = self.model, self._loops.data
+        model, data = self.model, self.system.data
         pin.framesForwardKinematics(model, data, q_)
-        forces = forces_on_joints(self._loops, on_closures, self._by_frame(wrenches))
-        pin.rnea(model, data, q_, v_, a_, forces)
+        on_frames = self.system.by_frame(wrenches)
+        pin.rnea(
+            model, data, q_, v_, a_, forces_on_joints(self.system.equations, on_closures, on_frames)
+        )
         carried = {}
         for index, name in enumerate(model.names):
             if index:
@@ -293,18 +829,7 @@ class ClosedLoopModel(ClosedLoopDynamics):
         MechanismError
             If the tree holds a joint whose derivatives are not known (ellipsoid, mimic).
         """
-        q_, v_, a_ = self._checked_state(q, v, a)
-        basis = self.motion_basis(q_)
-        multipliers = self.inverse_dynamics(q_, v_, a_, wrenches=wrenches).constraint_forces
-        slopes, rows = dynamics_slopes(
-            self._differentiable(),
-            (q_, v_, a_),
-            multipliers,
-            self._by_frame(wrenches),
-            self.effects,
-        )
-        following = Following(basis, self._actuated, self._solution(q_), rows)
-        return inverse_derivatives(slopes, following)
+        return self._dynamics_derivatives().inverse(*self.system.state(q, v, a), wrenches)
 
     def forward_dynamics_derivatives(
         self,
@@ -329,15 +854,9 @@ class ClosedLoopModel(ClosedLoopDynamics):
         SingularityError
             If these joints do not determine the motion here, or a motion moves no mass.
         """
-        q_, v_ = real_vector(q, self.model.nq, "q"), real_vector(v, self.model.nv, "v")
-        a = self.forward_dynamics(q_, v_, tau, wrenches=wrenches)
-        multipliers = self.constraint_forces(q_, v_, a, tau, wrenches=wrenches)
-        basis, chosen = self.motion_basis(q_, independent), self._independent(independent)
-        slopes, rows = dynamics_slopes(
-            self._differentiable(), (q_, v_, a), multipliers, self._by_frame(wrenches), self.effects
-        )
-        following = Following(basis, chosen, self._solution(q_), rows)
-        return forward_derivatives(slopes, rows, following, (chosen, self._actuated))
+        q_, v_ = self._configuration(q), self._velocity(v)
+        chosen = self.system.independent(independent)
+        return self._dynamics_derivatives().forward(q_, v_, self._forces(tau), chosen, wrenches)
 
     def linearize(
         self,
@@ -363,7 +882,7 @@ class ClosedLoopModel(ClosedLoopDynamics):
             self.forward_dynamics_derivatives(q, v, tau, independent, wrenches=wrenches)
         )
 
-    # Motion in time -------------------------------------------------------------------------------
+    # Simulation -----------------------------------------------------------------------------------
 
     def simulate(
         self, q: ArrayLike, v: ArrayLike | None = None, *, duration: float, **options: Any
@@ -382,33 +901,27 @@ class ClosedLoopModel(ClosedLoopDynamics):
         """
         return simulate(self, q, v, duration=duration, **options)
 
-    def _differentiable(self) -> Loops:
-        """Return the loops on a tree whose derivatives Pinocchio knows; see `splitting`."""
-        if self._split_loops is None:
-            twin = split(self.model)
-            self._split_loops = (
-                self._loops
-                if twin is self.model
-                else Loops(twin, self.closures, self.characteristic_length)
-            )
-        return self._split_loops
+    # Arguments, and what is made when first needed -----------------------------------------------
 
-    def _solution(self, q: Array) -> Solved:
-        """Return what solves J x = b at q: of x, the passive joints' rows if they determine it."""
-        jacobian = self._loops.jacobian(q).copy()
-        if self._solver.solve(jacobian, np.zeros((self.constraint_size, 1))) is None:
-            inverse = pseudo_inverse(self._scaled(jacobian))
-            unscaled = self._loops.column_scale[:, None] * inverse * self._loops.row_scale
-            return lambda right: unscaled @ right
+    def _configuration(self, q: ArrayLike) -> Array:
+        return real_vector(q, self.model.nq, "q")
 
-        def solved(right: Array) -> Array:
-            x = np.zeros((self.model.nv, right.shape[1]))
-            found = self._solver.solve(jacobian, np.asfortranarray(right))
-            assert found is not None  # as it was above
-            x[self._passive] = found
-            return x
+    def _velocity(self, v: ArrayLike) -> Array:
+        return real_vector(v, self.model.nv, "v")
 
-        return solved
+    def _forces(self, tau: ArrayLike) -> Array:
+        return real_vector(tau, self.system.actuated.size, "tau")
+
+    def _closed(self, q: Array) -> Array:
+        """Return q if it is closed, or else a closed configuration near it."""
+        if self.loop_gap(q) <= closed_gap(self.system):
+            return q
+        return close(self.system, q)
+
+    def _dynamics_derivatives(self) -> DynamicsDerivatives:
+        if self._derivatives is None:
+            self._derivatives = DynamicsDerivatives(self.system)
+        return self._derivatives
 
 
 def _rebuilt(

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.dynamics.kinematics import MAX_CONDITION
+from rps_pin.closed_loop.constraints.system import MAX_CONDITION
 from rps_pin.paper.lagrange_vectors import times
 from rps_pin.rps.checks import refuse_large_gain
 from rps_pin.rps.kinematics.legs import RADIAL

@@ -1,4 +1,4 @@
-"""Joint limits of a tree: the box of coordinates that closing the loops stays in."""
+"""Joint limits of a tree: bounds on its coordinates, for closing the loops within them."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""How the closures' rates, accelerations and forces change with q and v: closed forms.
+"""Derivatives of the closures' rates, accelerations and forces by q and v, in closed form.
 
 For a closure of frames a and b let, all in a's axes at a's origin,
 
 - M be b's placement in a, and eta = (B - A) dq its change, dM = eta^ M, with A and B the Jacobians
   of a and b there;
-- X = nu_a - nu_b the twist of a relative to b, with nu_b = Ad_M (b's own twist);
-- Y = X' = alpha_a - Ad_M (b's own acceleration) + X x nu_a its derivative.
+- X = nu_a - nu_b the twist of a relative to b, with nu_b = Ad_M (b's twist in its own axes);
+- Y = X' = alpha_a - Ad_M (b's acceleration in its own axes) + X x nu_a its derivative.
 
 Then, the derivatives of nu and alpha being Pinocchio's and x the cross product of twists,
 
@@ -13,7 +13,7 @@ Then, the derivatives of nu and alpha being Pinocchio's and x the cross product 
     dY = dalpha_a - Ad_M dalpha_b - eta x alpha_b + dX x nu_a + X x dnu_a,
 
 and the rows J v = W X and J a + J' v = W Y + W' X, W' = -D X, follow by the product rule from W,
-its slope D and that slope's own (see `closure_rows`). Points in world axes have it simpler.
+its derivative D and the derivative of D (see `rows`). Points in world axes are simpler.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.constraints.loops import ClosedFrames, Loops
+from rps_pin.closed_loop.constraints.equations import ClosedFrames, ClosureEquations
 
 _LOCAL = pin.ReferenceFrame.LOCAL
 
@@ -58,38 +58,38 @@ class FrameMotions:
 
     Parameters
     ----------
-    loops
+    equations
         The tree; its data are filled.
     motion
         q (nq,), v (nv,), a (nv,).
     """
 
-    def __init__(self, loops: Loops, motion: tuple[Array, Array, Array]) -> None:
-        self.loops = loops
-        self._known: dict[int, _Frame] = {}
-        pin.computeForwardKinematicsDerivatives(loops.model, loops.data, *motion)
-        pin.updateFramePlacements(loops.model, loops.data)
+    def __init__(self, equations: ClosureEquations, motion: tuple[Array, Array, Array]) -> None:
+        self.equations = equations
+        self._frames: dict[int, _Frame] = {}
+        pin.computeForwardKinematicsDerivatives(equations.model, equations.data, *motion)
+        pin.updateFramePlacements(equations.model, equations.data)
 
     def __getitem__(self, index: int) -> _Frame:
         """Return a frame's, by its index; before the data are used for anything else."""
-        if index not in self._known:
-            self._known[index] = _frame(self.loops, index)
-        return self._known[index]
+        if index not in self._frames:
+            self._frames[index] = _frame(self.equations, index)
+        return self._frames[index]
 
 
 def closure_derivatives(motions: FrameMotions) -> ClosureDerivatives:
     """Return the derivatives of the rows' rates and accelerations."""
-    loops = motions.loops
-    shape = loops.size, loops.model.nv
+    equations = motions.equations
+    shape = equations.size, equations.model.nv
     found = ClosureDerivatives(np.zeros(shape), np.zeros(shape), np.zeros(shape))
-    for frames in loops.closed_frames:
+    for frames in equations.closed_frames:
         of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
-        own = (
+        derivatives = (
             _of_point(of_a, of_b)
             if frames.closure.kind == "spherical"
-            else _kept(frames, of_a, of_b)
+            else _of_frames(frames, of_a, of_b)
         )
-        for whole, part in zip(found, own, strict=True):
+        for whole, part in zip(found, derivatives, strict=True):
             whole[frames.rows] = part
     return found
 
@@ -100,26 +100,26 @@ def closure_force_slope(motions: FrameMotions, multipliers: Array) -> Array:
     That part is Pinocchio's: `computeRNEADerivatives` with the wrenches as external forces.
 
     On a's side acts f = W' lambda, on b's side -f. With G = sum lambda_k D_k, df = G eta (and, f
-    held in world axes, f turns against a's rotation); b's own frame moving under it by eta adds
+    held in world axes, f turns against a's rotation); frame b moving under it by eta adds
     eta x* f, the cross product of a twist and a wrench.
     """
-    loops = motions.loops
-    slope = np.zeros((loops.model.nv, loops.model.nv))
-    for frames in loops.closed_frames:
-        own = multipliers[frames.rows]
+    equations = motions.equations
+    slope = np.zeros((equations.model.nv, equations.model.nv))
+    for frames in equations.closed_frames:
+        force = multipliers[frames.rows]
         of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
         if frames.closure.kind == "spherical":
-            slope += world_wrench_slope(of_a, np.concatenate([own, np.zeros(3)]))
-            slope -= world_wrench_slope(of_b, np.concatenate([own, np.zeros(3)]))
+            slope += world_wrench_slope(of_a, np.concatenate([force, np.zeros(3)]))
+            slope -= world_wrench_slope(of_b, np.concatenate([force, np.zeros(3)]))
             continue
         placement = of_a.placement.actInv(of_b.placement)
         A, B = of_a.jacobian, placement.toActionMatrix() @ of_b.jacobian
         if frames.in_world:
-            f = (own.reshape(2, 3) @ of_a.placement.rotation).ravel()
+            f = (force.reshape(2, 3) @ of_a.placement.rotation).ravel()
             change = _turned_back(f) @ A
         else:
-            f = frames.kept.wrenches(placement).T @ own
-            change = np.tensordot(own, frames.kept.slope(placement), 1) @ (B - A)
+            f = frames.selected.wrenches(placement).T @ force
+            change = np.tensordot(force, frames.selected.slope(placement), 1) @ (B - A)
         slope += (A - B).T @ change + B.T @ _twist_on_wrench(f) @ (B - A)
     return slope
 
@@ -133,15 +133,15 @@ def world_wrench_slope(frame: _Frame, wrench: Array) -> Array:
 
 def external_force_slope(motions: FrameMotions, wrenches: Mapping[int, Array]) -> Array:
     """Return the same of external wrenches by frame index, shape (nv, nv)."""
-    nv = motions.loops.model.nv
+    nv = motions.equations.model.nv
     slope = np.zeros((nv, nv))
     for frame, wrench in wrenches.items():
         slope += world_wrench_slope(motions[frame], wrench)
     return slope
 
 
-def _frame(loops: Loops, index: int) -> _Frame:
-    model, data = loops.model, loops.data
+def _frame(equations: ClosureEquations, index: int) -> _Frame:
+    model, data = equations.model, equations.data
     nv = model.nv
     twist_q, acceleration_q, acceleration_v, jacobian = (
         np.asarray(part).reshape(6, nv)
@@ -181,7 +181,7 @@ def _point(frame: _Frame) -> tuple[Array, Array, Array]:
     return turn @ rate_q, turn @ by_q, turn @ by_v
 
 
-def _kept(frames: ClosedFrames, of_a: _Frame, of_b: _Frame) -> tuple[Array, Array, Array]:
+def _of_frames(frames: ClosedFrames, of_a: _Frame, of_b: _Frame) -> tuple[Array, Array, Array]:
     """Return the derivatives of the rows W X, and W Y + W' X by q and v."""
     placement = of_a.placement.actInv(of_b.placement)
     Ad = placement.toActionMatrix()
@@ -196,11 +196,11 @@ def _kept(frames: ClosedFrames, of_a: _Frame, of_b: _Frame) -> tuple[Array, Arra
     dY_v = of_a.acceleration_v - Ad @ of_b.acceleration_v
     dY_v += _cross(X) @ A - _cross(nu_a) @ (A - B)
 
-    W, D = frames.kept.wrenches(placement), frames.kept.slope(placement)
+    W, D = frames.selected.wrenches(placement), frames.selected.slope(placement)
     W_rate = -D @ X
     of_X = W_rate - np.einsum("kij,i->kj", D, X)  # W' dX + dW' X, where X alone changes
     D_X, D_Y = np.einsum("kij,i->kj", D, X), np.einsum("kij,i->kj", D, Y)  # (D eta) X, (D eta) Y
-    E_X = np.einsum("kij,i->kj", frames.kept.slope_rate(placement, X), X)
+    E_X = np.einsum("kij,i->kj", frames.selected.slope_rate(placement, X), X)
     rate_q = W @ dX + D_X @ eta
     by_q = W @ dY + of_X @ dX + (D_Y - E_X) @ eta
     by_v = W @ dY_v + of_X @ (A - B)
@@ -218,9 +218,9 @@ def _in_world(
     x, y = values
     of_x, by_q, by_v = slopes
     turning = of_a.jacobian[3:]
-    bend = spin @ x + y
+    total = spin @ x + y
     rate_q = of_x - _skews(x) @ turning
-    by_q = by_q + spin @ of_x - _skews(x) @ of_a.twist_q[3:] - _skews(bend) @ turning
+    by_q = by_q + spin @ of_x - _skews(x) @ of_a.twist_q[3:] - _skews(total) @ turning
     by_v = by_v + spin @ rate_v - _skews(x) @ turning
     return turn @ rate_q, turn @ by_q, turn @ by_v
 

@@ -1,4 +1,4 @@
-"""The rows of a closure as wrenches: how a closure's gap changes with the placement of b in a.
+"""Selected rows of a closure, as wrenches: the rate of its gap, and derivatives of the rows.
 
 Let M = (R, p) be frame b's placement in frame a, and xi = (linear, angular) the twist of b relative
 to a in a's axes at a's origin, dM/dt = xi^ M. Pinocchio's constraint model of a whole frame gives
@@ -16,8 +16,8 @@ origin. A `Rows` object stacks some: W(M), shape (k, 6). There are four sorts:
 - `FrameRows`: the frames stay parallel, gap -log(R), w = (0, e_i);
 - `DistanceRows`: |p| stays as it is, gap L - |p|, w = (p / |p|, 0).
 
-Since W depends on M, its derivatives along a twist eta of b relative to a are needed for
-accelerations (first) and for derivatives of the dynamics (first and second).
+Since W depends on M, accelerations need its first derivative along a twist eta of b relative to a,
+and derivatives of the dynamics its first and second.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from operator import mul
 
 import numpy as np
 import pinocchio as pin
@@ -34,12 +35,22 @@ from rps_pin.closed_loop.constraints.closures import LoopClosure
 
 skew = pin.skew
 
+Floats = tuple[float, ...]
+
 
 class Rows(ABC):
     """Some rows of a closure; all in frame a's axes."""
 
     #: Which rows are angular: their gaps in rad, their multipliers in N m.
     angular: Bools
+
+    @abstractmethod
+    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
+        """Return the square of the gap, m^2, angles times a lever, in plain floats.
+
+        To second order in the gap, for a fast test of whether a closure is open. p are b's origin
+        in a (3 numbers), R the columns of its rotation (9 numbers).
+        """
 
     @abstractmethod
     def gap(self, placement: pin.SE3) -> Array:
@@ -50,7 +61,7 @@ class Rows(ABC):
         """Return W, shape (k, 6), (force, moment) at a's origin."""
 
     @abstractmethod
-    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+    def bias(self, placement: pin.SE3, twist: Array) -> Array:
         """Return W' X, shape (k,), where a moves with the twist X relative to b: -(D X) X."""
 
     @abstractmethod
@@ -70,6 +81,14 @@ class PointRows(Rows):
         self._at_origin = np.hstack([directions, np.zeros_like(directions)])
         self.angular = np.zeros(len(directions), dtype=bool)
         self._cross = np.array([skew(u) for u in directions])
+        self._rows: list[list[float]] = directions.tolist()
+
+    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
+        """Return the sum of (u . p)^2, |p|^2 for three directions, which are orthonormal."""
+        x, y, z = p
+        if len(self._rows) == 3:
+            return x * x + y * y + z * z
+        return sum([(u * x + v * y + w * z) ** 2 for u, v, w in self._rows])
 
     def gap(self, placement: pin.SE3) -> Array:
         """Return -u . p."""
@@ -82,12 +101,12 @@ class PointRows(Rows):
         wrenches[:, 3:] = -self._cross @ placement.translation
         return wrenches
 
-    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+    def bias(self, placement: pin.SE3, twist: Array) -> Array:
         """Return (u x s) . X_a = u . (s x X_a), s = X_l + X_a x p."""
         linear, angular = twist[:3], twist[3:]
         s = linear + skew(angular) @ placement.translation
-        bend: Array = self.directions @ (skew(s) @ angular)
-        return bend
+        bias: Array = self.directions @ (skew(s) @ angular)
+        return bias
 
     def slope(self, placement: pin.SE3) -> Array:
         """Return d(u, p x u) = (0, -u x dp)."""
@@ -99,12 +118,19 @@ class PointRows(Rows):
 
 
 class AxisRows(Rows):
-    """Directions fixed in b, n_b (k, 3), stay perpendicular to directions fixed in a, m (k, 3)."""
+    """Directions n_b (k, 3), fixed in b, stay perpendicular to directions fixed in a, m (k, 3)."""
 
     def __init__(self, in_a: Array, in_b: Array) -> None:
         self.in_a, self.in_b = in_a, in_b
         self.angular = np.ones(len(in_a), dtype=bool)
         self._cross = np.array([skew(m) for m in in_a])
+        # m . R n is the sum of these times the columns of R.
+        products = np.einsum("ij,ik->ijk", in_b, in_a).reshape(-1, 9)
+        self._products: list[list[float]] = products.tolist()
+
+    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
+        """Return the sum of (lever m . R n)^2."""
+        return sum([(lever * _dot(m, R)) ** 2 for m in self._products])
 
     def gap(self, placement: pin.SE3) -> Array:
         """Return m . n."""
@@ -118,12 +144,12 @@ class AxisRows(Rows):
         wrenches[:, 3:] = np.matmul(self._cross, turned[:, :, None])[:, :, 0]
         return wrenches
 
-    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+    def bias(self, placement: pin.SE3, twist: Array) -> Array:
         """Return -(m x (X_a x n)) . X_a = -m . ((X_a x n) x X_a)."""
         spin = skew(twist[3:])
         turning = self.in_b @ placement.rotation.T @ spin.T  # X_a x n, row by row
-        bend: Array = np.einsum("ij,ij->i", self.in_a, turning @ spin.T)
-        return bend
+        bias: Array = np.einsum("ij,ij->i", self.in_a, turning @ spin.T)
+        return bias
 
     def slope(self, placement: pin.SE3) -> Array:
         """Return d(m x n) = m x (eta_a x n)."""
@@ -150,6 +176,11 @@ class ParallelRows(AxisRows):
     def __init__(self, in_a: Array, in_b: Array) -> None:
         self.axis, self.across = in_a, across(in_a)
         super().__init__(np.cross(in_a, self.across), np.vstack([in_b, in_b]))
+        self._product: list[float] = np.outer(in_b, in_a).ravel().tolist()
+
+    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
+        """Return lever^2 |n - n_a|^2."""
+        return 2 * lever * lever * abs(1 - _dot(self._product, R))
 
     def gap(self, placement: pin.SE3) -> Array:
         """Return the rotation vector from n to n_a; it does not vanish where they are opposite."""
@@ -166,6 +197,10 @@ class FrameRows(Rows):
 
     angular = np.ones(3, dtype=bool)
 
+    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
+        """Return lever^2 (3 - trace R) = lever^2 2 (1 - cos angle)."""
+        return lever * lever * abs(3 - (R[0] + R[4] + R[8]))
+
     def gap(self, placement: pin.SE3) -> Array:
         """Return the rotation vector from b to a."""
         gap: Array = -pin.log3(placement.rotation)
@@ -175,7 +210,7 @@ class FrameRows(Rows):
         """Return (0, e_i)."""
         return np.hstack([np.zeros((3, 3)), np.eye(3)])
 
-    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+    def bias(self, placement: pin.SE3, twist: Array) -> Array:
         """Return 0."""
         return np.zeros(3)
 
@@ -196,6 +231,10 @@ class DistanceRows(Rows):
     def __init__(self, distance: float) -> None:
         self.distance = distance
 
+    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
+        """Return (L - |p|)^2."""
+        return (self.distance - math.hypot(*p)) ** 2
+
     def gap(self, placement: pin.SE3) -> Array:
         """Return L - |p|."""
         return np.array([self.distance - np.linalg.norm(placement.translation)])
@@ -207,7 +246,7 @@ class DistanceRows(Rows):
         wrench[0, :3] = u
         return wrench
 
-    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+    def bias(self, placement: pin.SE3, twist: Array) -> Array:
         """Return -(P s / |p|) . X_l, s = X_l + X_a x p, P = 1 - u u'."""
         u, length = self._direction(placement)
         linear = twist[:3]
@@ -247,6 +286,10 @@ class Stack(Rows):
         self.parts = tuple(parts)
         self.angular = np.concatenate([part.angular for part in self.parts])
 
+    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
+        """Return the sum over the parts."""
+        return sum([part.squared_gap(lever, p, R) for part in self.parts])
+
     def gap(self, placement: pin.SE3) -> Array:
         """Return the parts' gaps."""
         return np.concatenate([part.gap(placement) for part in self.parts])
@@ -255,9 +298,9 @@ class Stack(Rows):
         """Return the parts' wrenches."""
         return np.concatenate([part.wrenches(placement) for part in self.parts])
 
-    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+    def bias(self, placement: pin.SE3, twist: Array) -> Array:
         """Return the parts' W' X."""
-        return np.concatenate([part.bend(placement, twist) for part in self.parts])
+        return np.concatenate([part.bias(placement, twist) for part in self.parts])
 
     def slope(self, placement: pin.SE3) -> Array:
         """Return the parts' slopes."""
@@ -278,7 +321,7 @@ class WholeRows(Stack):
         """Return 1."""
         return np.eye(6)
 
-    def bend(self, placement: pin.SE3, twist: Array) -> Array:
+    def bias(self, placement: pin.SE3, twist: Array) -> Array:
         """Return 0."""
         return np.zeros(6)
 
@@ -289,6 +332,11 @@ class WholeRows(Stack):
     def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
         """Return 0."""
         return np.zeros((6, 6, 6))
+
+
+def _dot(a: Sequence[float], b: Floats) -> float:
+    total: float = sum(map(mul, a, b))
+    return total
 
 
 def rows_of(closure: LoopClosure) -> Rows:

@@ -1,8 +1,8 @@
 """Derivatives of inverse and forward dynamics, in all coordinates and in independent ones.
 
-With F(q, v, a) = rnea + effects - external forces - J' lambda, which is S' tau, its slopes F_q,
-F_v, F_a = M (lambda held) and the rows' c(q, v, a) = J a + J' v with c_q, c_v, c_a = J, the KKT
-equations differentiate to
+With F(q, v, a) = rnea + passive joint forces - external forces - J' lambda, which is S' tau, its
+derivatives F_q, F_v, F_a = M (lambda held) and c(q, v, a) = J a + J' v of the closures' rows with
+c_q, c_v, c_a = J, the KKT equations differentiate to
 
     S' dtau + J' dlambda = dF,      J da + dc = 0.
 
@@ -19,7 +19,7 @@ the independent joints' own rows of V_y, A_y and A_y' being zero.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -33,9 +33,14 @@ from rps_pin.closed_loop.constraints.derivatives import (
     closure_force_slope,
     external_force_slope,
 )
-from rps_pin.closed_loop.constraints.loops import Loops
-from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
-from rps_pin.closed_loop.dynamics.wrenches import closure_wrenches, forces_on_joints
+from rps_pin.closed_loop.constraints.equations import ClosureEquations
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.closed_loop.dynamics.forward_dynamics import forward_dynamics
+from rps_pin.closed_loop.dynamics.inverse_dynamics import constraint_forces, inverse_dynamics
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
+from rps_pin.closed_loop.editing.split import split
+from rps_pin.closed_loop.kinematics import motion_basis
+from rps_pin.numerics.linear_algebra import pseudo_inverse
 
 Solved = Callable[[Array], Array]
 
@@ -83,7 +88,7 @@ class Linearisation(NamedTuple):
     """Shape (2 m, na)."""
 
 
-class _Slopes(NamedTuple):
+class _ForceDerivatives(NamedTuple):
     """F_q, F_v and M, shapes (nv, nv)."""
 
     q: Array
@@ -91,48 +96,121 @@ class _Slopes(NamedTuple):
     a: Array
 
 
-def dynamics_slopes(
-    loops: Loops,
-    motion: tuple[Array, Array, Array],
-    multipliers: Array,
-    wrenches: Mapping[int, Array],
-    effects: JointEffects | None,
-) -> tuple[_Slopes, ClosureDerivatives]:
-    """Return the derivatives of F with lambda held, and those of the closures' rows.
+class DynamicsDerivatives:
+    """Derivatives of the dynamics of one system.
+
+    They are taken on a tree whose joints have derivatives in Pinocchio (see `split`): the system's,
+    or the same tree with some joints split.
 
     Parameters
     ----------
-    loops
-        The tree and its closures.
-    motion
-        q (nq,), v (nv,), a (nv,).
-    multipliers
-        lambda, shape (nc,).
-    wrenches
-        External wrenches by frame index, in world axes.
-    effects
-        Damping, friction, springs.
+    system
+        The system; its scratch memory is used.
     """
-    model, data = loops.model, loops.data
-    on_closures = closure_wrenches(loops, motion[0], multipliers)
-    motions = FrameMotions(loops, motion)
-    rows = closure_derivatives(motions)
-    beyond = closure_force_slope(motions, multipliers) + external_force_slope(motions, wrenches)
-    forces = forces_on_joints(loops, on_closures, wrenches)
-    by_q, by_v, mass = (
-        np.array(part).reshape(model.nv, model.nv)
-        for part in pin.computeRNEADerivatives(model, data, *motion, forces)
-    )
-    by_q -= beyond
-    if effects is not None:
-        stiffness, damping = effects.slopes(motion[1])
-        by_q += np.diag(stiffness)
-        by_v += np.diag(damping)
-    return _Slopes(by_q, by_v, mass), rows
+
+    def __init__(self, system: ConstraintSystem) -> None:
+        self._system, self._equations = system, system.equations
+        tree = split(system.model)
+        if tree is not system.model:
+            equations = system.equations
+            self._equations = ClosureEquations(tree, equations.closures, equations.length)
+
+    def inverse(
+        self, q: Array, v: Array, a: Array, wrenches: Wrenches | None
+    ) -> InverseDynamicsDerivatives:
+        """Return the derivatives of tau; the independent joints are the actuated ones."""
+        system = self._system
+        basis = motion_basis(system, q, system.actuated)
+        multipliers = inverse_dynamics(system, q, v, a, wrenches).constraint_forces
+        force, rows = self._force_derivatives((q, v, a), multipliers, wrenches)
+        following = Following(basis, system.actuated, self._solution(q), rows)
+        T = following.T
+        by_q, by_v, by_a = (T.T @ derivative for derivative in force)
+        return InverseDynamicsDerivatives(
+            by_q,
+            by_v,
+            by_a,
+            by_q @ T + by_v @ following.velocity_y + by_a @ following.acceleration_y,
+            by_v @ T + by_a @ following.acceleration_dy,
+            by_a @ T,
+        )
+
+    def forward(
+        self, q: Array, v: Array, tau: Array, chosen: Indices, wrenches: Wrenches | None
+    ) -> ForwardDynamicsDerivatives:
+        """Return the derivatives of a; `chosen` are the independent velocities."""
+        system = self._system
+        a = forward_dynamics(system, q, v, tau, wrenches)
+        multipliers = constraint_forces(system, q, v, a, tau, wrenches)
+        basis = motion_basis(system, q, chosen)
+        force, rows = self._force_derivatives((q, v, a), multipliers, wrenches)
+        following = Following(basis, chosen, self._solution(q), rows)
+        T, mass = following.T, basis.T @ force.a @ basis
+
+        def response(of_force: Array, opening: Array) -> Array:
+            """Return da of dF and dc, shapes (nv, k) and (nc, k)."""
+            x = -following.solved(opening)
+            along = np.linalg.solve(mass, -T.T @ (of_force + force.a @ x))
+            da: Array = T @ along + x
+            return da
+
+        by_q = response(force.q, rows.acceleration_q)
+        by_v = response(force.v, rows.acceleration_v)
+        by_tau = T @ np.linalg.solve(mass, T[system.actuated].T)
+        return ForwardDynamicsDerivatives(
+            by_q,
+            by_v,
+            by_tau,
+            (by_q @ T + by_v @ following.velocity_y)[chosen],
+            (by_v @ T)[chosen],
+            by_tau[chosen],
+        )
+
+    def _force_derivatives(
+        self, motion: tuple[Array, Array, Array], multipliers: Array, wrenches: Wrenches | None
+    ) -> tuple[_ForceDerivatives, ClosureDerivatives]:
+        """Return the derivatives of F with lambda held, and those of the closures' rows."""
+        system, equations = self._system, self._equations
+        model, on_frames = equations.model, system.by_frame(wrenches)
+        on_closures = closure_wrenches(equations, motion[0], multipliers)
+        motions = FrameMotions(equations, motion)
+        rows = closure_derivatives(motions)
+        beyond = closure_force_slope(motions, multipliers)
+        beyond += external_force_slope(motions, on_frames)
+        forces = forces_on_joints(equations, on_closures, on_frames)
+        by_q, by_v, mass = (
+            np.array(part).reshape(model.nv, model.nv)
+            for part in pin.computeRNEADerivatives(model, equations.data, *motion, forces)
+        )
+        by_q -= beyond
+        if system.effects is not None:
+            stiffness, damping = system.effects.slopes(motion[1])
+            by_q += np.diag(stiffness)
+            by_v += np.diag(damping)
+        return _ForceDerivatives(by_q, by_v, mass), rows
+
+    def _solution(self, q: Array) -> Solved:
+        """Return what solves J x = b at q: of x, the passive joints' rows if they determine it."""
+        system = self._system
+        jacobian = system.equations.jacobian(q).copy()
+        solve = system.factorisation.passive_motion
+        if solve(jacobian, np.zeros((system.equations.size, 1))) is None:
+            inverse = pseudo_inverse(system.scaled(jacobian))
+            unscaled = system.column_scale[:, None] * inverse * system.row_scale
+            return lambda right: unscaled @ right
+
+        def solved(right: Array) -> Array:
+            x = np.zeros((system.model.nv, right.shape[1]))
+            found = solve(jacobian, np.asfortranarray(right))
+            assert found is not None  # as it was above
+            x[system.passive] = found
+            return x
+
+        return solved
 
 
 class Following:
-    """How the whole mechanism follows independent coordinates: T, V_y, A_y and A_y'.
+    """Dependence of the whole mechanism on independent coordinates: T, V_y, A_y and A_y'.
 
     Parameters
     ----------
@@ -161,50 +239,6 @@ class Following:
         x = self.solved(right)
         held: Array = x - self.T @ x[self._chosen]
         return held
-
-
-def inverse_derivatives(slopes: _Slopes, following: Following) -> InverseDynamicsDerivatives:
-    """Return the derivatives of tau; the independent joints are the actuated ones."""
-    T = following.T
-    by_q, by_v, by_a = (T.T @ slope for slope in slopes)
-    return InverseDynamicsDerivatives(
-        by_q,
-        by_v,
-        by_a,
-        by_q @ T + by_v @ following.velocity_y + by_a @ following.acceleration_y,
-        by_v @ T + by_a @ following.acceleration_dy,
-        by_a @ T,
-    )
-
-
-def forward_derivatives(
-    slopes: _Slopes,
-    rows: ClosureDerivatives,
-    following: Following,
-    indices: tuple[Indices, Indices],
-) -> ForwardDynamicsDerivatives:
-    """Return the derivatives of a; `indices` of the independent and of the actuated velocities."""
-    T, (chosen, actuated) = following.T, indices
-    mass = T.T @ slopes.a @ T
-
-    def response(force: Array, opening: Array) -> Array:
-        """Return da of dF and dc, shapes (nv, k) and (nc, k)."""
-        x = -following.solved(opening)
-        along = np.linalg.solve(mass, -T.T @ (force + slopes.a @ x))
-        da: Array = T @ along + x
-        return da
-
-    by_q = response(slopes.q, rows.acceleration_q)
-    by_v = response(slopes.v, rows.acceleration_v)
-    by_tau = T @ np.linalg.solve(mass, T[actuated].T)
-    return ForwardDynamicsDerivatives(
-        by_q,
-        by_v,
-        by_tau,
-        (by_q @ T + by_v @ following.velocity_y)[chosen],
-        (by_v @ T)[chosen],
-        by_tau[chosen],
-    )
 
 
 def linearisation(derivatives: ForwardDynamicsDerivatives) -> Linearisation:

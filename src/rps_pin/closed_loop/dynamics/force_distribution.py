@@ -5,16 +5,16 @@ Of all tau and lambda with
     S' tau + J' lambda = f(q, v, a)
 
 (f: `ClosedLoopModel.generalised_force`) within their limits, that of least |W (tau - tau_0)| is
-meant. The equations are solved first, once and for all: every solution is
+meant. The equations are solved first: every solution is
 
     tau = tau_l + F y,    lambda = lambda_l + L y + K z,
 
-tau_l the unlimited answer, F what no allowed motion feels (W F orthonormal), K what redundant rows
-carry among themselves (J' K = 0). So |W (tau - tau_0)|^2 is that of tau_l plus |y|^2, the limits
-are linear in y and z, and what is left is a `least_distance` problem. However that is solved, the
-equations of motion hold to rounding.
+tau_l the unlimited solution, F the tau without work in any allowed motion (W F orthonormal), K the
+null space of J' (J' K = 0). So |W (tau - tau_0)|^2 is that of tau_l plus |y|^2, the limits are
+linear in y and z, and a least-distance problem is left (see `quadratic_program`). Whatever its
+accuracy, the equations of motion hold to rounding.
 
-Units: f, tau and lambda are made forces by the characteristic length as their lever, here as in
+Units: moments are made forces by the characteristic length as their lever, as in
 `ClosedLoopModel`; tolerances are relative to |W tau|.
 """
 
@@ -31,9 +31,10 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.column_names import column_names
 from rps_pin.closed_loop.dynamics.force_bounds import ForceBound
 from rps_pin.closed_loop.dynamics.least_effort import (
+    RESIDUAL,
     least_effort,
     refuse_nearly_singular,
-    unproduced_force,
+    residual_force,
 )
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
@@ -48,8 +49,6 @@ TorqueLimits = Literal["model"] | float | ArrayLike | tuple[ArrayLike, ArrayLike
 #: than about the square of this, relatively, in effort. Matters only where a bound rests on
 #: redundant rows.
 REDUNDANCY_WEIGHT = 1e-4
-#: What actuators may leave unproduced, relative to what is asked for.
-_PRODUCED = 1e-9
 
 
 class DistributedForces(NamedTuple):
@@ -215,9 +214,9 @@ class ForceDistribution:
         own = (motions.take(self._actuated, axis=1) * self._levers).T  # W^-1 S N
         best = least_effort(own, reduced, size=self._largest_lever)
         refuse_nearly_singular(best.values, self.mechanism.max_condition, self._largest_lever)
-        if best.missing @ best.missing > _PRODUCED**2 * (reduced @ reduced):
+        if best.missing @ best.missing > RESIDUAL**2 * (reduced @ reduced):
             motions = self._columns[:, None] * motions.T
-            raise self._unproduced(unproduced_force(motions, best.missing, self._columns))
+            raise self._infeasible_motion(residual_force(motions, best.missing, self._columns))
         return best.tau, best.free
 
     def _multipliers(self, factors: _Factors, force: Array, tau: Array) -> Array:
@@ -276,8 +275,8 @@ class ForceDistribution:
             "no forces within the limits: " + "; ".join(map(str, violations)), violations
         )
 
-    def _unproduced(self, force: Array) -> InfeasibleError:
-        """Return the error that says what the actuators cannot produce."""
+    def _infeasible_motion(self, force: Array) -> InfeasibleError:
+        """Return the error of a motion that leaves a residual force."""
         scaled = np.abs(self._columns * force)
         names = column_names(self.mechanism.model)[1]
         parts = [

@@ -1,4 +1,4 @@
-"""Forward dynamics of a closed-loop mechanism in reduced coordinates.
+"""Forward dynamics of a mechanism with closed loops, in reduced coordinates.
 
 With v = T u for any basis T of the motions that the closures allow (J T = 0) and a_0 any solution
 of J a + J' v = 0, all accelerations are a = T w + a_0, and multiplying
@@ -17,28 +17,95 @@ import pinocchio as pin
 from scipy.linalg.lapack import dposv
 
 from rps_pin.arrays import Array
-from rps_pin.errors import MechanismError, SingularityError
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.closed_loop.dynamics.generalised_forces import resisting_force, tree_mass
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.closed_loop.kinematics import actuated_basis
+from rps_pin.errors import SingularityError
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, rank
 
-#: Relative to the largest: what counts as no inertia at all.
+#: Relative to the largest pivot: what counts as no inertia at all.
 _NO_INERTIA = 1e-14
 
 
-def basis_and_drift(jacobian: Array, drift: Array, scale: Array) -> tuple[Array, Array]:
+def forward_dynamics(
+    system: ConstraintSystem,
+    q: Array,
+    v: Array,
+    tau: Array,
+    wrenches: Wrenches | None,
+    *,
+    closed: bool = True,
+) -> Array:
+    """Return the acceleration, shape (nv,); see `ClosedLoopModel.forward_dynamics`.
+
+    An open q is refused if it has to be `closed`; otherwise the equations are solved all the same.
+    """
+    bias = system.equations.bias(q, v)
+    jacobian = system.equations.jacobian(q)
+    if closed:
+        system.refuse_open(q)
+    right = np.empty((bias.size, system.actuated.size + 1), order="F")
+    right[:, :-1], right[:, -1] = jacobian.take(system.actuated, axis=1), bias
+    solved = system.factorisation.passive_motion(jacobian, right)
+    if solved is None:  # the motion is determined at a singularity of the actuators, too
+        rows = system.row_scale
+        basis, a_0 = basis_and_bias(rows[:, None] * jacobian, rows * bias, system.column_scale)
+    else:  # T_p = -J_p^-1 J_a
+        a_0 = np.zeros(system.model.nv)
+        a_0[system.passive] = -solved[:, -1]
+        basis = actuated_basis(system, solved[:, :-1])
+    return reduced_acceleration(system, (q, v), tau, wrenches, basis, a_0)[0]
+
+
+def reduced_acceleration(
+    system: ConstraintSystem,
+    state: tuple[Array, Array],
+    tau: Array,
+    wrenches: Wrenches | None,
+    basis: Array,
+    a_0: Array,
+) -> tuple[Array, Array | None]:
+    """Return a = T w + a_0, and passive joint forces less external forces (None: none).
+
+    After `computeJointJacobians` at the state.
+
+    Parameters
+    ----------
+    system
+        Tree and actuators.
+    state
+        q (nq,) and v (nv,).
+    tau, wrenches
+        Actuator forces (na,), and external wrenches.
+    basis, a_0
+        T (nv, m) and a_0 (nv,).
+    """
+    q, v = state
+    force, resisting = -pin.rnea(system.model, system.data, q, v, a_0), None
+    if system.effects is not None or wrenches:
+        resisting = resisting_force(system, q, v, wrenches)
+        force -= resisting
+    force[system.actuated] += tau
+    mass = basis.T @ tree_mass(system, q) @ basis
+    return basis @ solve_reduced(mass, basis.T @ force) + a_0, resisting
+
+
+def basis_and_bias(jacobian: Array, bias: Array, scale: Array) -> tuple[Array, Array]:
     """Return T, shape (nv, m), and a_0, shape (nv,), of a Jacobian of any rank.
 
     Parameters
     ----------
     jacobian
         J, shape (nc, nv), its rows in one unit.
-    drift
+    bias
         J' v, shape (nc,), in the same units.
     scale
         Scaling of the velocities to one unit, shape (nv,).
     """
     left, values, right = np.linalg.svd(jacobian * scale)
     count = rank(values)
-    along = (left[:, :count].T @ drift) / values[:count]
+    along = (left[:, :count].T @ bias) / values[:count]
     return scale[:, None] * right[count:].T, -scale * (right[:count].T @ along)
 
 
@@ -58,49 +125,7 @@ def solve_reduced(mass: Array, force: Array) -> Array:
         return np.asarray(solution, dtype=np.float64)
     raise SingularityError(
         "a motion that the closures allow moves no mass: its acceleration is not determined "
-        "(give the links on its way a mass, or its joints an armature)",
+        "(give the links that it moves a mass, or its joints an armature)",
         np.inf,
         1 / RANK_TOLERANCE,
     )
-
-
-class ProximalDynamics:
-    """Pinocchio's own constrained forward dynamics, by proximal iterations.
-
-    It takes redundant rows as they are, and needs a regular mass matrix of the open tree: every
-    joint must move some mass of its own.
-
-    Parameters
-    ----------
-    model
-        The open tree.
-    constraints
-        A vector of spherical and rigid constraint models.
-    """
-
-    def __init__(self, model: pin.Model, constraints: pin.StdVec_RigidConstraintModel) -> None:
-        self._model, self._constraints = model, constraints
-        self._data = model.createData()
-        self._scratch = pin.StdVec_RigidConstraintData()
-        for constraint in constraints:
-            self._scratch.append(constraint.createData())
-        pin.initConstraintDynamics(model, self._data, constraints, self._scratch)
-        self._settings = pin.ProximalSettings(1e-14, 1e-10, 200)
-
-    def __call__(self, q: Array, v: Array, force: Array) -> Array:
-        """Return the acceleration (nv,) under generalised forces (nv,).
-
-        Raises
-        ------
-        MechanismError
-            If the open tree's mass matrix is singular.
-        """
-        a: Array = pin.constraintDynamics(
-            self._model, self._data, q, v, force, self._constraints, self._scratch, self._settings
-        ).copy()
-        if not np.isfinite(a).all():
-            raise MechanismError(
-                "Pinocchio's constraintDynamics returned no finite acceleration: the mass matrix "
-                "of the open tree is singular (massless links); use method='reduced'"
-            )
-        return a

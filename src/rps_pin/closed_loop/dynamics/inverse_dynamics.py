@@ -1,21 +1,48 @@
-"""Inverse dynamics of a closed-loop mechanism: constrained RNEA, a KKT problem.
+"""Inverse dynamics of a mechanism with closed loops: constrained RNEA, a KKT problem.
 
-With S picking the actuated rows and J the loop closures' Jacobian,
+With S selecting the actuated rows and J the closures' Jacobian,
 
-    S' tau + J' lambda = rnea(q, v, a).
+    S' tau + J' lambda = f,   f = rnea(q, v, a) + passive joint forces - external forces.
 
-The passive rows hold no actuator: J_p' lambda = rnea_p. With as many actuators as mobility, lambda
-follows from one factorisation of J_p (LU where it is square, QR where rows are redundant: then of
-least norm), and the actuated rows give tau. In every other case, see `by_motions`. Damping,
-friction and springs add to rnea, external forces take from it.
+The passive rows have no actuator: J_p' lambda = f_p. With as many actuators as mobility, lambda
+follows from one factorisation of J_p (see `factorisation`; of least norm where rows are redundant),
+and the actuated rows give tau.
+
+In every other case the null space N of J is used: J N = 0 leaves (S N)' tau = N' f. With as many
+independent actuators as motions that has one solution; otherwise see `least_effort`. Then lambda
+of least norm follows from the rest.
 """
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from typing import NamedTuple
 
-from rps_pin.arrays import Array
-from rps_pin.numerics.linear_algebra import condition_number
+import numpy as np
+from pinocchio import computeJointJacobians, getConstraintsJacobian, rnea
+from scipy.linalg.blas import dgemv, dnrm2
+
+from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.constraints.factorisation import HUGE
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.closed_loop.dynamics.generalised_forces import required_force, resisting_force
+from rps_pin.closed_loop.dynamics.least_effort import (
+    RESIDUAL,
+    least_effort,
+    refuse_nearly_singular,
+    residual_force,
+)
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.errors import InputError, SingularityError
+from rps_pin.numerics.linear_algebra import (
+    RANK_TOLERANCE,
+    condition_number,
+    least_norm,
+    null_space,
+    singular_values,
+)
+
+_INFINITY = math.inf
 
 
 class InverseDynamics:
@@ -33,25 +60,34 @@ class InverseDynamics:
     residual : float
         Norm of the KKT equations' error on the passive rows, in the units of generalised forces.
     unproduced : (nv,) array or None
-        Where actuators are lacking, the generalised force that the motion takes and nothing in the
-        mechanism produces, S' tau + J' lambda + unproduced = rnea + ...: the smallest that would
-        have to be added. None if the actuators can do it.
+        Residual force of an underactuated mechanism: the smallest generalised force that would have
+        to be added for this motion, S' tau + J' lambda + unproduced = f. None if the actuators
+        produce the motion.
     """
 
-    __slots__ = ("_scaled_jacobian", "constraint_forces", "residual", "tau", "unproduced")
+    __slots__ = (
+        "_passive_jacobian",
+        "_scales",
+        "constraint_forces",
+        "residual",
+        "tau",
+        "unproduced",
+    )
 
     def __init__(
         self,
         tau: Array,
         constraint_forces: Array,
         residual: float,
-        scaled_jacobian: tuple[tuple[Array, Array], Array],
+        scales: tuple[Array, Array],
+        passive_jacobian: Array,
         unproduced: Array | None = None,
     ) -> None:
         self.tau = tau
         self.constraint_forces = constraint_forces
         self.residual = residual
-        self._scaled_jacobian = scaled_jacobian
+        self._scales = scales
+        self._passive_jacobian = passive_jacobian
         self.unproduced = unproduced
 
     @property
@@ -60,7 +96,7 @@ class InverseDynamics:
 
         Computed when asked for.
         """
-        return condition_number(self._passive_jacobian())
+        return condition_number(self._scaled_jacobian())
 
     @property
     def orientation(self) -> int:
@@ -68,15 +104,15 @@ class InverseDynamics:
 
         0 where J_p is not square, or its determinant vanishes. Computed when asked for.
         """
-        jacobian = self._passive_jacobian()
+        jacobian = self._scaled_jacobian()
         if jacobian.shape[0] != jacobian.shape[1]:
             return 0
         return int(np.linalg.slogdet(jacobian)[0])
 
-    def _passive_jacobian(self) -> Array:
+    def _scaled_jacobian(self) -> Array:
         """Return J_p with all entries in one unit, shape (nc, np)."""
-        (rows, columns), jacobian = self._scaled_jacobian
-        return rows * jacobian * columns
+        rows, columns = self._scales
+        return rows * self._passive_jacobian * columns
 
     def __repr__(self) -> str:
         return (
@@ -84,3 +120,170 @@ class InverseDynamics:
             f"residual={self.residual:.3g}"
             + (")" if self.unproduced is None else f", unproduced={self.unproduced})")
         )
+
+
+def inverse_dynamics(
+    system: ConstraintSystem,
+    q: Array,
+    v: Array,
+    a: Array,
+    wrenches: Wrenches | None,
+    *,
+    closed: bool = True,
+) -> InverseDynamics:
+    """Return the forces of a motion; see `ClosedLoopModel.inverse_dynamics`.
+
+    An open q is refused if it has to be `closed`; otherwise the equations are solved all the same.
+    """
+    model, data, equations = system.model, system.data, system.equations
+    try:
+        force = rnea(model, data, q, v, a)
+        computeJointJacobians(model, data, q)
+    except (TypeError, ValueError):  # a list, an array of integers, or a wrong shape
+        given, checked = (q, v, a), system.state(q, v, a)
+        if all(array is one for array, one in zip(checked, given, strict=True)):
+            raise  # a complaint of Pinocchio's own
+        return inverse_dynamics(system, *checked, wrenches, closed=closed)
+    for calc, constraint_data in equations.calls:  # getConstraintsJacobian reads what they refresh
+        calc(model, data, constraint_data)
+    jacobian = getConstraintsJacobian(model, data, equations.constraints, equations.constraint_data)
+    if not equations.plain:
+        jacobian = equations.select_rows(jacobian)
+    if closed and equations.is_open(q):
+        system.state(q, v, a)  # not finite?
+        system.refuse_open(q)
+    if system.effects is not None or wrenches:
+        force = force + resisting_force(system, q, v, wrenches)
+
+    passive_jacobian = jacobian.take(system.passive, axis=1)
+    multipliers = system.factorisation.multipliers(jacobian, passive_jacobian, force)
+    if multipliers is None:
+        system.state(q, v, a)
+        return _by_null_space(system, jacobian, force)
+    # f - J' lambda, the passive rows first: they are the residual, the actuated ones tau.
+    rest = dgemv(-1.0, jacobian.T, multipliers, 1.0, force).take(system.order)
+    size = system.passive_size
+    residual = dnrm2(rest, size)
+    # The estimate of the condition does not see a pivot that is exactly zero, nor a matrix of
+    # rounding errors.
+    if not (residual < _INFINITY and dnrm2(multipliers) <= HUGE * dnrm2(force)):
+        system.state(q, v, a)
+        return _by_null_space(system, jacobian, force)
+    scales = system.factorisation.scales
+    return InverseDynamics(rest[size:], multipliers, residual, scales, passive_jacobian)
+
+
+def constraint_forces(
+    system: ConstraintSystem,
+    q: Array,
+    v: Array,
+    a: Array,
+    tau: Array,
+    wrenches: Wrenches | None,
+) -> Array:
+    """Return lambda (nc,) of a motion under given actuator forces, of least norm."""
+    rest = required_force(system, q, v, a, wrenches)
+    rest[system.actuated] -= tau
+    jacobian = system.scaled(system.equations.jacobian(q))
+    scaled: Array = system.row_scale * least_norm(jacobian.T, system.column_scale * rest)
+    return scaled
+
+
+def _by_null_space(system: ConstraintSystem, jacobian: Array, force: Array) -> InverseDynamics:
+    if not np.isfinite(force).all():
+        raise InputError("q, v and a must be finite")
+    jacobian = jacobian.reshape(system.equations.size, system.model.nv)
+    rows, scale = system.row_scale, system.column_scale
+    scaled_rows = rows[:, None] * jacobian
+    motions = scale[:, None] * null_space(scaled_rows * scale)
+    if motions.shape[1] == system.actuated.size:
+        system.refuse_singular(system.condition(jacobian))
+    tau, scaled, unproduced = null_space_solution(
+        scaled_rows, system.actuated, force, scale, system.max_condition, motions
+    )
+    multipliers = rows * scaled
+    error = force - jacobian.T @ multipliers
+    if unproduced is not None:
+        error -= unproduced
+    residual = float(np.linalg.norm(error[system.passive]))
+    return InverseDynamics(
+        tau,
+        multipliers,
+        residual,
+        system.factorisation.scales,
+        jacobian.take(system.passive, axis=1),
+        unproduced,
+    )
+
+
+class NullSpaceSolution(NamedTuple):
+    """Actuator and constraint forces, and what neither produces."""
+
+    tau: Array
+    """Shape (na,)."""
+    multipliers: Array
+    """lambda, shape (nc,)."""
+    residual_force: Array | None
+    """f - S' tau - J' lambda, shape (nv,), or None if it is rounding error."""
+
+
+def null_space_solution(
+    jacobian: Array,
+    actuated: Indices,
+    force: Array,
+    scale: Array,
+    max_condition: float = 1 / RANK_TOLERANCE,
+    motions: Array | None = None,
+) -> NullSpaceSolution:
+    """Return tau and lambda for any number of closure rows and actuators.
+
+    Parameters
+    ----------
+    jacobian
+        J, shape (nc, nv), its rows in one unit.
+    actuated
+        Indices of the actuated velocities, shape (na,).
+    force
+        f, shape (nv,).
+    scale
+        Positive scaling of the velocities, shape (nv,): coordinates v / scale share one unit.
+    max_condition
+        Largest condition number of the actuators' part in the motions that is accepted.
+    motions
+        N, shape (nv, m), N / scale orthonormal; computed if left out.
+
+    Raises
+    ------
+    SingularityError
+        If as many actuators as motions do not move all of the mechanism, or others hardly do.
+    """
+    if motions is None:
+        motions = scale[:, None] * null_space(jacobian * scale)
+    of_actuators, reduced = motions[actuated], motions.T @ force
+    remaining = None
+    if of_actuators.shape[0] == of_actuators.shape[1]:
+        tau = _exact(of_actuators / scale[actuated][:, None], reduced, max_condition)
+        tau = tau / scale[actuated]
+    else:
+        effort = least_effort(of_actuators, reduced, weights=scale[actuated])
+        refuse_nearly_singular(effort.values, max_condition)
+        tau = effort.tau
+        if np.linalg.norm(effort.missing) > RESIDUAL * np.linalg.norm(reduced):
+            remaining = residual_force(motions, effort.missing, scale)
+    rest = force.copy() if remaining is None else force - remaining
+    rest[actuated] -= tau
+    return NullSpaceSolution(tau, least_norm((jacobian * scale).T, scale * rest), remaining)
+
+
+def _exact(of_actuators: Array, reduced: Array, max_condition: float) -> Array:
+    """Return tau with (S N)' tau = N' f, S N square and of one unit, of size 1 at best."""
+    smallest = float(singular_values(of_actuators).min(initial=1.0))
+    condition = 1 / smallest if smallest > 0 else np.inf
+    if not condition <= max_condition:
+        raise SingularityError(
+            "the actuated joints do not move all of the mechanism here: condition "
+            f"{condition:.3g}, and at most {max_condition:.3g} is accepted",
+            condition,
+            max_condition,
+        )
+    return np.asarray(np.linalg.solve(of_actuators.T, reduced), np.float64)

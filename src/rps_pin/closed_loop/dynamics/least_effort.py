@@ -1,12 +1,13 @@
-"""Actuator forces of least effort, and what no actuator can produce.
+"""Actuator forces of least effort, and the residual force of an underactuated mechanism.
 
-The motions N that the closures allow (J N = 0) do not feel the closures' forces, and leave of
-S' tau + J' lambda = f only
+The closures' forces do no work in the null space N of J, which leaves of S' tau + J' lambda = f
+only
 
     (S N)' tau = N' f.
 
-With more actuators than mobility many tau do it: that of least |W tau| is meant. With fewer, or
-with actuators that do not move all of the mechanism, in general none does: then tau misses least.
+With more actuators than mobility many tau solve it: that of least |W tau| is meant. With fewer, or
+with actuators that do not move all of the mechanism, in general none does: then tau is the
+least-squares solution.
 """
 
 from __future__ import annotations
@@ -17,16 +18,19 @@ from rps_pin.arrays import Array
 from rps_pin.errors import SingularityError
 from rps_pin.numerics.linear_algebra import full_svd, rank
 
+#: Part of N' f that the actuators may leave, relative to it, before there is a residual force.
+RESIDUAL = 1e-9
+
 
 class LeastEffort(NamedTuple):
-    """The actuator forces of least effort, and all others: tau + free y do the same for any y."""
+    """Actuator forces of least effort, and all others: tau + free y act the same for any y."""
 
     tau: Array
-    """Shape (na,); of all tau that miss least, that of least |W tau|."""
+    """Shape (na,); of all least-squares solutions, that of least |W tau|."""
     missing: Array
     """N' f - (S N)' tau, shape (m,): zero but for rounding if the actuators can do it."""
     free: Array
-    """Basis of the tau that no allowed motion feels, shape (na, na - rank), W free orthonormal."""
+    """Basis of the tau without work in any allowed motion, (na, na - rank), W free orthonormal."""
     values: Array
     """Singular values of W^-1 S N, largest first, shape (min(na, m),)."""
 
@@ -39,8 +43,8 @@ def least_effort(
     Parameters
     ----------
     actuator_motions
-        S N, shape (na, m): what the actuators move by in each allowed motion. Where they cannot do
-        all, tau is the least-squares solution; N should then be orthonormal in comparable units.
+        S N, shape (na, m): the actuators' velocities in each allowed motion. Of an underactuated
+        mechanism, N should be orthonormal in comparable units.
     reduced_force
         N' f, shape (m,).
     weights
@@ -59,13 +63,12 @@ def least_effort(
     return LeastEffort(tau, missing, free, values)
 
 
-def unproduced_force(motions: Array, missing: Array, scale: Array) -> Array:
+def residual_force(motions: Array, missing: Array, scale: Array) -> Array:
     """Return the smallest generalised force that would have to be added, shape (nv,).
 
     With D = diag(scale) and tau, lambda that make |D (f - S' tau - J' lambda)| least, this is
-    f - S' tau - J' lambda, where lambda is free to be anything. It is zero on the actuated rows,
-    the allowed motions feel exactly what is missing of it (N' u = missing), and D u is orthogonal
-    to all that actuators and closures can produce.
+    f - S' tau - J' lambda, for any lambda. It is zero on the actuated rows, N' u = missing, and D u
+    is orthogonal to all that actuators and closures can produce.
 
     Parameters
     ----------

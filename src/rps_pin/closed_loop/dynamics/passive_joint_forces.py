@@ -1,11 +1,11 @@
-"""What a joint does to its own motion: viscous damping, dry friction, springs.
+"""Passive joint forces: viscous damping, dry friction, springs.
 
 They resist the motion with the generalised force
 
     e(q, v) = d v + f tanh(v / v_s) + k (q - q_0),
 
 which adds to what `rnea` returns. Dry friction is smooth: it reaches 76 % of f at the speed v_s,
-and creeps below it instead of sticking. Rotor inertia is no matter of this file: set
+and creeps below it instead of sticking. Rotor inertia is not a passive force: set
 ``model.armature``, which Pinocchio's algorithms include.
 """
 
@@ -23,7 +23,7 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number, tanh
-from rps_pin.validation import real_vector
+from rps_pin.validation import positive_number, real_vector
 
 #: rad/s or m/s.
 FRICTION_SPEED = 1e-2
@@ -83,8 +83,7 @@ class JointEffects:
                 raise InputError(f"{name} must not be negative: entry {int(array.argmin())} is")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
-        if not 0 < self.friction_speed < np.inf:
-            raise InputError(f"friction_speed = {self.friction_speed}: it must be positive")
+        positive_number(self.friction_speed, "friction_speed", "rad/s or m/s")
 
     @classmethod
     def named(
@@ -128,7 +127,12 @@ class JointEffects:
     def force(self, q: Array, v: Array, q_of_v: Indices) -> Array:
         """Return e(q, v), shape (nv,); `q_of_v` from `coordinate_indices`."""
         force: Array = friction_force(v, self.damping, self.friction, self.friction_speed)
-        force += self.stiffness * (q[q_of_v] - self.rest)
+        force += self.springs(q, q_of_v)
+        return force
+
+    def springs(self, q: Array, q_of_v: Indices) -> Array:
+        """Return the springs' part of e(q, v), shape (nv,)."""
+        force: Array = self.stiffness * (q[q_of_v] - self.rest)
         return force
 
     def slopes(self, v: Array) -> tuple[Array, Array]:
@@ -137,7 +141,7 @@ class JointEffects:
         return self.stiffness, slope
 
     def energy(self, q: Array, q_of_v: Indices) -> float:
-        """Return what the springs hold, k (q - q_0)^2 / 2, J."""
+        """Return the energy of the springs, k (q - q_0)^2 / 2, J."""
         return float(self.stiffness @ (q[q_of_v] - self.rest) ** 2) / 2
 
 
@@ -149,16 +153,16 @@ def coordinate_indices(model: pin.Model) -> Indices:
     """
     indices = np.zeros(model.nv, dtype=np.intp)
     for joint in list(model.joints)[1:]:
-        own = np.arange(joint.nv) if joint.nq == joint.nv else np.zeros(joint.nv, np.intp)
-        indices[joint.idx_v : joint.idx_v + joint.nv] = joint.idx_q + own
+        offsets = np.arange(joint.nv) if joint.nq == joint.nv else np.zeros(joint.nv, np.intp)
+        indices[joint.idx_v : joint.idx_v + joint.nv] = joint.idx_q + offsets
     return indices
 
 
 def refuse_springs(model: pin.Model, effects: JointEffects) -> None:
     """Raise `MechanismError` if a spring acts on a joint of several coordinates."""
     for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
-        own = effects.stiffness[joint.idx_v : joint.idx_v + joint.nv]
-        if own.any() and not joint.nq == joint.nv == 1:
+        stiffness = effects.stiffness[joint.idx_v : joint.idx_v + joint.nv]
+        if stiffness.any() and not joint.nq == joint.nv == 1:
             raise MechanismError(f"stiffness: joint {name!r} has {joint.nq} coordinates, not one")
 
 

@@ -6,6 +6,7 @@ and move along the manifold by `pin.integrate` alone, written q (+) v here.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
@@ -16,9 +17,14 @@ from scipy.integrate import DOP853
 from rps_pin.arrays import Array
 from rps_pin.errors import SingularityError
 
+#: Weights of the stages of `rk4_step`, for integrals along a step.
+RK4_WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+#: Of the work among the entries of an adaptive step.
+_SCALE = 1e-100
+
 
 class Acceleration(Protocol):
-    """What moves the mechanism: (t, q, v) to a, shape (nv,)."""
+    """Function of (t, q, v) that returns the acceleration a, shape (nv,)."""
 
     def __call__(self, t: float, q: Array, v: Array) -> Array:
         """Return the acceleration."""
@@ -52,7 +58,7 @@ def rk4_step(
     step
         h, s.
     first
-        The acceleration at the start, if it is known already.
+        The acceleration at the start; computed if left out.
     """
     q, v = state
     h, plus = step, pin.integrate
@@ -69,7 +75,7 @@ def rk4_step(
 
 
 class AdaptiveStepper:
-    """Steps of DOP853 (order 8, error kept by order 5 and 3), each in coordinates of its own.
+    """Steps of DOP853 (order 8, error estimated by orders 5 and 3), each in its own coordinates.
 
     Around the configuration q_0 that a step starts from, q = q_0 (+) u, and
 
@@ -92,6 +98,7 @@ class AdaptiveStepper:
         self._model, self._tolerance, self._next = model, tolerance, first_step
         joints = list(model.joints)[1:]
         self._flat = all(joint.nv in (joint.nq, 1) for joint in joints)
+        self.work: Callable[[float], float] = lambda time: 0.0
 
     def step(
         self,
@@ -99,8 +106,12 @@ class AdaptiveStepper:
         t: float,
         state: tuple[Array, Array],
         until: float,
+        power: Callable[[], float] = lambda: 0.0,
     ) -> tuple[float, Callable[[float], tuple[Array, Array]]]:
-        """Take one step, not beyond `until`; return where it ends and the state at times within.
+        """Take one step, not beyond `until`; return its end and the state at times within.
+
+        `power` returns the power at the last call of `acceleration`. Its integral from the start of
+        the step to a time within is ``work(time)`` afterwards; the step length ignores its error.
 
         Raises
         ------
@@ -111,30 +122,39 @@ class AdaptiveStepper:
         start, v_start = state
 
         def slope(time: float, y: Array) -> Array:
-            u, v = y[:nv], y[nv:]
+            u, v = y[:nv], y[nv:-1]
             a = acceleration(time, pin.integrate(model, start, u), v)
-            return np.concatenate([self._chart_rate(start, u, v), a])
+            return np.concatenate([self._chart_rate(start, u, v), a, [_SCALE * power()]])
 
+        # The work is scaled so that its error counts for nothing; DOP853 takes the root mean square
+        # of all errors, which one more entry does not change then.
+        tolerance = self._tolerance * math.sqrt(2 * nv / (2 * nv + 1))
         solver = DOP853(
             slope,
             t,
-            np.concatenate([np.zeros(nv), v_start]),
+            np.concatenate([np.zeros(nv), v_start, [0.0]]),
             until,
-            rtol=self._tolerance,
-            atol=self._tolerance,
+            rtol=tolerance,
+            atol=tolerance,
             first_step=min(self._next, until - t),
         )
         message = solver.step()
         if solver.status == "failed":
             raise SingularityError(f"no step is short enough: {message}", np.inf, np.inf)
         if solver.h_abs >= self._next or solver.t < until:
-            self._next = solver.h_abs  # one cut short by `until` says nothing about the next
+            self._next = solver.h_abs  # one cut short by `until` does not tell about the next
         interpolant = solver.dense_output() if solver.t > t else None
 
-        def at(time: float) -> tuple[Array, Array]:
-            y = solver.y if time == solver.t or interpolant is None else interpolant(time)
-            return pin.integrate(model, start, y[:nv]), np.array(y[nv:])
+        def values(time: float) -> Array:
+            if time == solver.t or interpolant is None:
+                return np.asarray(solver.y, np.float64)
+            return np.asarray(interpolant(time), np.float64)
 
+        def at(time: float) -> tuple[Array, Array]:
+            y = values(time)
+            return pin.integrate(model, start, y[:nv]), np.array(y[nv:-1])
+
+        self.work = lambda time: float(values(time)[-1] / _SCALE)
         return float(solver.t), at
 
     def _chart_rate(self, start: Array, u: Array, v: Array) -> Array:

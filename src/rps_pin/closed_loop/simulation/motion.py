@@ -1,26 +1,22 @@
-"""A mechanism's motion under its actuators and wrenches, before it is divided into steps.
+"""Motion of a mechanism under actuator forces and wrenches, for `simulate` and `Stepper`.
 
-What `simulation` and `stepping` share: the forces that act, the acceleration they give, and the
-closed state that a motion starts from.
+The applied forces, the acceleration they give, and the closed state that a motion starts from.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.manifold import ClosedManifold
 from rps_pin.errors import ClosureError, InputError, SingularityError
 from rps_pin.validation import real_vector
-
-if TYPE_CHECKING:
-    from rps_pin.closed_loop.model import ClosedLoopModel
 
 State = tuple[Array, Array]
 Controller = Callable[[float, Array, Array], ArrayLike]
@@ -36,14 +32,14 @@ class Drive:
 
     def __init__(
         self,
-        mechanism: ClosedLoopModel,
+        system: ConstraintSystem,
         controller: Controller | None,
         tau: ArrayLike | None,
         wrenches: Wrenches | WrenchesInTime | None,
     ) -> None:
         if controller is not None and tau is not None:
             raise InputError("give a controller or constant forces tau, not both")
-        self._controller, self._size = controller, mechanism.actuated_indices.size
+        self._controller, self._size = controller, system.actuated.size
         given = np.zeros(self._size) if tau is None else tau
         self.tau = real_vector(given, self._size, "tau").copy()
         self._wrenches = wrenches
@@ -63,10 +59,12 @@ class Drive:
 class Motion:
     """The dynamics under a drive, on a manifold that each finished step returns to."""
 
-    def __init__(self, mechanism: ClosedLoopModel, start: State, drive: Drive, gain: float) -> None:
-        self.model, self._drive, self._gain = mechanism.model, drive, gain
-        self._manifold = ClosedManifold(mechanism, start[0])
+    def __init__(self, system: ConstraintSystem, start: State, drive: Drive, gain: float) -> None:
+        self.model, self._drive, self._gain = system.model, drive, gain
+        self._manifold = ClosedManifold(system, start[0])
         self.gap = self._manifold.gap
+        #: Of the applied forces (see `ClosedManifold.acceleration`) at the last acceleration, W.
+        self.power = 0.0
 
     def acceleration(self, t: float, q: Array, v: Array) -> Array:
         """Return a, shape (nv,).
@@ -78,10 +76,11 @@ class Motion:
         """
         refuse_infinite(q, v)
         wrenches = self._drive.wrenches(t, q, v)
-        return self._manifold.acceleration(q, v, self._drive.tau, wrenches, self._gain)
+        a, self.power = self._manifold.acceleration(q, v, self._drive.tau, wrenches, self._gain)
+        return a
 
     def finish(self, state: State) -> tuple[State, float]:
-        """Return the state projected, unless Baumgarte's way was chosen, and its largest gap.
+        """Return the state, projected unless Baumgarte's method was chosen, and its largest gap.
 
         Raises
         ------
@@ -108,23 +107,22 @@ def refuse_infinite(q: Array, v: Array) -> None:
         )
 
 
-def closed_start(mechanism: ClosedLoopModel, q: ArrayLike, v: ArrayLike | None) -> State:
+def closed_start(system: ConstraintSystem, q: ArrayLike, v: ArrayLike | None) -> State:
     """Return the initial state closed to rounding error, or say how far open it is."""
-    nv = mechanism.model.nv
-    q_ = real_vector(q, mechanism.model.nq, "q")
+    nv, equations = system.model.nv, system.equations
+    q_ = real_vector(q, system.model.nq, "q")
     v_ = np.zeros(nv) if v is None else real_vector(v, nv, "v")
-    gap = mechanism.loop_gap(q_)
-    if not gap <= OPEN * max(1.0, mechanism.characteristic_length):
+    gap = equations.largest_gap(equations.gaps(q_))
+    if not gap <= OPEN * max(1.0, equations.length):
         raise ClosureError(
             f"the loops are open by {gap:.3g} m at the start; close them with close() first", gap
         )
-    rates = mechanism.jacobian(q_) @ v_
-    opening = float(np.abs(rates).max(initial=0.0))
+    opening = float(np.abs(equations.jacobian(q_) @ v_).max(initial=0.0))
     if opening > _OPENING * max(1.0, float(np.abs(v_).max(initial=0.0))):
         raise ClosureError(
             f"v opens the loops at {opening:.3g} m/s (or rad/s) at the start; make it with "
             "velocity() first",
             opening,
         )
-    q_, v_, _ = ClosedManifold(mechanism, q_).project(q_, v_)
+    q_, v_, _ = ClosedManifold(system, q_).project(q_, v_)
     return q_.copy(), v_.copy()

@@ -1,4 +1,4 @@
-"""What a simulation returns: a motion as arrays, a row for each recorded time."""
+"""Result of a simulation: a motion as arrays, a row for each recorded time."""
 
 from __future__ import annotations
 
@@ -59,7 +59,11 @@ class Simulation:
         The joints that left their limits on the way, which nothing keeps them from, in the order
         in which they did.
     q_names, v_names, tau_names : tuples of str
-        What the columns are, for tables.
+        Names of the columns, for tables.
+    work : (n,) array
+        Work done since the start by what adds or takes energy, J: actuator forces, external
+        wrenches, damping and friction (negative where it takes). Integrated along the steps, to
+        their order.
     """
 
     time: Array
@@ -75,6 +79,13 @@ class Simulation:
     q_names: tuple[str, ...]
     v_names: tuple[str, ...]
     tau_names: tuple[str, ...]
+    work: Array
+
+    @property
+    def energy_balance(self) -> Array:
+        """Energy less the work done, zero at the start, shape (n,), J: the integration's error."""
+        balance: Array = self.energy - self.energy[:1] - self.work
+        return balance
 
     @property
     def energy(self) -> Array:
@@ -93,10 +104,10 @@ class Simulation:
             *(f"v_{name}" for name in self.v_names),
             *(f"a_{name}" for name in self.v_names),
             *(f"tau_{name}" for name in self.tau_names),
-            *("kinetic", "potential", "gap"),
+            *("kinetic", "potential", "gap", "work"),
         ]
         columns = [self.time, self.q, self.v, self.a, self.tau]
-        columns += [self.kinetic, self.potential, self.gap]
+        columns += [self.kinetic, self.potential, self.gap, self.work]
         if self.constraint_forces is not None:
             names += [f"lambda_{row}" for row in range(self.constraint_forces.shape[1])]
             columns.append(self.constraint_forces)
@@ -109,7 +120,7 @@ class Simulation:
         """Write the arrays under their names for `numpy.load`, whole or not at all."""
         arrays: dict[str, Any] = {
             name: getattr(self, name)
-            for name in ("time", "q", "v", "a", "tau", "kinetic", "potential", "gap")
+            for name in ("time", "q", "v", "a", "tau", "kinetic", "potential", "gap", "work")
         }
         if self.constraint_forces is not None:
             arrays["constraint_forces"] = self.constraint_forces
@@ -130,6 +141,7 @@ class Sample(NamedTuple):
     energies: tuple[float, float]
     gap: float
     constraint_forces: Array | None
+    work: float
 
 
 class Recorder:
@@ -188,4 +200,5 @@ class Recorder:
             q_names=self._q_names,
             v_names=self._v_names,
             tau_names=self._tau_names,
+            work=np.array([row.work for row in rows]),
         )

@@ -1,25 +1,32 @@
-"""Simulation: a mechanism's motion in time under its actuators, its loops kept closed.
+"""Simulation of a mechanism's motion in time, its loops kept closed.
 
-The state (q, v) moves by the reduced dynamics of `closed_manifold`, in steps of `integrators`. With
+The state (q, v) moves by the reduced dynamics of `manifold`, in steps of `integrators`. With
 ``closing="projection"`` each step ends with a projection to the closed configurations and the
 velocities that keep them closed: gaps stay at rounding error, and since the correction is as small
 as the step's own error the order of the method stays what it is. With ``closing="baumgarte"``
-nothing is projected; gaps that the steps' errors open die out like exp(-alpha t), and stand at what
-is opened anew in the meantime.
+nothing is projected; gaps that the steps' errors open decay like exp(-alpha t), and stay at the
+size where as much is opened as decays.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.system import ConstraintSystem, Mechanism
+from rps_pin.closed_loop.dynamics.generalised_forces import energy
+from rps_pin.closed_loop.dynamics.inverse_dynamics import constraint_forces
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
-from rps_pin.closed_loop.simulation.integrators import AdaptiveStepper, rk4_step, times
+from rps_pin.closed_loop.simulation.integrators import (
+    RK4_WEIGHTS,
+    AdaptiveStepper,
+    rk4_step,
+    times,
+)
 from rps_pin.closed_loop.simulation.motion import (
     Controller,
     Drive,
@@ -29,18 +36,15 @@ from rps_pin.closed_loop.simulation.motion import (
     closed_start,
 )
 from rps_pin.closed_loop.simulation.result import Recorder, Sample, Simulation
-from rps_pin.errors import InputError, RPSPinError
-
-if TYPE_CHECKING:
-    from rps_pin.closed_loop.model import ClosedLoopModel
-
+from rps_pin.errors import RPSPinError
+from rps_pin.validation import choice, positive_number, whole_number
 
 #: How often `progress` is called, about.
 _PROGRESS_CALLS = 200
 
 
 def simulate(
-    mechanism: ClosedLoopModel,
+    mechanism: Mechanism,
     q: ArrayLike,
     v: ArrayLike | None = None,
     *,
@@ -59,15 +63,16 @@ def simulate(
 ) -> Simulation:
     """Return the motion of a mechanism from a closed state.
 
-    Joint limits are not enforced; `Simulation.limits_passed` tells when a joint first left its own.
+    Joint limits are not enforced; `Simulation.limits_passed` tells when a joint first left its
+    limits.
 
     Parameters
     ----------
     mechanism
-        What moves. Its scratch memory is used: simulate it from one thread at a time.
+        The mechanism. Its scratch memory is used: simulate it from one thread at a time.
     q, v
         Closed configuration (nq,), and a velocity that keeps it closed (nv,); at rest if left out.
-        What rounding left open is closed before the start.
+        Gaps of rounding error are closed before the start.
     duration
         s; positive.
     step
@@ -81,19 +86,19 @@ def simulate(
         rows between are interpolated to order 7 and projected.
     controller
         ``controller(t, q, v)`` returns tau (na,). It is called once at the beginning of each
-        `step`, its answer held to the end of it, as by a real one, and once at the end.
+        `step`, its result held to the end of it, as in a sampled controller, and once at the end.
     tau
         Constant actuator forces, shape (na,), instead of a controller; zero if left out.
     wrenches
         External wrenches by frame name, as for `ClosedLoopModel.inverse_dynamics`; or a function
         of (t, q, v) that returns them, smooth in time, called at every stage of a step.
     closing
-        ``"projection"`` keeps the loops closed to 1e-12 m; ``"baumgarte"`` pulls them together.
+        ``"projection"`` keeps the loops closed to 1e-12 m; ``"baumgarte"`` stabilises them.
     tolerance
         Relative and absolute error per step of ``"adaptive"``.
     baumgarte_gain
-        alpha, 1/s; positive. More is not better: what the stages of a step see as open grows with
-        alpha^2, and fixed steps are unstable for alpha * step above about 2.
+        alpha, 1/s; positive. More is not better: the correction of the gaps within a step grows
+        with alpha^2, and fixed steps are unstable for alpha * step above about 2.
     record_every
         One row of so many steps is recorded, and the last.
     forces
@@ -104,9 +109,8 @@ def simulate(
     Returns
     -------
     Simulation
-        The motion. Where it breaks off, the rows until then are in the error's attribute
-        ``partial``, a `Simulation`: of the errors below, and of whatever else passes through, an
-        exception of the controller's own or Ctrl-C.
+        The motion. Where it breaks off, the rows until then are in the exception's attribute
+        ``partial``, a `Simulation`: for the errors below, exceptions of the controller, and Ctrl-C.
 
     Raises
     ------
@@ -119,26 +123,23 @@ def simulate(
         If the motion is not determined any more (see `ClosedLoopModel.forward_dynamics`), if it
         grows beyond all numbers, or no step is short enough for the tolerance; says when.
     """
-    _check_choices(method, closing)
-    for name, number in (
-        ("duration", duration),
-        ("step", step),
-        ("tolerance", tolerance),
-        ("baumgarte_gain", baumgarte_gain),
-    ):
-        if not 0 < number < math.inf:
-            raise InputError(f"{name} = {number}: it must be positive and finite")
-    if record_every < 1:
-        raise InputError(f"record_every = {record_every}: it must be at least 1")
-    drive = Drive(mechanism, controller, tau, wrenches)
-    start = closed_start(mechanism, q, v)
-    motion = Motion(mechanism, start, drive, baumgarte_gain if closing == "baumgarte" else 0.0)
+    choice(method, "method", ("rk4", "adaptive"))
+    choice(closing, "closing", ("projection", "baumgarte"))
+    positive_number(duration, "duration", "s")
+    positive_number(step, "step", "s")
+    positive_number(tolerance, "tolerance")
+    positive_number(baumgarte_gain, "baumgarte_gain", "1/s")
+    whole_number(record_every, "record_every")
+    system = mechanism.system
+    drive = Drive(system, controller, tau, wrenches)
+    start = closed_start(system, q, v)
+    motion = Motion(system, start, drive, baumgarte_gain if closing == "baumgarte" else 0.0)
     advance: _Advance = _Fixed(motion)
     if method == "adaptive":
-        stepper = AdaptiveStepper(mechanism.model, tolerance, min(step, duration))
+        stepper = AdaptiveStepper(system.model, tolerance, min(step, duration))
         advance = _Adaptive(motion, stepper, start, None if controller else duration)
-    recorder = Recorder(mechanism.model, mechanism.actuated_indices)
-    time, shown = 0.0, 0.0
+    recorder = Recorder(system.model, system.actuated)
+    time, shown, work = 0.0, 0.0, 0.0
     try:
         state, gap = start, motion.gap(start[0])
         for k, time, following in _intervals(duration, step):
@@ -147,11 +148,12 @@ def simulate(
             with np.errstate(over="ignore", invalid="ignore"):  # refused in words
                 a = motion.acceleration(time, *state)
             if k % record_every == 0 or following is None:
-                recorder.add(_sample(mechanism, drive, time, state, a, gap, forces))
+                recorder.add(_sample(system, drive, (time, *state), a, gap, work, forces))
             if following is None:
                 break
             with np.errstate(over="ignore", invalid="ignore"):
-                state, gap = advance(time, state, following, a)
+                state, gap, done = advance(time, state, following, a)
+            work += done
             if progress and following / duration >= shown + 1 / _PROGRESS_CALLS:
                 shown = following / duration
                 progress(shown)
@@ -171,28 +173,37 @@ def simulate(
 class _Advance(Protocol):
     def __call__(
         self, time: float, state: State, following: float, a: Array
-    ) -> tuple[State, float]: ...
+    ) -> tuple[State, float, float]:
+        """Return the state at the following time, its gap, and the work done on the way."""
 
 
 class _Fixed:
-    """One step of the fixed kind."""
+    """One step of fixed length."""
 
     def __init__(self, motion: Motion) -> None:
         self._motion = motion
+        self._powers: list[float] = []
 
     def __call__(
         self, time: float, state: State, following: float, a: Array
-    ) -> tuple[State, float]:
-        motion = self._motion
-        step = following - time
-        return motion.finish(rk4_step(motion.model, motion.acceleration, time, state, step, a))
+    ) -> tuple[State, float, float]:
+        motion, step = self._motion, following - time
+        self._powers = [motion.power]  # at the start, where a comes from
+        moved = rk4_step(motion.model, self._acceleration, time, state, step, a)
+        work = step * sum(w * p for w, p in zip(RK4_WEIGHTS, self._powers, strict=True))
+        return *motion.finish(moved), work
+
+    def _acceleration(self, t: float, q: Array, v: Array) -> Array:
+        a = self._motion.acceleration(t, q, v)
+        self._powers.append(self._motion.power)
+        return a
 
 
 class _Adaptive:
     """As many adaptive steps as it takes.
 
-    With a `horizon`, steps go on from each other, on to it, and the states asked for on the way
-    are interpolated; without, each interval is a problem of its own, starting from its state.
+    With a `horizon`, steps continue from each other, on to it, and the states asked for on the way
+    are interpolated; without, each interval is a separate problem, starting from its state.
     """
 
     def __init__(
@@ -201,22 +212,27 @@ class _Adaptive:
         self._motion, self._stepper, self._horizon = motion, stepper, horizon
         self._time, self._state, self._gap = 0.0, start, 0.0
         self._at: Callable[[float], State] = lambda _: start
+        self._power: Callable[[], float] = lambda: motion.power
 
     def __call__(
         self, time: float, state: State, following: float, a: Array
-    ) -> tuple[State, float]:
+    ) -> tuple[State, float, float]:
         if self._horizon is None:
             self._time, self._state = time, state
         until = following if self._horizon is None else self._horizon
+        work = -self._stepper.work(time) if self._time > time else 0.0
         while self._time < following:
+            if self._time > time:
+                work += self._stepper.work(self._time)
             end, self._at = self._stepper.step(
-                self._motion.acceleration, self._time, self._state, until
+                self._motion.acceleration, self._time, self._state, until, self._power
             )
             self._time = end
             self._state, self._gap = self._motion.finish(self._at(end))
+        work += self._stepper.work(following)
         if following == self._time:
-            return self._state, self._gap
-        return self._motion.finish(self._at(following))
+            return self._state, self._gap, work
+        return *self._motion.finish(self._at(following)), work
 
 
 def _intervals(duration: float, step: float) -> list[tuple[int, float, float | None]]:
@@ -226,30 +242,18 @@ def _intervals(duration: float, step: float) -> list[tuple[int, float, float | N
     return [(k, t, after) for (k, t), after in zip(grid, [*following, None], strict=True)]
 
 
-# Start and record ---------------------------------------------------------------------------------
-
-
-def _check_choices(method: str, closing: str) -> None:
-    for name, given, choices in (
-        ("method", method, ("rk4", "adaptive")),
-        ("closing", closing, ("projection", "baumgarte")),
-    ):
-        if given not in choices:
-            raise InputError(f"{name} = {given!r}; it must be {' or '.join(map(repr, choices))}")
-
-
 def _sample(
-    mechanism: ClosedLoopModel,
+    system: ConstraintSystem,
     drive: Drive,
-    time: float,
-    state: State,
+    at: tuple[float, Array, Array],
     a: Array,
     gap: float,
+    work: float,
     forces: bool,
 ) -> Sample:
-    q, v = state
+    time, q, v = at
     multipliers = None
     if forces:
         wrenches = drive.wrenches(time, q, v)
-        multipliers = mechanism.constraint_forces(q, v, a, drive.tau, wrenches=wrenches)
-    return Sample(time, q, v, a, drive.tau, mechanism.energy(q, v), gap, multipliers)
+        multipliers = constraint_forces(system, q, v, a, drive.tau, wrenches)
+    return Sample(time, q, v, a, drive.tau, energy(system, q, v), gap, multipliers, work)

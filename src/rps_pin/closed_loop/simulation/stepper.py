@@ -1,30 +1,24 @@
-"""A mechanism simulated step by step: for loops that belong to someone else."""
+"""Simulation of a mechanism step by step, for a caller's own loop."""
 
 from __future__ import annotations
-
-from numbers import Integral
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.closed_loop.constraints.system import Mechanism
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.integrators import rk4_step
 from rps_pin.closed_loop.simulation.motion import Drive, Motion, WrenchesInTime, closed_start
-from rps_pin.errors import InputError
-from rps_pin.validation import real_vector
-
-if TYPE_CHECKING:
-    from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.validation import positive_number, real_vector, whole_number
 
 
 class Stepper:
-    """What `simulate` does with fixed steps and projection, one call at a time.
+    """Simulation with fixed steps and projection, as `simulate` does it, one call at a time.
 
     Parameters
     ----------
     mechanism
-        What moves. Its scratch memory is used: one thread at a time.
+        The mechanism. Its scratch memory is used: one thread at a time.
     q, v
         Closed configuration (nq,), and a velocity that keeps it closed (nv,); at rest if left out.
     wrenches
@@ -49,15 +43,16 @@ class Stepper:
 
     def __init__(
         self,
-        mechanism: ClosedLoopModel,
+        mechanism: Mechanism,
         q: ArrayLike,
         v: ArrayLike | None = None,
         *,
         wrenches: Wrenches | WrenchesInTime | None = None,
     ) -> None:
-        self._drive = Drive(mechanism, None, None, wrenches)
-        self.q, self.v = closed_start(mechanism, q, v)
-        self._motion = Motion(mechanism, (self.q, self.v), self._drive, 0.0)
+        system = mechanism.system
+        self._drive = Drive(system, None, None, wrenches)
+        self.q, self.v = closed_start(system, q, v)
+        self._motion = Motion(system, (self.q, self.v), self._drive, 0.0)
         self.time, self.gap = 0.0, self._motion.gap(self.q)
 
     def advance(self, tau: ArrayLike, duration: float, steps: int = 1) -> None:
@@ -81,10 +76,8 @@ class Stepper:
         ClosureError
             If a step is so long that the loops cannot be closed any more.
         """
-        if not 0 < duration < np.inf:
-            raise InputError(f"duration = {duration}: it must be positive and finite")
-        if not isinstance(steps, Integral) or isinstance(steps, bool) or steps < 1:
-            raise InputError(f"steps = {steps!r}: it must be a whole number, 1 or more")
+        positive_number(duration, "duration", "s")
+        whole_number(steps, "steps")
         self._drive.tau = real_vector(tau, self._drive.tau.size, "tau").copy()
         motion, step = self._motion, duration / steps
         start, state, gap = self.time, (self.q, self.v), self.gap

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
-from rps_pin.closed_loop.dynamics.kinematics import MAX_CONDITION
+from rps_pin.closed_loop.constraints.system import MAX_CONDITION
 from rps_pin.errors import InputError, SingularityError
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips as ring

@@ -1,7 +1,7 @@
-"""The loops of a tree: how far open they are, and how they change with the joints.
+"""Closure equations of a tree: gaps, Jacobian and constraint bias.
 
-With e(q) the gaps of all closures, one below the other, J v is their rate (in the rows that
-`closure_rows` describes) and J a + J' v their acceleration, J' being the derivative of J.
+With e(q) the gaps of all closures, stacked, J v is their rate (in the rows that `rows` describes)
+and J a + J' v their acceleration, J' being the derivative of J. J' v is the constraint bias.
 
 Rows of spherical and rigid closures are in *world* axes at frame a's origin, those of the other
 kinds in *frame a's* axes at its origin; forces come before moments.
@@ -9,23 +9,35 @@ kinds in *frame a's* axes at its origin; forces come before moments.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from rps_pin.arrays import Array, Bools
+from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure
-from rps_pin.closed_loop.constraints.rows import Rows, rows_of
+from rps_pin.closed_loop.constraints.rows import Floats, Rows, rows_of
 from rps_pin.errors import InputError, MechanismError, shown
+from rps_pin.validation import positive_number
 
 _WORLD_AXES = ("spherical", "rigid")
 _WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+_THREE, _NINE = Struct("3d").unpack_from, Struct("9d").unpack_from
+
+_Reader = Callable[[], Floats]
+_OpenTest = tuple[_Reader, _Reader, Callable[[Floats, Floats], float]]
+
+#: A configuration counts as open beyond this gap, in characteristic lengths. Forces at a smaller
+#: gap have a relative error of about its size, and steps of finite differences stay below it.
+OPEN = 1e-4
 
 
 class LoopErrors(NamedTuple):
-    """How far the loops are from being closed; the rows are those of the closures in order."""
+    """Gaps of the loops, their rates and accelerations; rows as the closures' in order."""
 
     position: Array
     """Gaps, shape (nc,), m; for angular rows the rotation vector between the frames, rad."""
@@ -37,7 +49,7 @@ class LoopErrors(NamedTuple):
 
 
 class _Coupled(NamedTuple):
-    """Where a coupling's coordinates stand."""
+    """Indices and numbers of a coupling."""
 
     q: tuple[int, int]
     v: tuple[int, int]
@@ -46,23 +58,23 @@ class _Coupled(NamedTuple):
 
 
 class ClosedFrames(NamedTuple):
-    """A closure of two frames among the loops."""
+    """A closure of two frames, its rows and Pinocchio's data."""
 
     closure: LoopClosure
     rows: slice
     """Its rows in J."""
     frame_a: int
     frame_b: int
-    kept: Rows
-    """Its rows in frame a's axes."""
+    selected: Rows
+    """The selected rows, in frame a's axes."""
     in_world: bool
     """Whether its rows in J are turned to world axes."""
     constraint_data: Any
-    """Pinocchio's; holds ``oMc1`` and ``c1Mc2`` once J is computed."""
+    """Pinocchio's; holds ``oMc1`` and ``c1Mc2`` once J or the gaps are computed."""
 
 
-class Loops:
-    """The closures of one model with the scratch memory that evaluating them takes.
+class ClosureEquations:
+    """The closure equations of one model, with the scratch memory to evaluate them.
 
     Parameters
     ----------
@@ -87,7 +99,7 @@ class Loops:
     data, calls, constraints, constraint_data
         For calling Pinocchio: `getConstraintsJacobian` reads what each of the `calls` refreshes.
     plain : bool
-        Whether what it returns is J already; `kept_rows` makes J of it otherwise.
+        Whether what it returns is J already; otherwise `select_rows` makes J of it.
     closed_frames : list of ClosedFrames
         The closures of frames; the rest are couplings.
 
@@ -123,15 +135,14 @@ class Loops:
         self.couplings: list[tuple[int, _Coupled]] = []
         self._add_couplings()
         self._add_constraints()
-        # Iterating a StdVec makes new Python objects each time; kept pairs cost a tenth.
+        # Iterating a StdVec makes new Python objects each time: ten times as slow as a list.
         self.calls = [
             (constraint.calc, data)
             for constraint, data in zip(self.constraints, self.constraint_data, strict=True)
         ]
         self._add_frames()
-        points = [frames for frames in self.closed_frames if frames.closure.kind == "spherical"]
-        self._points = [(frames.rows, frames.frame_a, frames.frame_b) for frames in points]
-        self._wholes = [frames for frames in self.closed_frames if frames not in points]
+        self._points = [f for f in self.closed_frames if f.closure.kind == "spherical"]
+        self._frames = [f for f in self.closed_frames if f.closure.kind != "spherical"]
         self.plain = bool(self.closed_frames) and not self.couplings
         self.plain = self.plain and all(frames.in_world for frames in self.closed_frames)
         self.length = self._length(characteristic_length)
@@ -139,10 +150,14 @@ class Loops:
         self.column_scale = np.where(angular, 1 / self.length, 1.0)
         self.angular_rows = np.zeros(self.size, dtype=bool)
         for frames in self.closed_frames:
-            self.angular_rows[frames.rows] = frames.kept.angular
+            self.angular_rows[frames.rows] = frames.selected.angular
         for row, coupled in self.couplings:
             self.angular_rows[row] = angular[coupled.v[0]]
         self.row_scale = np.where(self.angular_rows, self.length, 1.0)
+        self._groups = self._row_groups()
+        self._open_limit = (OPEN * self.length) ** 2
+        self._open_points, self._open_frames = self._open_tests()
+        self._only_spherical = len(self._open_points) == len(self.closures)
 
     def _add_couplings(self) -> None:
         for closure in self.closures:
@@ -193,44 +208,109 @@ class Loops:
         pin.computeJointJacobians(model, data, q)
         for calc, constraint_data in self.calls:
             calc(model, data, constraint_data)
-        return self.kept_rows(
+        return self.select_rows(
             pin.getConstraintsJacobian(model, data, self.constraints, self.constraint_data)
         )
 
-    def kept_rows(self, jacobian: Array) -> Array:
-        """Return J, shape (nc, nv), of what Pinocchio's `getConstraintsJacobian` returned."""
+    def select_rows(self, jacobian: Array) -> Array:
+        """Return J, shape (nc, nv), from what Pinocchio's `getConstraintsJacobian` returned."""
         if self.plain:
             return jacobian.reshape(self.size, self.model.nv)  # a single row or column comes flat
         rows = np.zeros((self.size, self.model.nv))
-        whole = jacobian.reshape(-1, self.model.nv)
+        all_rows = jacobian.reshape(-1, self.model.nv)
         start = 0
         for frames in self.closed_frames:
             stop = start + (3 if frames.closure.kind == "spherical" else 6)
-            block = whole[start:stop]
+            block = all_rows[start:stop]
             rows[frames.rows] = (
                 block
                 if frames.in_world
-                else frames.kept.wrenches(frames.constraint_data.c1Mc2) @ block
+                else frames.selected.wrenches(frames.constraint_data.c1Mc2) @ block
             )
             start = stop
         for row, coupled in self.couplings:
             rows[row, coupled.v[0]], rows[row, coupled.v[1]] = 1.0, -coupled.ratio
         return rows
 
+    # Gaps -----------------------------------------------------------------------------------------
+
     def gaps(self, q: Array) -> Array:
         """Return e(q), shape (nc,), m and rad."""
-        pin.framesForwardKinematics(self.model, self.data, q)
-        placements = self.data.oMf
+        pin.forwardKinematics(self.model, self.data, q)
+        for calc, constraint_data in self.calls:
+            calc(self.model, self.data, constraint_data)
+        return self.current_gaps(q)
+
+    def current_gaps(self, q: Array) -> Array:
+        """Return e(q), from the placements that `jacobian` or `gaps` has computed at q."""
         gaps = np.empty(self.size)
         for frames in self.closed_frames:
-            a, b = placements[frames.frame_a], placements[frames.frame_b]
-            gap = frames.kept.gap(a.actInv(b))
+            gap = frames.selected.gap(frames.constraint_data.c1Mc2)
             if frames.in_world:
-                gap = (gap.reshape(-1, 3) @ a.rotation.T).ravel()
+                gap = (gap.reshape(-1, 3) @ frames.constraint_data.oMc1.rotation.T).ravel()
             gaps[frames.rows] = gap
         for row, (at, _, ratio, offset) in self.couplings:
             gaps[row] = q[at[0]] - ratio * q[at[1]] - offset
         return gaps
+
+    def largest_gap(self, gaps: Array) -> float:
+        """Return the largest gap of a closure, m; angles with the length as lever."""
+        if not self.size:
+            return 0.0
+        scaled = self.row_scale * gaps
+        return math.sqrt(max(np.add.reduceat(scaled * scaled, self._groups).tolist()))
+
+    def is_open(self, q: Array) -> bool:
+        """Return whether a gap exceeds `OPEN`, after `jacobian` at q: fast, for control loops."""
+        limit = self._open_limit
+        for point in self._open_points:
+            x, y, z = point()
+            if not x * x + y * y + z * z <= limit:
+                return True
+        if self._only_spherical:
+            return False
+        for point, rotation, squared_gap in self._open_frames:
+            if not squared_gap(point(), rotation()) <= limit:
+                return True
+        for row, (at, _, ratio, offset) in self.couplings:
+            gap = self.row_scale[row] * (q[at[0]] - ratio * q[at[1]] - offset)
+            if not gap * gap <= limit:
+                return True
+        return False
+
+    def open_closure(self, gaps: Array) -> str:
+        """Return the closure of the largest gap, and the gap, in words."""
+        scaled = self.row_scale * gaps
+        largest = [np.linalg.norm(part) for part in np.split(scaled, self._groups[1:])]
+        row = int(self._groups[int(np.argmax(largest))])
+        name = next(c.name for c in self.closures if row < self.rows(c.name).stop)
+        found, angular = gaps[self.rows(name)], self.angular_rows[self.rows(name)]
+        turn, apart = float(np.linalg.norm(found[angular])), float(np.linalg.norm(found[~angular]))
+        parts = ""
+        if turn * self.length > 0.01 * apart:
+            parts = f" ({apart:.3g} m between its points, {turn:.3g} rad between its axes)"
+        return f"closure {name!r} stays open by {max(largest):.6g} m{parts}"
+
+    def _row_groups(self) -> Indices:
+        """Return the first row of each closure's linear and angular part."""
+        starts = {self.rows(closure.name).start for closure in self.closures}
+        starts |= set((np.flatnonzero(np.diff(self.angular_rows.astype(int))) + 1).tolist())
+        return np.array(sorted(starts), dtype=np.intp)
+
+    def _open_tests(self) -> tuple[list[_Reader], list[_OpenTest]]:
+        """Return what reads c1Mc2 of spherical closures; and of the others, with their gaps."""
+        points: list[_Reader] = []
+        others: list[_OpenTest] = []
+        for frames in self.closed_frames:
+            placement = frames.constraint_data.c1Mc2  # refers to Pinocchio's own memory
+            point = partial(_THREE, memoryview(placement.translation))
+            if frames.closure.kind == "spherical":
+                points.append(point)
+                continue
+            rotation = partial(_NINE, memoryview(placement.rotation.T))
+            squared_gap = partial(frames.selected.squared_gap, self.length)
+            others.append((point, rotation, squared_gap))
+        return points, others
 
     def errors(self, q: Array, v: Array, a: Array) -> LoopErrors:
         """Return gaps, their rates and their accelerations."""
@@ -239,50 +319,29 @@ class Loops:
         rates, accelerations = np.empty(self.size), np.empty(self.size)
         for frames in self.closed_frames:
             rates[frames.rows], accelerations[frames.rows] = (
-                self._world_motion(frames) if frames.in_world else self._kept_motion(frames)
+                self._world_motion(frames) if frames.in_world else self._selected_motion(frames)
             )
         for row, (_, at, ratio, _) in self.couplings:
             rates[row] = v[at[0]] - ratio * v[at[1]]
             accelerations[row] = a[at[0]] - ratio * a[at[1]]
         return LoopErrors(gaps, rates, accelerations)
 
-    def drift(self, q: Array, v: Array) -> Array:
-        """Return J' v, shape (nc,): what J a must cancel for the loops to stay closed.
+    def bias(self, q: Array, v: Array) -> Array:
+        """Return the constraint bias J' v, shape (nc,): J a = -J' v keeps the loops closed.
 
-        This is the derivative of J itself, also where the loops are open.
+        J' is the derivative of J itself, also where the loops are open.
         """
         model, data, acceleration = self.model, self.data, pin.getFrameClassicalAcceleration
         pin.forwardKinematics(model, data, q, v, self._still)
-        drift = np.zeros(self.size)
-        for rows, a, b in self._points:
-            drift[rows] = (
-                acceleration(model, data, a, _WORLD).linear
-                - acceleration(model, data, b, _WORLD).linear
+        bias = np.zeros(self.size)
+        for frames in self._points:
+            bias[frames.rows] = (
+                acceleration(model, data, frames.frame_a, _WORLD).linear
+                - acceleration(model, data, frames.frame_b, _WORLD).linear
             )
-        for frames in self._wholes:
-            drift[frames.rows] = self._kept_motion(frames)[1]
-        return drift
-
-    def worst(self, gaps: Array) -> tuple[float, str]:
-        """Return the largest gap (m; angles with the length as lever) and its closure's name."""
-        worst, name = 0.0, ""
-        scaled = self.row_scale * gaps
-        for closure in self.closures:
-            rows = self.rows(closure.name)
-            own, angular = scaled[rows], self.angular_rows[rows]
-            gap = float(max(np.linalg.norm(own[~angular]), np.linalg.norm(own[angular])))
-            if not gap <= worst:
-                worst, name = gap, closure.name
-        return worst, name
-
-    def parts(self, gaps: Array, name: str) -> str:
-        """Return a closure's gap in words where some of it is of directions; else ""."""
-        rows = self.rows(name)
-        own, angular = gaps[rows], self.angular_rows[rows]
-        turn, apart = float(np.linalg.norm(own[angular])), float(np.linalg.norm(own[~angular]))
-        if not turn * self.length > 0.01 * apart:
-            return ""
-        return f" ({apart:.3g} m between its points, {turn:.3g} rad between its axes)"
+        for frames in self._frames:
+            bias[frames.rows] = self._selected_motion(frames)[1]
+        return bias
 
     def _world_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
         """Return velocity and acceleration of a less those of b, each frame's at its own origin."""
@@ -296,22 +355,22 @@ class Loops:
             (accelerations[0] - accelerations[1]).vector[:size],
         )
 
-    def _kept_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
-        """Return J v and its derivative, J made of W and the twist X of a relative to b.
+    def _selected_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
+        """Return J v = W X and its derivative W A + W' X, X the twist of a relative to b.
 
-        They are W X and W A + W' X; turned to world axes by R, R (W X)' + R (w x W X).
+        In world axes, with R and w of frame a: R W X, and R (W X)' + R (w x W X).
         """
         placement, twist, acceleration, twist_a = self.relative_motion(frames)
-        wrenches = frames.kept.wrenches(placement)
+        wrenches = frames.selected.wrenches(placement)
         rate = wrenches @ twist
-        bend = wrenches @ acceleration + frames.kept.bend(placement, twist)
+        change = wrenches @ acceleration + frames.selected.bias(placement, twist)
         if not frames.in_world:
-            return rate, bend
+            return rate, change
         frame = self.model.frames[frames.frame_a]
         turn = self.data.oMi[frame.parentJoint].rotation @ frame.placement.rotation
-        rate, bend = rate.reshape(-1, 3), bend.reshape(-1, 3)
-        bend = bend + np.cross(twist_a.angular, rate)
-        return (rate @ turn.T).ravel(), (bend @ turn.T).ravel()
+        rate, change = rate.reshape(-1, 3), change.reshape(-1, 3)
+        change = change + np.cross(twist_a.angular, rate)
+        return (rate @ turn.T).ravel(), (change @ turn.T).ravel()
 
     def relative_motion(self, frames: ClosedFrames) -> tuple[pin.SE3, Array, Array, pin.Motion]:
         """Return b's placement in a, a's twist X relative to b, its derivative A, and a's twist.
@@ -319,17 +378,17 @@ class Loops:
         In a's axes at its origin, after a `forwardKinematics` with velocities and accelerations.
         """
         model, data = self.model, self.data
-        own = pin.ReferenceFrame.LOCAL
+        local = pin.ReferenceFrame.LOCAL
         placement_a, placement_b = (
             data.oMi[model.frames[frame].parentJoint] * model.frames[frame].placement
             for frame in (frames.frame_a, frames.frame_b)
         )
         placement = placement_a.actInv(placement_b)
-        twist_a = pin.getFrameVelocity(model, data, frames.frame_a, own)
-        twist_b = placement.act(pin.getFrameVelocity(model, data, frames.frame_b, own))
+        twist_a = pin.getFrameVelocity(model, data, frames.frame_a, local)
+        twist_b = placement.act(pin.getFrameVelocity(model, data, frames.frame_b, local))
         twist = twist_a - twist_b
-        a = pin.getFrameAcceleration(model, data, frames.frame_a, own)
-        b = placement.act(pin.getFrameAcceleration(model, data, frames.frame_b, own))
+        a = pin.getFrameAcceleration(model, data, frames.frame_a, local)
+        b = placement.act(pin.getFrameAcceleration(model, data, frames.frame_b, local))
         # d/dt (Ad_M nu_b) = Ad_M nu_b' + xi x (Ad_M nu_b), xi = -X; and X x nu_b = X x nu_a.
         acceleration = a - b + twist.cross(twist_a)
         return placement, twist.vector, acceleration.vector, twist_a
@@ -337,9 +396,7 @@ class Loops:
     def _length(self, given: float | None) -> float:
         """Return the given length, or the longest lever of a closure, or 1 m if there is none."""
         if given is not None:
-            if not (np.isfinite(given) and given > 0):
-                raise InputError(f"characteristic_length = {given}: it must be positive")
-            return float(given)
+            return positive_number(given, "characteristic_length", "m")
         levers = [
             float(np.linalg.norm(self.model.frames[frame].placement.translation))
             for frames in self.closed_frames
@@ -358,8 +415,8 @@ class Loops:
                 continue
             columns = slice(joint.idx_v, joint.idx_v + joint.nv)
             local = pin.getJointJacobian(self.model, self.data, index, pin.ReferenceFrame.LOCAL)
-            own = local.reshape(6, self.model.nv)[:, columns]
-            angular[columns] = np.abs(own[3:]).max(axis=0) > 1e-12
+            subspace = local.reshape(6, self.model.nv)[:, columns]
+            angular[columns] = np.abs(subspace[3:]).max(axis=0) > 1e-12
         return angular
 
 

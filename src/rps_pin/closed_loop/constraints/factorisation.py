@@ -1,0 +1,177 @@
+"""Factorisation of the passive joints' Jacobian J_p, memory allocated once.
+
+A mechanism with as many actuators as mobility has a J_p of full column rank. Where it is square, LU
+serves. With redundant rows it is taller than wide and, scaled to one unit and its columns permuted,
+J_p = Q R. Then
+
+- J_p' lambda = f_p has the solution of least norm lambda = Q R^-T f_p;
+- J_p x_p = b has the least-squares solution x_p = R^-1 Q' b, and b lies in the range of J_p if the
+  rest of Q' b vanishes.
+
+Near a singularity, and with more or fewer actuators than mobility, there is no such solution.
+"""
+
+from __future__ import annotations
+
+import math
+
+import eigenpy
+import numpy as np
+from scipy.linalg.blas import dasum, dtrsm
+from scipy.linalg.lapack import dgeqp3, dormqr
+
+from rps_pin.arrays import Array, Indices
+from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, condition_number, rank
+
+#: What no well conditioned J_p, in one unit, makes of a right side of 1.
+HUGE = 1e12
+
+
+class PassiveFactorisation:
+    """Solves J_p x_p = b and J_p' lambda = f_p of one mechanism, at one J after another.
+
+    Parameters
+    ----------
+    passive, actuated
+        Indices of the velocities, shapes (np,) and (na,).
+    rows, columns
+        Scaling of J to one unit, shapes (nc,) and (nv,).
+    max_condition
+        Of `ClosedLoopModel`.
+    """
+
+    def __init__(
+        self,
+        passive: Indices,
+        actuated: Indices,
+        rows: Array,
+        columns: Array,
+        max_condition: float,
+    ) -> None:
+        self._passive, self._actuated, self._max_condition = passive, actuated, max_condition
+        #: Scaling of J_p to one unit, shapes (nc, 1) and (np,).
+        self.scales = rows[:, None], columns[passive]
+        self._rows = rows[:, None]
+        # eigenpy takes a vector of one number for a matrix: one row is not counted as square.
+        self._square = rows.size == passive.size > 1
+        self._lu = eigenpy.PartialPivLU(passive.size)
+        self._harmless_rcond = self._least_harmless_rcond()
+
+    def condition(self, passive_jacobian: Array) -> float:
+        """Return the condition number of J_p, shape (nc, np), in one unit."""
+        rows, columns = self.scales
+        return condition_number(rows * passive_jacobian * columns)
+
+    def multipliers(self, jacobian: Array, passive_jacobian: Array, force: Array) -> Array | None:
+        """Return lambda (nc,), of least norm in one unit, with J_p' lambda = f_p.
+
+        None near a singularity, and where the actuators are more or fewer than the mobility.
+
+        Parameters
+        ----------
+        jacobian, passive_jacobian
+            J (nc, nv), and its passive columns (nc, np).
+        force
+            f, shape (nv,).
+        """
+        if not self._square:
+            factors = self._tall_factors(jacobian, passive_jacobian)
+            return None if factors is None else factors.multipliers(force.take(self._passive))
+        lu = self._lu
+        lu.compute(passive_jacobian.T)
+        multipliers: Array = lu.solve(force.take(self._passive))
+        if not lu.rcond() > self._harmless_rcond and not (
+            self.condition(passive_jacobian) <= self._max_condition
+        ):
+            return None
+        return multipliers
+
+    def passive_motion(self, jacobian: Array, right: Array) -> Array | None:
+        """Return x_p (np, k) with J_p x_p = b (nc, k), or None as `multipliers`.
+
+        Of a b that no x_p solves, the least-squares solution.
+        """
+        passive_jacobian = jacobian.take(self._passive, axis=1)
+        if not self._square:
+            factors = self._tall_factors(jacobian, passive_jacobian)
+            return None if factors is None else factors.passive_motion(right)[0]
+        self._lu.compute(passive_jacobian)
+        solved: Array = self._lu.solve(right).reshape(right.shape)  # one column comes flat
+        # The estimate does not see a pivot that is exactly zero, nor a matrix of rounding errors;
+        # the solution does.
+        well = self._lu.rcond() > self._harmless_rcond and dasum(solved.ravel("K")) <= HUGE * (
+            1.0 + dasum(right.ravel("K"))
+        )
+        return solved if well else None
+
+    def _tall_factors(self, jacobian: Array, passive_jacobian: Array) -> _TallFactors | None:
+        """Return the factors of J_p where they determine the motion well."""
+        rows, columns = self.scales
+        if not rows.size >= columns.size > 0:
+            return None
+        factors = _TallFactors(passive_jacobian, rows, columns)
+        well = factors.condition < np.inf and (
+            100 * factors.condition <= self._max_condition
+            or self.condition(passive_jacobian) <= self._max_condition
+        )
+        # The actuators move independently if J_a lies in the range of J_p.
+        if not well or factors.passive_motion(jacobian[:, self._actuated])[1] > RANK_TOLERANCE:
+            return None
+        return factors
+
+    def _least_harmless_rcond(self) -> float:
+        """Return the estimate of the reciprocal condition above which no closer look is needed.
+
+        The estimate is in the 1-norm, without scaling, and rarely off by more than a factor of 3
+        (Higham). The norms differ by at most a factor of the size, the scaling by at most the
+        ratios of its factors; one of 100 is for the estimate.
+        """
+        if not self._square:
+            return 0.0
+        spread = sum(float(np.ptp(np.log(scale))) for scale in self.scales)
+        return min(100 * self._passive.size * math.exp(spread) / self._max_condition, 1.0)
+
+
+class _TallFactors:
+    """Q, R and the permutation of a J_p, shape (nc, np), nc >= np > 0; scaled to one unit."""
+
+    def __init__(self, jacobian: Array, rows: Array, columns: Array) -> None:
+        self._rows, self._columns = rows[:, 0], columns
+        self._size = columns.size
+        packed, order, reflectors, _, _ = dgeqp3(rows * jacobian * columns)
+        self._packed, self._reflectors = packed, reflectors
+        self._order = order - 1
+        self._work = 64 * max(packed.shape)
+        pivots = np.abs(packed.diagonal())
+        self._largest, smallest = float(pivots.max()), float(pivots.min())
+        #: Estimate of the condition number by the pivots; the true one is rarely 10 times larger.
+        self.condition = np.inf
+        if rank(np.array([self._largest, smallest])) == 2:  # pivots stand for singular values
+            self.condition = self._largest / smallest
+
+    def multipliers(self, force: Array) -> Array:
+        """Return lambda (nc,) of least norm (in one unit) with J_p' lambda = f_p (np,)."""
+        right = np.zeros((self._rows.size, 1))
+        right[: self._size] = self._solve((self._columns * force)[self._order, None], transposed=1)
+        turned: Array = self._turn(right, "N")[:, 0]
+        return self._rows * turned
+
+    def passive_motion(self, right: Array) -> tuple[Array, float]:
+        """Return x_p (np, k) with J_p x_p = b (nc, k) in the least-squares sense, and what is left.
+
+        What is left is the largest entry of b outside the range of J_p, relative to J_p.
+        """
+        turned = self._turn(np.asfortranarray(self._rows[:, None] * right), "T")
+        solved = np.empty((self._size, right.shape[1]))
+        solved[self._order] = self._solve(turned[: self._size], transposed=0)
+        left = float(np.abs(turned[self._size :]).max(initial=0.0)) / self._largest
+        return self._columns[:, None] * solved, left
+
+    def _solve(self, right: Array, transposed: int) -> Array:
+        solved: Array = dtrsm(1.0, self._packed[: self._size], right, trans_a=transposed)
+        return solved
+
+    def _turn(self, right: Array, transposed: str) -> Array:
+        turned, _, _ = dormqr("L", transposed, self._packed, self._reflectors, right, self._work)
+        product: Array = turned
+        return product

@@ -1,0 +1,189 @@
+"""Constraint system of a mechanism: the tree, its closure equations, its actuated joints.
+
+This is what the algorithms of kinematics, assembly, dynamics and simulation take. It holds the
+closures' selected rows and their scales, one factorisation of the passive joints' Jacobian, and the
+passive joint forces. `ClosedLoopModel` is the public face of one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.assembly.joint_limits import JointLimits
+from rps_pin.closed_loop.constraints.closures import Closure, frame_id
+from rps_pin.closed_loop.constraints.equations import OPEN, ClosureEquations, refuse_twice
+from rps_pin.closed_loop.constraints.factorisation import PassiveFactorisation
+from rps_pin.closed_loop.dynamics.passive_joint_forces import (
+    JointEffects,
+    coordinate_indices,
+    refuse_springs,
+)
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.errors import ClosureError, InputError, MechanismError, SingularityError
+from rps_pin.validation import real_vector
+
+#: Beyond this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
+#: machine is built well enough to know its forces.
+MAX_CONDITION = 1e8
+
+
+class ConstraintSystem:
+    """Tree, closure equations and actuated joints; for the parameters see `ClosedLoopModel`.
+
+    Attributes
+    ----------
+    model, data
+        The open tree, and scratch memory: one thread at a time.
+    equations : ClosureEquations
+    actuated, passive : index arrays
+        Velocities with and without actuator, shapes (na,) and (np,); `order` holds the passive
+        ones, then the actuated ones.
+    actuated_names : tuple of str
+    row_scale, column_scale : (nc,) and (nv,) arrays
+        ``row_scale[:, None] * J * column_scale`` has entries of one unit.
+    factorisation : PassiveFactorisation
+        Of J_p.
+    effects : JointEffects or None
+        Passive joint forces; `coordinates` are the indices in q that their springs act on.
+    limits : JointLimits
+    max_condition : float
+    """
+
+    def __init__(
+        self,
+        model: pin.Model,
+        closures: Sequence[Closure],
+        actuated: Sequence[str],
+        *,
+        effects: JointEffects | None = None,
+        characteristic_length: float | None = None,
+        max_condition: float = MAX_CONDITION,
+    ) -> None:
+        self.model = model
+        self.actuated_names = (actuated,) if isinstance(actuated, str) else tuple(actuated)
+        refuse_twice("actuated joint", self.actuated_names)
+        self.equations = equations = ClosureEquations(model, closures, characteristic_length)
+        if not self.actuated_names:
+            raise MechanismError("a mechanism needs at least one joint to actuate")
+        if not max_condition >= 1:
+            raise InputError(f"max_condition = {max_condition}: it must be at least 1")
+        if effects is not None and effects.damping.size != model.nv:
+            raise InputError(f"effects are of {effects.damping.size} velocities, not {model.nv}")
+        if effects is not None:
+            refuse_springs(model, effects)
+        self.data = equations.data
+        self.actuated = self.velocity_indices(self.actuated_names, "to actuate")
+        self.passive = np.setdiff1d(np.arange(model.nv), self.actuated)
+        self.passive_size = self.passive.size
+        self.order = np.concatenate([self.passive, self.actuated])
+        self.identity = np.eye(self.actuated.size)
+        self.row_scale, self.column_scale = equations.row_scale, equations.column_scale
+        self._scale = self.row_scale[:, None] * self.column_scale
+        self.max_condition = max_condition
+        self.factorisation = PassiveFactorisation(
+            self.passive, self.actuated, self.row_scale, self.column_scale, max_condition
+        )
+        self.effects, self.coordinates = effects, coordinate_indices(model)
+        self.limits = JointLimits(model)
+        self._frame_ids: dict[str, int] = {}
+
+    # Arguments ------------------------------------------------------------------------------------
+
+    def state(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> tuple[Array, Array, Array]:
+        """Return q, v and a as finite arrays of the right shapes."""
+        nv = self.model.nv
+        return (
+            real_vector(q, self.model.nq, "q"),
+            real_vector(v, nv, "v"),
+            real_vector(a, nv, "a"),
+        )
+
+    def normalised(self, q: ArrayLike, name: str) -> Array:
+        """Return a checked configuration with quaternions of unit length."""
+        normal: Array = pin.normalize(self.model, real_vector(q, self.model.nq, name))
+        if not pin.isNormalized(self.model, normal, 1e-9):
+            raise InputError(f"{name} holds a quaternion of length zero, which is no orientation")
+        return normal
+
+    def velocity_indices(self, joints: Sequence[str], purpose: str) -> Indices:
+        """Return the indices of joints' velocities, or say which joints there are."""
+        indices: list[int] = []
+        for name in joints:
+            if not self.model.existJointName(name) or name == "universe":
+                names = ", ".join(list(self.model.names)[1:])
+                raise MechanismError(f"no joint {name!r} {purpose}; there are: {names}")
+            joint = self.model.joints[self.model.getJointId(name)]
+            indices.extend(range(joint.idx_v, joint.idx_v + joint.nv))
+        return np.array(indices, dtype=np.intp)
+
+    def independent(self, joints: Sequence[str] | None) -> Indices:
+        """Return the velocities of joints, each named once; the actuated ones if left out."""
+        if joints is None:
+            return self.actuated
+        refuse_twice("independent joint", list(joints))
+        return self.velocity_indices(joints, "to move independently")
+
+    def frame(self, name: str) -> int:
+        """Return the index of a frame, or say which frames there are."""
+        if name not in self._frame_ids:
+            self._frame_ids[name] = frame_id(self.model, name)
+        return self._frame_ids[name]
+
+    def by_frame(self, wrenches: Wrenches | None) -> dict[int, Array]:
+        """Return wrenches, checked, by frame index."""
+        return {
+            self.frame(name): real_vector(value, 6, f"the wrench at frame {name!r}")
+            for name, value in (wrenches or {}).items()
+        }
+
+    def refuse_open(self, q: Array) -> None:
+        """Raise `ClosureError` if q is open (see `OPEN`); after a Jacobian at q."""
+        if self.equations.is_open(q):
+            gaps = self.equations.gaps(real_vector(q, self.model.nq, "q"))
+            length = self.equations.length
+            raise ClosureError(
+                f"q is not a closed configuration: {self.equations.open_closure(gaps)}, and at "
+                f"most {OPEN * length:.3g} m is accepted; close it first with close()",
+                self.equations.largest_gap(gaps),
+            )
+
+    # Jacobian -------------------------------------------------------------------------------------
+
+    def closed_jacobian(self, q: Array) -> Array:
+        """Return J at a configuration, or say that it is open."""
+        jacobian = self.equations.jacobian(q)
+        self.refuse_open(q)
+        return jacobian
+
+    def scaled(self, jacobian: Array) -> Array:
+        """Return J with all entries in one unit."""
+        scaled: Array = self._scale * jacobian
+        return scaled
+
+    def condition(self, jacobian: Array) -> float:
+        """Return the condition number of J_p."""
+        return self.factorisation.condition(jacobian[:, self.passive])
+
+    def refuse_singular(self, condition: float) -> None:
+        """Raise `SingularityError` if a condition number of J_p is too large."""
+        if not condition <= self.max_condition:
+            raise SingularityError(
+                "the actuated joints do not determine the motion here: the condition number is "
+                f"{condition:.3g}, and at most {self.max_condition:.3g} is accepted",
+                condition,
+                self.max_condition,
+            )
+
+
+class Mechanism(Protocol):
+    """What has a constraint system: a `ClosedLoopModel`."""
+
+    @property
+    def system(self) -> ConstraintSystem:
+        """The constraint system."""

@@ -1,0 +1,117 @@
+"""Velocities and accelerations of a mechanism whose loops stay closed.
+
+With J the closures' Jacobian, every velocity with J v = 0 is v = T u, u the velocities of some
+joints that move independently of each other (S_i their rows): T = N (S_i N)^-1 for any basis N of
+the null space of J.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.errors import ClosureError, SingularityError
+from rps_pin.numerics.linear_algebra import (
+    condition_number,
+    least_norm,
+    null_space,
+    singular_values,
+)
+
+#: Opening rate that `velocity` and `acceleration` accept, relative to the rates given.
+_CONSISTENT = 1e-8
+
+
+def allowed_motions(system: ConstraintSystem, jacobian: Array) -> Array:
+    """Return N, shape (nv, m), a basis of the null space of J, orthonormal in one unit."""
+    return system.column_scale[:, None] * null_space(system.scaled(jacobian))
+
+
+def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
+    """Return T, shape (nv, m), of independent velocities; see `ClosedLoopModel.motion_basis`."""
+    jacobian = system.equations.jacobian(q)
+    if chosen is system.actuated:
+        solved = system.factorisation.passive_motion(jacobian, jacobian.take(chosen, axis=1))
+        if solved is not None:
+            return actuated_basis(system, solved)
+    motions = allowed_motions(system, jacobian)
+    of_chosen = motions[chosen]
+    if of_chosen.shape[0] != of_chosen.shape[1]:
+        raise SingularityError(
+            f"{of_chosen.shape[0]} independent velocities are named, for a mobility of "
+            f"{of_chosen.shape[1]} at this configuration",
+            np.inf,
+            system.max_condition,
+        )
+    # N is orthonormal in one unit: joints that take part in all motions have a block of size 1.
+    scaled = of_chosen / system.column_scale[chosen][:, None]
+    smallest = float(singular_values(scaled).min(initial=1.0))
+    condition = 1 / smallest if smallest > 0 else np.inf
+    if not condition <= system.max_condition:
+        raise SingularityError(
+            "these joints do not determine the motion here: the condition number is "
+            f"{condition:.3g}, and at most {system.max_condition:.3g} is accepted",
+            condition,
+            system.max_condition,
+        )
+    return np.asarray(np.linalg.solve(of_chosen.T, motions.T).T, dtype=np.float64)
+
+
+def actuated_basis(system: ConstraintSystem, solved: Array) -> Array:
+    """Return T of the actuated joints from J_p^-1 J_a: its passive rows are minus that."""
+    basis = np.zeros((system.model.nv, system.actuated.size))
+    basis[system.passive], basis[system.actuated] = -solved, system.identity
+    return basis
+
+
+def velocity(system: ConstraintSystem, q: Array, given: Indices, rates: Array) -> Array:
+    """Return v with J v = 0 and given entries; see `ClosedLoopModel.velocity`."""
+    still = np.zeros(system.equations.size)
+    return _completed(system, system.equations.jacobian(q), given, rates, still)
+
+
+def acceleration(
+    system: ConstraintSystem, q: Array, v: Array, given: Indices, accelerations: Array
+) -> Array:
+    """Return a with J a + J' v = 0 and given entries; see `ClosedLoopModel.acceleration`."""
+    bias = system.equations.bias(q, v)
+    jacobian = system.equations.jacobian(q)
+    opening = float(np.abs(system.row_scale * (jacobian @ v)).max(initial=0.0))
+    speed = float(np.abs(v / system.column_scale).max(initial=0.0))
+    if opening > _CONSISTENT * max(speed, 1.0):
+        raise ClosureError(
+            f"v opens the loops at {opening:.3g} m/s; complete it with velocity() first", opening
+        )
+    return _completed(system, jacobian, given, accelerations, bias)
+
+
+def _completed(
+    system: ConstraintSystem, jacobian: Array, given: Indices, values: Array, bias: Array
+) -> Array:
+    """Return x with x_g given and J x + bias = 0 for the rest: J_r x_r = -J_g x_g - bias."""
+    full = np.empty(system.model.nv)
+    full[given] = values
+    right = jacobian.take(given, axis=1) @ values + bias
+    rest = system.passive
+    if given is system.actuated:
+        solved = system.factorisation.passive_motion(jacobian, right[:, None])
+        if solved is not None:
+            full[rest] = -solved[:, 0]
+            return full
+    else:
+        rest = np.setdiff1d(np.arange(system.model.nv), given)
+    left = system.scaled(jacobian)[:, rest]
+    system.refuse_singular(condition_number(left))
+    right = -system.row_scale * right
+    scaled = least_norm(left, right)
+    opening = float(np.abs(left @ scaled - right).max(initial=0.0))
+    size = float(np.abs(right).max(initial=0.0))
+    if opening > _CONSISTENT * max(size, 1e-3):
+        raise ClosureError(
+            f"no motion of the mechanism has these {given.size} actuated values: "
+            f"the loops would open at a rate of {opening:.3g} (asked for: {size:.3g})",
+            opening,
+        )
+    full[rest] = system.column_scale[rest] * scaled
+    return full
