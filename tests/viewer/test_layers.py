@@ -360,7 +360,7 @@ def test_layers_of_the_3_rps_say_so_of_others(layer):
     ("what", "motion", "complaint"),
     [
         ("robot", None, "at a pose"),
-        ("robot", [1.0, 2.0], r"shape \(13,\)"),
+        ("robot", [1.0, 2.0], r"must be \(13,\)"),
         ("robot", "nonsense", "not a motion"),
         ("nothing", None, "cannot be shown"),
     ],

@@ -61,7 +61,7 @@ def test_a_view_plays_until_it_is_told_to_stop(robot):
     ("state", "complaint"),
     [
         (([0.4, np.nan, 0.0],), "finite"),
-        (([0.4, 0.1],), r"shape \(13,\)"),
+        (([0.4, 0.1],), r"must be \(13,\)"),
         (([0.4, 0.1, 0.0], [1.0]), "v has shape"),
     ],
 )

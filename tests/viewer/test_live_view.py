@@ -305,13 +305,13 @@ def test_a_view_runs_once(view):
 
 @pytest.mark.parametrize("pose", [(0.22, 0.0), np.full(3, np.nan), (np.inf, 0.0, 0.0)])
 def test_a_first_pose_that_is_none_is_refused(robot, pose):
-    with pytest.raises(InputError, match="three finite numbers"):
+    with pytest.raises(InputError, match="pose"):
         LiveView(robot, pose)
 
 
 @pytest.mark.parametrize("rate", [0.0, -30.0, np.nan, np.inf])
 def test_an_impossible_rate_is_refused(robot, rate):
-    with pytest.raises(InputError, match="frame_rate"):
+    with pytest.raises(InputError, match="rate ="):
         LiveView(robot, POSE, rate=rate)
 
 

@@ -1,4 +1,4 @@
-"""Any mechanism under sliders: its actuated joints."""
+"""Panel of any mechanism: sliders of its actuated joints."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _MM, _DEGREE = 1e3, 180.0 / math.pi
 class MechanismPanel:
     """Sliders of a mechanism's actuated joints, in one group, ``"joints"``.
 
-    The loops are closed round what the sliders say, from where they were. Other joints may go
-    beyond their limits, or actuators need more than theirs: that is shown, and said in `trouble`.
-    Where the loops cannot be closed the last good configuration stays, and `trouble` says why.
+    The loops are closed for the joints' coordinates, starting from the last configuration. Joints
+    beyond their limits and actuators that would need more than their effort are listed in `trouble`.
+    Where the loops cannot be closed the last configuration stays, and `trouble` says why.
 
     Parameters
     ----------
     mechanism
         The mechanism; its actuated joints must have one coordinate each.
     q
-        Where it starts, shape (nq,); its home if left out.
+        Its first configuration, shape (nq,). Default: its home.
     visual
-        Its shapes; bars between its joints if left out.
+        Its geometry. Default: bars between its joints.
 
     Raises
     ------
@@ -66,7 +66,7 @@ class MechanismPanel:
         return np.array([self._q[joint.idx_q] for joint in self._joints])
 
     def move(self, group: str, values: Any) -> bool:
-        """Close the loops round the joints' coordinates; return whether that could be done."""
+        """Close the loops for the joints' coordinates; return whether they close."""
         try:
             asked = slider_values(self.groups, group, values)
             wanted = dict(zip(self.mechanism.actuated, asked.tolist(), strict=True))
@@ -78,7 +78,7 @@ class MechanismPanel:
         return True
 
     def readings(self) -> list[tuple[str, str]]:
-        """Return the joints, the forces that hold the weight, conditioning and gap."""
+        """Return the joints, the forces that hold the weight, the conditioning and the loop gap."""
         rows = [
             (name, quantity(value, _DEGREE, "degrees") if angular else quantity(value, _MM, "mm"))
             for name, value, angular in zip(
@@ -94,21 +94,23 @@ class MechanismPanel:
                     self.mechanism.actuated, self._held, self._angular, strict=True
                 )
             ]
-        rows.append(("condition of the passive joints", f"{self.mechanism.condition(self._q):.3f}"))
+        conditioning = 1.0 / self.mechanism.condition(self._q)
+        words = f"{conditioning:.4f} (0 singular, 1 best)"
+        rows.append(("conditioning of the passive joints", words))
         rows.append(("largest loop gap", f"{self.mechanism.loop_gap(self._q):.1e} m"))
         return rows
 
     @property
     def configuration(self) -> Array:
-        """Where the mechanism stands, shape (nq,)."""
+        """Configuration of the mechanism, shape (nq,)."""
         return self._q
 
     def visual_model(self) -> pin.GeometryModel:
-        """Return its shapes."""
+        """Return its visual geometry."""
         return skeleton(self.mechanism) if self._visual is None else self._visual
 
     def _take(self, q: Array) -> None:
-        """Stand in a closed configuration."""
+        """Go to a closed configuration."""
         still = np.zeros(self.mechanism.model.nv)
         self._q = q
         self._held: Array | str
@@ -119,7 +121,7 @@ class MechanismPanel:
         self.trouble = self._beyond()
 
     def _beyond(self) -> list[str]:
-        """Return a sentence for each limit that is broken where the mechanism stands."""
+        """Return a sentence for each limit that is broken."""
         words = [f"joint {phrase}" for phrase in self._limits.outside(self._q).values()]
         if isinstance(self._held, str):
             return words
@@ -142,7 +144,7 @@ class MechanismPanel:
         high = float(model.upperPositionLimit[joint.idx_q])
         scale, unit = (_DEGREE, "degrees") if angular else (_MM, "mm")
         here = float(self._q[joint.idx_q])
-        if not high - low < 1e3:  # none
+        if not high - low < 1e3:  # no limits
             low, high = (-math.pi, math.pi) if angular else (here - 1.0, here + 1.0)
         name = f"{self.mechanism.actuated[number]} ({unit})"
         return Slider(name, scale * low, scale * high, scale * (high - low) / 1000, scale)

@@ -1,4 +1,4 @@
-"""The 3-RPS under sliders: its pose, or its leg lengths."""
+"""Panel of a 3-RPS: sliders of its pose, and of its leg lengths."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ _LARGEST_TILT = math.radians(60.0)
 class RPSPanel:
     """Sliders of a 3-RPS, in two groups: ``"pose"`` and ``"lengths"``.
 
-    A pose beyond the robot's limits is shown, and said in `trouble`: that is when one looks. Leg
-    lengths are followed in the assembly mode that the robot is in. Where there is no such pose, or
-    the way meets a singularity, the last good one stays, and `trouble` says why.
+    A pose beyond the robot's limits is shown, and the limits are listed in `trouble`. Leg lengths
+    are followed in the current assembly mode. Where there is no such pose, or the path to it meets
+    a singularity, the last pose stays, and `trouble` says why.
 
     Parameters
     ----------
     robot
         The robot, with its payload.
     pose
-        Where it starts, shape (3,), m and rad; level, in the middle of its stroke, if left out.
+        Its first pose, shape (3,), m and rad. Default: level, in the middle of its stroke.
 
     Raises
     ------
@@ -61,7 +61,7 @@ class RPSPanel:
         return (self.pose if group == "pose" else self.length).copy()
 
     def move(self, group: str, values: Any) -> bool:
-        """Go to a pose, or to lengths; return whether that could be done."""
+        """Go to a pose, or to leg lengths; return whether the robot can."""
         try:
             asked = slider_values(self.groups, group, values)
             if group == "lengths":
@@ -91,11 +91,11 @@ class RPSPanel:
         return self._q
 
     def visual_model(self) -> pin.GeometryModel:
-        """Return the robot's shapes."""
+        """Return the robot's visual geometry."""
         return self.robot.visual_model()
 
     def _take(self, pose: Array) -> None:
-        """Stand in a pose, if there is one."""
+        """Go to a pose."""
         q = self._free.state(pose, _STILL, _STILL)[0]
         legs = self._free.inverse_kinematics(pose)
         force = self._free.actuator_forces(pose, _STILL, _STILL)
@@ -105,7 +105,7 @@ class RPSPanel:
         self.trouble = self._limits()
 
     def _limits(self) -> list[str]:
-        """Return a sentence for each limit that is broken where the robot stands."""
+        """Return a sentence for each limit that is broken."""
         p = self.robot.parameters
         cone = cone_angles(self.angle, self._rotation, p.spherical_rest_angle)
         words = [str(one) for one in violations(p, self.length, self.angle, cone)]
@@ -126,7 +126,7 @@ def _middle(parameters: RPSParameters) -> Array:
         low = 0.5 * high
     length, inwards = (low + high) / 2, parameters.base_radius - parameters.platform_radius
     if length <= abs(inwards):
-        raise InputError("no level pose in the middle of the stroke; give one to start from")
+        raise InputError("there is no level pose in the middle of the stroke; give a first pose")
     return np.array([math.sqrt(length**2 - inwards**2), 0.0, 0.0])
 
 

@@ -12,9 +12,10 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.visuals import skeleton
-from rps_pin.errors import InputError, shown
+from rps_pin.errors import InputError
 from rps_pin.rps.dynamics.motion_run import MotionRun, sample_times
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.validation import real_vector
 from rps_pin.viewer.motion import Motion
 
 _SAMPLE_RATE = 100.0
@@ -125,11 +126,6 @@ def configuration_of(subject: DisplayedMechanism, given: Any) -> Array:
 
 def _one(given: Any, model: pin.Model) -> Array:
     try:
-        q = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{shown(given)} is not a motion or a configuration") from None
-    if q.shape != (model.nq,):
-        raise InputError(
-            f"a configuration of {model.name!r} has shape ({model.nq},), not {q.shape}"
-        )
-    return q[None]
+        return real_vector(given, model.nq, f"a configuration of {model.name!r}")[None]
+    except InputError as error:
+        raise InputError(f"not a motion, a pose or a configuration: {error}") from None

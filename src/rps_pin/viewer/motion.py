@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.validation import positive_number, real_array, real_vector
 
 FRAME_RATE = 30.0
 """Pictures per second, unless told otherwise."""
@@ -75,39 +76,18 @@ class Motion:
         wrenches: Mapping[str, ArrayLike] | None = None,
     ) -> None:
         self._model = model
-        self.times: Array = np.asarray(times, dtype=np.float64)
         self.configurations = checked_configurations(model, configurations)
-        if self.times.shape != (len(self.configurations),):
-            raise InputError(
-                f"times has shape {self.times.shape}; with configurations of shape "
-                f"{self.configurations.shape} it must be ({len(self.configurations)},)"
-            )
-        if not np.all(np.isfinite(self.times)) or np.any(np.diff(self.times) <= 0.0):
-            raise InputError("times must be finite and strictly increasing")
-        self.forces = self._known_forces(forces, "forces", "na")
-        self.constraint_forces = self._known_forces(constraint_forces, "constraint_forces", "nc")
+        n, nv = len(self.configurations), model.nv
+        self.times = real_vector(times, n, "times")
+        if np.any(np.diff(self.times) <= 0.0):
+            raise InputError("times must be strictly increasing")
+        self.forces = _rows(forces, n, "na", "forces")
+        self.constraint_forces = _rows(constraint_forces, n, "nc", "constraint_forces")
         self.wrenches = dict(wrenches or {})
         self.at_rest = velocities is None and accelerations is None
-        self.velocities = self._rates(velocities, "velocities")
-        self.accelerations = self._rates(accelerations, "accelerations")
-
-    def _rates(self, given: ArrayLike | None, name: str) -> Array:
-        wanted = (len(self.times), self._model.nv)
-        if given is None:
-            return np.zeros(wanted)
-        rates = np.asarray(given, dtype=np.float64)
-        if rates.shape != wanted or not np.isfinite(rates).all():
-            raise InputError(f"{name} has shape {rates.shape}; it must be {wanted}, all finite")
-        return rates
-
-    def _known_forces(self, given: ArrayLike | None, name: str, size: str) -> Array | None:
-        if given is None:
-            return None
-        forces = np.asarray(given, dtype=np.float64)
-        n = len(self.times)
-        if forces.ndim != 2 or len(forces) != n or not np.isfinite(forces).all():
-            raise InputError(f"{name} has shape {forces.shape}; it must be ({n}, {size}), finite")
-        return forces
+        v, a = _rows(velocities, n, nv, "velocities"), _rows(accelerations, n, nv, "accelerations")
+        self.velocities = np.zeros((n, nv)) if v is None else v
+        self.accelerations = np.zeros((n, nv)) if a is None else a
 
     @property
     def duration(self) -> float:
@@ -119,7 +99,7 @@ class Motion:
 
         Before the start and after the end it is the first and the last configuration.
         """
-        before, fraction = self._place(elapsed)
+        before, fraction = self._locate(elapsed)
         if fraction == 0.0:
             given: Array = self.configurations[before]
             return given
@@ -130,7 +110,7 @@ class Motion:
 
     def state_at(self, elapsed: float) -> MotionState:
         """Return configuration, velocity and acceleration `elapsed` seconds after the first."""
-        before, fraction = self._place(elapsed)
+        before, fraction = self._locate(elapsed)
         after = before + (fraction > 0.0)
 
         def between(rows: Array) -> Array:
@@ -142,8 +122,8 @@ class Motion:
         rates = between(self.velocities), between(self.accelerations)
         return MotionState(self.at(elapsed), *rates, tau, constraint)
 
-    def _place(self, elapsed: float) -> tuple[int, float]:
-        """Return the sample at or before a time, and the share of the way to the next one."""
+    def _locate(self, elapsed: float) -> tuple[int, float]:
+        """Return the index of the sample before a time, and the fraction of the step after it."""
         time = self.times[0] + elapsed
         after = int(np.searchsorted(self.times, time, side="right"))
         if after == 0 or after == len(self.times):
@@ -158,7 +138,7 @@ class Motion:
 
     def sample_times(self, frame_rate: float = FRAME_RATE) -> Array:
         """Return the times of `sampled`, in seconds since the first configuration, shape (m,)."""
-        check_frame_rate(frame_rate)
+        positive_number(frame_rate, "frame_rate")
         steps = max(1, round(self.duration * frame_rate)) if self.duration > 0.0 else 0
         return np.linspace(0.0, self.duration, steps + 1)
 
@@ -186,10 +166,14 @@ class Motion:
         return elapsed, np.array([self.at(float(time)) for time in elapsed])
 
 
-def check_frame_rate(frame_rate: float) -> None:
-    """Raise `InputError` unless `frame_rate` is positive and finite."""
-    if not np.isfinite(frame_rate) or frame_rate <= 0.0:
-        raise InputError(f"frame_rate = {frame_rate!r}: it must be positive and finite")
+def _rows(given: ArrayLike | None, n: int, size: int | str, name: str) -> Array | None:
+    """Return n rows of finite numbers, or None; a size that is text is for the error only."""
+    if given is None:
+        return None
+    rows = real_array(given, name)
+    if rows.ndim != 2 or len(rows) != n or (isinstance(size, int) and rows.shape[1] != size):
+        raise InputError(f"{name} has shape {rows.shape}; it must be ({n}, {size})")
+    return rows
 
 
 def checked_configurations(model: pin.Model, configurations: ArrayLike) -> Array:
@@ -207,15 +191,13 @@ def checked_configurations(model: pin.Model, configurations: ArrayLike) -> Array
     InputError
         If the shape does not fit, a value is not finite, or a quaternion is not of unit length.
     """
-    q = np.asarray(configurations, dtype=np.float64)
+    q = real_array(configurations, "configurations")
     if q.ndim not in (1, 2) or q.shape[-1] != model.nq or q.size == 0:
         raise InputError(
             f"a configuration of this robot has nq = {model.nq} numbers: the shape must be "
             f"({model.nq},) or (n, {model.nq}), not {q.shape}"
         )
     q = q.reshape(-1, model.nq)
-    if not np.all(np.isfinite(q)):
-        raise InputError("a configuration holds a number that is not finite")
     for index, row in enumerate(q):
         if not pin.isNormalized(model, row, _UNIT_TOLERANCE):
             raise InputError(

@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
-from rps_pin.viewer.motion import FRAME_RATE, Motion, check_frame_rate
+from rps_pin.validation import positive_number
+from rps_pin.viewer.motion import FRAME_RATE, Motion
 from rps_pin.viewer.scene.scene import Scene
 
 
@@ -43,7 +44,7 @@ def play(
     InputError
         If the motion or the frame rate cannot be played.
     """
-    check_frame_rate(frame_rate)
+    positive_number(frame_rate, "frame_rate")
     motion = Motion(scene.model, times, configurations)
     stop = threading.Event() if stop is None else stop
     if motion.duration == 0.0:

@@ -15,12 +15,13 @@ from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.validation import positive_number
 from rps_pin.viewer.files.browser import in_own_thread
 from rps_pin.viewer.files.film import check_film, write_film
 from rps_pin.viewer.files.html import checked_target, recorded_page
-from rps_pin.viewer.files.pictures import Progress, checked_size, take_pictures
-from rps_pin.viewer.layers import Layer
-from rps_pin.viewer.motion import FRAME_RATE, check_frame_rate
+from rps_pin.viewer.files.pictures import Progress, picture_style, take_pictures
+from rps_pin.viewer.layers.base import Layer
+from rps_pin.viewer.motion import FRAME_RATE
 from rps_pin.viewer.view import View
 from rps_pin.viewer.writers.recorder import Recorder
 
@@ -110,23 +111,11 @@ def save_png(
     target = checked_target(path)
     if target.suffix.lower() != ".png":
         raise InputError(f"{target.name}: a picture is written as .png")
-    sides = checked_size(size, scale)
+    style = picture_style(size, scale, background, captions)
     text, view = _page(what, motion, visual, layers, (), title, FRAME_RATE)
     if not 0.0 <= time <= view.motion.duration:
         raise InputError(f"time = {time} s; the motion lasts from 0 to {view.motion.duration:g} s")
-    [picture] = in_own_thread(
-        lambda stop: list(
-            take_pictures(
-                text,
-                [time],
-                stop,
-                size=sides,
-                scale=scale,
-                background=background,
-                captions=captions,
-            )
-        )
-    )
+    [picture] = in_own_thread(lambda stop: list(take_pictures(text, [time], stop, style)))
     with whole_file(target) as scratch:
         scratch.write_bytes(picture)
 
@@ -170,8 +159,8 @@ def save_video(
     """
     target = checked_target(path)
     check_film(target)
-    check_frame_rate(frame_rate)
-    sides = checked_size(size, scale)
+    positive_number(frame_rate, "frame_rate")
+    style = picture_style(size, scale, background, captions)
     if background == "transparent":
         raise InputError("a film has no transparent background: give a colour, or none")
     text, view = _page(what, motion, visual, layers, (), title, FRAME_RATE)
@@ -182,16 +171,8 @@ def save_video(
     times = np.arange(0.0, duration - 0.5 / frame_rate, 1.0 / frame_rate)
 
     def film(scratch: Path, stop: threading.Event) -> None:
-        pictures = take_pictures(
-            text,
-            progress([float(time) for time in times]),
-            stop,
-            size=sides,
-            scale=scale,
-            background=background,
-            captions=captions,
-        )
-        write_film(scratch, pictures, frame_rate)
+        moments = progress([float(time) for time in times])
+        write_film(scratch, take_pictures(text, moments, stop, style), frame_rate)
 
     with whole_file(target) as scratch:
         in_own_thread(lambda stop: film(scratch, stop))

@@ -11,7 +11,7 @@ import pinocchio as pin
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.viewer.displayed_mechanism import displayed
-from rps_pin.viewer.layers import Layer
+from rps_pin.viewer.layers.base import Layer
 from rps_pin.viewer.server.local_viewer import LocalViewer
 from rps_pin.viewer.view import View
 

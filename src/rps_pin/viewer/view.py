@@ -17,7 +17,8 @@ from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import real_vector
 from rps_pin.viewer.displayed_mechanism import configuration_of, displayed, motion_of
-from rps_pin.viewer.layers import DrawnLayer, Layer, LayerContext, layers_of
+from rps_pin.viewer.layers import layers_of
+from rps_pin.viewer.layers.base import DrawnLayer, Layer, LayerContext
 from rps_pin.viewer.motion import FRAME_RATE, MotionState
 from rps_pin.viewer.playback import follow_clock
 from rps_pin.viewer.scene.keyframes import NodeKeyframes

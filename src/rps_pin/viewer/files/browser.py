@@ -1,4 +1,4 @@
-"""A headless Chromium that takes pictures of pages; its package and itself are optional."""
+"""Headless Chromium, by Playwright; both are optional."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-"""Programs that are looked for, after the one that ``RPS_PIN_CHROMIUM`` names."""
+"""Programs that are searched for, after the one in ``RPS_PIN_CHROMIUM``."""
 ARGUMENTS = (
     "--no-sandbox",
     # WebGL without a graphics card: Chromium's own software renderer, the same everywhere.
@@ -31,10 +31,10 @@ _Answer = TypeVar("_Answer")
 
 
 def in_own_thread(work: Callable[[threading.Event], _Answer]) -> _Answer:
-    """Return what `work` returns, run in a thread of its own.
+    """Call `work` in a new thread and return its result.
 
     Playwright refuses threads with an event loop, as Jupyter's. The event that `work` is given is
-    set when it shall stop, at Ctrl-C.
+    set at Ctrl-C.
     """
     stop = threading.Event()
     with ThreadPoolExecutor(1, thread_name_prefix="rps_pin pictures") as pool:
@@ -47,16 +47,16 @@ def in_own_thread(work: Callable[[threading.Event], _Answer]) -> _Answer:
 
 @contextmanager
 def opened_page(text: str, size: tuple[int, int], scale: float) -> Iterator[Page]:
-    """Give a page that has been loaded and drawn once, in a browser of its own.
+    """Give a page that has been loaded and drawn once, in a new browser.
 
     Parameters
     ----------
     text
-        The page, as HTML, one of `recorded_page`.
+        The page, as HTML of `recorded_page`.
     size
         Width and height of the window, in CSS pixels.
     scale
-        Pixels of the picture to one of these.
+        Pixels of the picture per CSS pixel.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def opened_page(text: str, size: tuple[int, int], scale: float) -> Iterator[Page
         except Error as error:
             raise RPSPinError(
                 "pictures need a Chromium that runs: apt-get install chromium, or playwright "
-                "install chromium, or set RPS_PIN_CHROMIUM to its path. It said: "
+                "install chromium, or set RPS_PIN_CHROMIUM to its path. The error: "
                 f"{str(error).strip().splitlines()[0]}"
             ) from None
         try:

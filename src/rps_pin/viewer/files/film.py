@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rps_pin.errors import InputError, RPSPinError
-from rps_pin.viewer.files.pictures import as_array
+from rps_pin.viewer.files.pictures import pixels_of
 
 FILMS = (".mp4", ".gif", ".webp")
 """Suffixes of the files that can be written."""
@@ -41,7 +41,7 @@ def write_film(path: Path, pictures: Iterable[bytes], frame_rate: float) -> None
     even = 2 if kind == ".mp4" else 1  # H.264 halves the colours' resolution
     with _imageio().get_writer(path, **options) as film:
         for picture in pictures:
-            pixels = as_array(picture)
+            pixels = pixels_of(picture)
             height, width = (side // even * even for side in pixels.shape[:2])
             film.append_data(pixels[:height, :width])
 

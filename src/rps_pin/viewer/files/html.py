@@ -36,7 +36,7 @@ def write_html(
 ) -> None:
     """Write a page that plays a motion in a loop when it is opened from disk.
 
-    The file is written whole or not at all; a file that stood there before is replaced.
+    The file is written whole or not at all; an existing file is replaced.
 
     Parameters
     ----------
@@ -45,9 +45,9 @@ def write_html(
     model
         The robot.
     visual
-        What to draw.
+        Its geometry.
     times : array_like, shape (n,)
-        Times in seconds, strictly increasing. With n = 1 the page shows a pose that stands still.
+        Times in seconds, strictly increasing. With n = 1 the page shows a single pose.
     configurations : array_like, shape (n, nq)
         The configuration at each time.
     title
@@ -58,8 +58,8 @@ def write_html(
     Raises
     ------
     InputError
-        If the motion, the frame rate or the visual model cannot be shown, or `path` names a
-        folder or stands in a folder that does not exist.
+        If the motion, the frame rate or the visual model cannot be shown, or `path` is a folder or
+        in a folder that does not exist.
     OSError
         If the file cannot be written.
     """
@@ -88,7 +88,7 @@ def motion_page(
 
 
 def checked_target(path: str | os.PathLike[str]) -> Path:
-    """Return where a file can be written, or raise `InputError`."""
+    """Return the path of a file, or raise `InputError` if it cannot be written there."""
     target = Path(path)
     if target.is_dir() or not target.parent.is_dir():
         raise InputError(f"cannot write {target}: it is a folder, or its folder does not exist")

@@ -22,7 +22,7 @@ def page(*, title: str, note: str, policy: str, scripts: str) -> str:
     note
         Plain text for the caption's second line (the element ``note``); escaped here.
     policy
-        Content-Security-Policy: what the page may load at all.
+        The page's Content-Security-Policy.
     scripts
         The ``<script>`` elements, as HTML.
     """
@@ -37,9 +37,9 @@ def page(*, title: str, note: str, policy: str, scripts: str) -> str:
 def inline_script(source: str, attributes: str = "") -> str:
     """Return a ``<script>`` element that holds `source`.
 
-    Whatever would end the element early, or make the browser's parser read on past its end, is
-    broken up with a backslash, which changes nothing inside JavaScript's strings and patterns.
-    (JSON knows no such backslash: data must come without ``<``.)
+    Text that would end the element early, or make the browser's parser read past its end, gets a
+    backslash, which changes nothing within JavaScript's strings and patterns. JSON has no such
+    backslash: data must not contain ``<``.
     """
     source = re.sub(r"<(?=/script|!--)", r"<\\", source, flags=re.IGNORECASE)
     return f"<script{attributes}>\n{source}\n</script>"
@@ -47,7 +47,7 @@ def inline_script(source: str, attributes: str = "") -> str:
 
 @cache
 def viewer_library() -> str:
-    """Return the source of Meshcat's browser part, as it came with the meshcat package."""
+    """Return the source of Meshcat's browser part, from the meshcat package."""
     return _distributed("main.min.js")
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
 from rps_pin.errors import InputError, shown
-from rps_pin.viewer.layers.base import DrawnLayer, Layer, LayerContext, NodeState
+from rps_pin.viewer.layers.base import Layer
 from rps_pin.viewer.layers.closures import Closures
 from rps_pin.viewer.layers.forces import Forces
 from rps_pin.viewer.layers.frames import Frames
@@ -66,23 +66,3 @@ def fitting_layers(mechanism: ClosedLoopModel) -> list[str]:
     held = ["closures"] if mechanism.closures else []
     names = ["forces", "limits", "singularity", "frames", *of_closures, *held]
     return [name for name in LAYERS if name in names]
-
-
-__all__ = [
-    "LAYERS",
-    "Closures",
-    "DrawnLayer",
-    "Forces",
-    "Frames",
-    "Ghosts",
-    "Layer",
-    "LayerContext",
-    "Limits",
-    "NodeState",
-    "Reactions",
-    "Singularity",
-    "Trail",
-    "WorkspaceSurface",
-    "fitting_layers",
-    "layers_of",
-]

@@ -1,12 +1,12 @@
-"""Live view of a running control loop, in a process of its own.
+"""Live view of a running control loop, without delaying the loop.
 
-The viewer is a process of its own. Between it and the loop lies a small shared memory: the loop
-writes a pose there, which takes about a microsecond and never waits; the viewer looks at its own
-rate, and shows what is new. (A thread would not do: it holds Python's interpreter lock for up to
-5 ms at a time, and a loop at 1 kHz waits for it.) Whatever happens to the viewer, the loop goes on.
+The viewer runs in its own process. The loop writes its pose to shared memory, which takes about a
+microsecond and never waits; the viewer reads it at its own rate. (A viewer in a thread would hold
+Python's interpreter lock for up to 5 ms at a time, and a loop at 1 kHz would wait for it.) The loop
+goes on whatever happens to the viewer.
 
-A pose that is read while it is written must not be shown. Its checksum tells, in whatever order a
-processor makes the writes visible; the viewer then looks again at its next picture.
+A pose that is read while it is being written is recognised by its checksum, in whatever order a
+processor makes the writes visible, and is not shown. The viewer reads again for its next picture.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ import numpy as np
 
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.viewer.motion import FRAME_RATE, check_frame_rate
+from rps_pin.validation import positive_number, real_vector
+from rps_pin.viewer.motion import FRAME_RATE
 
 #: Number of the write, and the pose; its CRC-32 follows.
 _RECORD = struct.Struct("4d")
@@ -44,9 +45,9 @@ class LiveView:
     robot
         The robot.
     pose
-        Where it is at first, and what the camera is set for, shape (3,).
+        The first pose, for which the camera is set, shape (3,).
     rate
-        Pictures a second.
+        Pictures per second.
     port
         As for `LocalViewer`.
     title
@@ -66,8 +67,8 @@ class LiveView:
 
     Notes
     -----
-    As for every process that Python spawns, a script that makes a live view must have its work
-    below ``if __name__ == "__main__":``, or the new process would do it once more.
+    Python spawns a process. A script that makes a live view must have its work below
+    ``if __name__ == "__main__":``, or the new process would run it again.
 
     Examples
     --------
@@ -87,10 +88,8 @@ class LiveView:
     ) -> None:
         if not isinstance(robot, RPSRobot):
             raise InputError(f"robot is a {type(robot).__name__}; it must be an RPSRobot")
-        check_frame_rate(rate)
-        start = np.asarray(pose, dtype=np.float64)
-        if start.shape != (3,) or not np.isfinite(start).all():
-            raise InputError(f"pose = {pose!r}: it must be three finite numbers")
+        positive_number(rate, "rate")
+        start = real_vector(pose, 3, "pose")
         self._asked = (robot, start, rate, port, title)
         # Not forked: Meshcat's server, and OpenBLAS, have threads.
         self._context = multiprocessing.get_context("spawn")
@@ -105,7 +104,7 @@ class LiveView:
     def show(self, pose: Any) -> None:
         """Give the newest pose, an array of shape (3,); takes about a microsecond, and never waits.
 
-        What the numbers are is not checked: a pose that cannot be shown is left out.
+        The numbers are not checked: a pose that cannot be shown is left out.
 
         Raises
         ------
@@ -159,7 +158,7 @@ class LiveView:
         return str(told)
 
     def _stop(self) -> None:
-        """End the process: it does when its line says anything, or is cut."""
+        """End the process: it ends when anything is sent, or the connection is closed."""
         if self._line is not None:
             with contextlib.suppress(OSError):  # nobody listens any more
                 self._line.send(None)
@@ -178,9 +177,9 @@ def _checked(record: bytes) -> bytes:
 
 @contextlib.contextmanager
 def _ctrl_c_blocked() -> Iterator[None]:
-    """Keep Ctrl-C from the processes that are started here: it is the loop's.
+    """Block SIGINT in the processes that are started here: Ctrl-C is for the loop.
 
-    They inherit the mask, and so never show a traceback, not even while they import.
+    They inherit the mask, and so show no traceback, not even while they import.
     """
     resource_tracker.ensure_running()  # where it first has to start, it would unblock the signal
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -202,12 +201,12 @@ def _serve(
     slot: Any,
     line: Connection,
 ) -> None:
-    """Show what the slot holds, at the rate, until the line or the loop's process ends."""
+    """Show the newest pose at the rate, until the connection or the loop's process ends."""
     from rps_pin.viewer.scene.scene import Scene  # noqa: PLC0415
     from rps_pin.viewer.server.local_viewer import LocalViewer  # noqa: PLC0415
 
     memory, parent = memoryview(slot).cast("B"), os.getppid()
-    # Shapes depend on the limits, so the scene is the robot's own.
+    # The shapes depend on the limits: they are those of the robot as it is.
     free, still, seen = RPSRobot(robot.parameters.without_limits()), np.zeros(3), 0.0
     try:
         first = free.state(start, still, still)[0]

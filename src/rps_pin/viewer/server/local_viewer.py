@@ -1,7 +1,7 @@
-"""A Meshcat server for this machine only, inside this process.
+"""Meshcat server for this machine only, in a thread of this process.
 
-Meshcat's own server listens on every network interface and runs as a process of its own; this one
-listens on 127.0.0.1, in one background thread, and is gone when its ``with`` block ends.
+Meshcat's own server runs in another process and listens on every network interface; this one
+listens on 127.0.0.1 and ends with its ``with`` block.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from rps_pin.viewer.server.web import Hub, application
 from rps_pin.viewer.writers.window import Command
 
 HOST = "127.0.0.1"
-"""The only address that is ever listened on."""
+"""The address that is listened on."""
 _START_SECONDS = 10.0
 _FAREWELL_SECONDS = 0.5
-"""How long the open tabs have to answer the goodbye before their connections are cut."""
+"""Time for the open tabs to close their connections before these are cut."""
 
 
 class LiveWindow:
-    """A Meshcat window that hands every command to the browser tabs of a `LocalViewer`."""
+    """A Meshcat window that sends every command to the browser tabs of a `LocalViewer`."""
 
     def __init__(self, viewer: LocalViewer) -> None:
         self._viewer = viewer
@@ -52,7 +52,7 @@ class LocalViewer:
     Parameters
     ----------
     port
-        The port to listen on, 1 to 65535; without it the system picks a free one.
+        The port to listen on, 1 to 65535. Default: a free one.
     title
         Plain text for the browser's tab and the caption.
     note
@@ -140,7 +140,7 @@ class LocalViewer:
         self._loop.call_soon_threadsafe(self._hub.publish, message, packed)
 
     async def _serve(self, listener: socket.socket, ready: threading.Event) -> None:
-        """Serve in the background thread until `_end` is set, then leave nothing open."""
+        """Serve in the background thread until `_end` is set, then close all connections."""
         app = application(self._hub, port=self._port, title=self._title, note=self._note)
         server = tornado.httpserver.HTTPServer(app)
         server.add_socket(listener)
@@ -165,7 +165,7 @@ def _listener(port: int | None) -> socket.socket:
     except OSError as error:
         listener.close()
         raise InputError(
-            f"port {port} of {HOST} cannot be used ({error.strerror}): choose another, or none to "
-            "let the system pick a free one"
+            f"port {port} of {HOST} cannot be used ({error.strerror}): choose another, or none "
+            "for a free one"
         ) from error
     return listener

@@ -1,4 +1,4 @@
-"""What a new browser tab has to be told: the scene as it stands now."""
+"""Store of the current scene, for browser tabs that open later."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ _Key = tuple[str, str, str]
 
 
 class SceneStore:
-    """The latest message of each kind for each place in the scene tree, oldest change first.
+    """The latest message of each kind for each path of the scene tree, oldest change first.
 
-    Replaying these messages to an empty viewer gives the scene that a viewer shows that was there
-    from the start; the store grows with the scene, not with the time it has been shown.
+    Replaying these messages to an empty viewer gives the current scene. The store grows with the
+    scene, not with time.
     """
 
     def __init__(self) -> None:
         self._messages: dict[_Key, bytes] = {}
 
     def apply(self, message: Mapping[str, object], packed: bytes) -> None:
-        """Take note of a message; `packed` is the same in Meshcat's wire format."""
+        """Store a message; `packed` is the same in Meshcat's wire format."""
         kind, path = str(message["type"]), str(message.get("path", ""))
         if kind == "delete":
             self._forget(lambda key: _within(key[1], path))
@@ -41,5 +41,5 @@ class SceneStore:
 
 
 def _within(path: str, ancestor: str) -> bool:
-    """Tell whether `path` is `ancestor` or lies below it."""
+    """Return whether `path` is `ancestor` or lies below it."""
     return path == ancestor or path.startswith(f"{ancestor}/")

@@ -1,4 +1,4 @@
-"""The web application behind `LocalViewer`: one page, Meshcat's script, and one WebSocket."""
+"""Web application of `LocalViewer`: one page, Meshcat's script, and one WebSocket."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _GOING_AWAY = 1001
 
 
 class Hub:
-    """The open tabs, and the scene that each of them shows. Used by the server's thread alone."""
+    """The open tabs and the scene that they show; for the server's thread only."""
 
     def __init__(self, store: SceneStore) -> None:
         self._store = store
         self._tabs: set[Tab] = set()
 
     def publish(self, message: Mapping[str, object], packed: bytes) -> None:
-        """Show a message in every tab and keep it for later ones.
+        """Send a message to every tab and keep it for later ones.
 
-        A tab that has stopped reading is cut off, or its unread messages would fill the memory.
+        A tab that has stopped reading is closed: its unread messages would fill the memory.
         """
         self._store.apply(message, packed)
         most = _MOST_UNSENT + len(self._store)
@@ -42,17 +42,17 @@ class Hub:
                 tab.cut()
 
     def join(self, tab: Tab) -> None:
-        """Show a new tab the scene as it stands, and all that comes."""
+        """Send the scene to a new tab, and all later messages."""
         self._tabs.add(tab)
         for packed in self._store:
             tab.show(packed)
 
     def leave(self, tab: Tab) -> None:
-        """Forget a tab."""
+        """Remove a tab."""
         self._tabs.discard(tab)
 
     async def close(self, patience: float) -> None:
-        """Say goodbye to every tab; cut off those that have not answered after `patience` s."""
+        """Close every tab's connection; cut those that are still open after `patience` s."""
         for tab in list(self._tabs):
             tab.close(_GOING_AWAY, "the viewer has ended")
         deadline = asyncio.get_running_loop().time() + patience
@@ -63,10 +63,10 @@ class Hub:
 
 
 class _LocalHandler(tornado.web.RequestHandler):
-    """Refuses whatever does not come from a page of this very server.
+    """Refuses requests that do not come from a page of this server.
 
-    A foreign site can make its own name lead to 127.0.0.1 (DNS rebinding), but it cannot make the
-    browser call that name by another in the Host header, nor hide its own in Origin.
+    Another site can make its own name lead to 127.0.0.1 (DNS rebinding), but it cannot change
+    what the browser sends as Host and Origin.
     """
 
     def prepare(self) -> None:
@@ -83,7 +83,7 @@ class _LocalHandler(tornado.web.RequestHandler):
 
 
 class _Text(_LocalHandler):
-    """Serves one text."""
+    """Handler of one text."""
 
     def initialize(self, content: str, kind: str) -> None:
         self._content = content
@@ -105,20 +105,20 @@ class Tab(_LocalHandler, tornado.websocket.WebSocketHandler):
         self._stream: IOStream | None = None
 
     def check_origin(self, origin: str) -> bool:
-        """Tell whether the page that opens the connection is our own."""
+        """Return whether the page that opens the connection is this server's."""
         return self._is_own(origin)
 
     def open(self, *args: str, **kwargs: str) -> None:
-        """Join the others."""
+        """Join the hub."""
         assert self.ws_connection is not None
         self._stream = self.ws_connection.stream
         self._hub.join(self)
 
     def on_message(self, message: str | bytes) -> None:
-        """Take no notice: a tab has nothing to tell."""
+        """Ignore messages from a tab."""
 
     def on_close(self) -> None:
-        """Leave the others."""
+        """Leave the hub."""
         self._hub.leave(self)
 
     def show(self, packed: bytes) -> None:
@@ -132,14 +132,14 @@ class Tab(_LocalHandler, tornado.websocket.WebSocketHandler):
         sent.add_done_callback(self._count_sent)
 
     def cut(self) -> None:
-        """Close the connection without a goodbye."""
+        """Cut the connection."""
         self._hub.leave(self)
         if self._stream is not None:
             self._stream.close()
 
     def _count_sent(self, sent: asyncio.Future[None]) -> None:
         self.unsent -= 1
-        # A tab that closed meanwhile is no error; on_close sees to it.
+        # A tab that closed meanwhile is not an error: on_close removes it.
         if not sent.cancelled():
             sent.exception()
 
@@ -152,7 +152,7 @@ def application(hub: Hub, *, port: int, title: str, note: str) -> tornado.web.Ap
     hub
         The scene and its tabs.
     port
-        The port it is reached on: part of every permitted Host and Origin.
+        The server's port, part of every permitted Host and Origin.
     title, note
         Plain text for the page's caption.
     """
@@ -178,7 +178,7 @@ def application(hub: Hub, *, port: int, title: str, note: str) -> tornado.web.Ap
         ],
         hosts=hosts,
         hub=hub,
-        # No line on the terminal for every request.
+        # No line on the terminal for each request.
         log_function=lambda handler: None,
         websocket_max_message_size=1024,
     )
