@@ -23,8 +23,8 @@ class MechanismPanel:
     """Sliders of a mechanism's actuated joints, in one group, ``"joints"``.
 
     The loops are closed for the joints' coordinates, starting from the last configuration. Joints
-    beyond their limits and actuators that would need more than their effort are listed in `trouble`.
-    Where the loops cannot be closed the last configuration stays, and `trouble` says why.
+    beyond their limits and actuators that would need more than their effort are listed in
+    `trouble`. Where the loops cannot be closed the last configuration stays; `trouble` says why.
 
     Parameters
     ----------
