@@ -150,6 +150,7 @@ def test_a_fixed_array_is_a_read_only_copy() -> None:
         (["0.2", "0", "0"], "start = .*: it must be numbers of shape"),
         ([0.2, [0.1], 0.0], "start = .*: it must be numbers of shape"),
         ([True, False, False], "start = .*: it must be numbers of shape"),
+        ([0.2, True, 0.0], "start = .*: it must be numbers of shape"),
         ([0.2, 1j, 0], "start = .*: it must be numbers of shape"),
         (None, "start = None: it must be numbers of shape"),
     ],

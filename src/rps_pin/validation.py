@@ -156,6 +156,9 @@ def fixed_array(
     sizes = ", ".join("n" if size is None else str(size) for size in shape)
     wanted = f"({sizes}{',' if len(shape) == 1 else ''}){meaning and f': {meaning}'}"
     array = numbers(value, name, f"numbers of shape {wanted}")
+    parts = () if isinstance(value, np.ndarray) else np.asarray(value, dtype=object).flat
+    if any(isinstance(part, (bool, np.bool_)) for part in parts):  # NumPy makes [True, 0.5] floats
+        raise InputError(f"{name} = {shown(value)}: it must be numbers of shape {wanted}")
     if array.ndim != len(shape) or any(
         size not in (None, given) for size, given in zip(shape, array.shape, strict=True)
     ):

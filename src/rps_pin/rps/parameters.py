@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -29,7 +28,7 @@ from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED
 from rps_pin.config import Finite, NonNegative, Positive, YamlFile, first_problem, read_yaml
 from rps_pin.errors import InputError, ParameterError, did_you_mean
 from rps_pin.files import whole_file
-from rps_pin.validation import inertia_fault
+from rps_pin.validation import fixed_array, inertia_fault, read_only
 
 #: A printed table rounds its inertias (the paper's Table 1 by 0.5 %): this much of the largest
 #: principal moment may be missing from the triangle inequality.
@@ -38,35 +37,16 @@ INERTIA_ROUNDING = 0.01
 
 def _array(*shape: int) -> BeforeValidator:
     """Return a validator that makes a finite, read-only float array of the given shape."""
-    wanted = f"must be {' x '.join(map(str, shape))} numbers, shape {shape}"
+    wanted = f"must be {' x '.join(map(str, shape))} finite numbers, shape {shape}"
 
-    def convert(value: object) -> Array:
-        # Looked at before it is converted: a file's nest of aliases can be huge.
-        if not _has_shape(value, shape):
-            raise ValueError(wanted)
-        given = np.asarray(value)
-        if given.dtype.kind not in "iuf" or given.shape != shape:
-            raise ValueError(wanted)
-        array = given.astype(np.float64) + 0.0  # no negative zeros: equal arrays, equal hashes
-        if not np.isfinite(array).all():
-            raise ValueError("must be finite")
-        array.setflags(write=False)
-        return array
+    def convert(value: Any) -> Array:
+        try:
+            array = fixed_array(value, "value", shape)
+        except InputError:
+            raise ValueError(wanted) from None
+        return read_only(array + 0.0)  # no negative zeros: equal arrays, equal hashes
 
     return BeforeValidator(convert)
-
-
-def _has_shape(value: object, shape: tuple[int, ...]) -> bool:
-    """Return whether nested sequences have the lengths of a shape; deeper nests are not entered."""
-    if isinstance(value, np.ndarray):
-        return bool(value.shape == shape)
-    if not shape:
-        return not isinstance(value, (Sequence, bool))
-    return (
-        isinstance(value, Sequence)
-        and len(value) == shape[0]
-        and all(_has_shape(part, shape[1:]) for part in value)
-    )
 
 
 _ToList = PlainSerializer(lambda array: array.tolist(), return_type=list)

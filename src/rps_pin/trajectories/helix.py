@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.trajectories.curve import CurveSample
-from rps_pin.trajectories.path import PathSample, checked_parameters, checked_times
+from rps_pin.trajectories.curve import CurveSample, LawSample, TimedCurve
+from rps_pin.trajectories.path import checked_parameters, checked_times
 from rps_pin.validation import choice, finite_number, positive_number
 
 #: Eq. 29: t_a and t_t of Table 1, the latter unrounded (5.2388 s).
@@ -85,11 +85,42 @@ class HelixCurve:
         )
 
 
-class HelixPath:
-    """A helix of the platform's centre, as a trajectory of poses.
+class HelixLaw:
+    """Eq. 29, corrected, scaled to a duration (s): phi from 0 to 2 pi."""
+
+    def __init__(self, duration: float) -> None:
+        self.duration = positive_number(duration, "duration", "seconds")
+        #: Duration of the rise and of the fall of the speed, s.
+        self.ramp = duration * PAPER_RAMP / PAPER_DURATION
+
+    def __repr__(self) -> str:
+        return f"HelixLaw(duration={self.duration:.6g})"
+
+    def at(self, t: ArrayLike) -> LawSample:
+        """Return phi and its time derivatives at times of shape (...), s."""
+        times = checked_times(t, self.duration)
+        speed = 2 * math.pi / (self.duration - self.ramp)  # of the middle piece
+        acceleration = speed / self.ramp
+        left = self.duration - times
+        rising, falling = times < self.ramp, left <= self.ramp
+        return LawSample(
+            np.select(
+                [rising, falling],
+                [acceleration * times**2 / 2, 2 * math.pi - acceleration * left**2 / 2],
+                speed * (times - self.ramp / 2),
+            ),
+            np.select([rising, falling], [acceleration * times, acceleration * left], speed),
+            np.select([rising, falling], [acceleration, -acceleration], 0.0),
+        )
+
+
+class HelixPath(TimedCurve):
+    """A helix of the platform's centre: a `HelixCurve` and a `HelixLaw`.
 
     See `helix` for the parameters.
     """
+
+    curve: HelixCurve
 
     def __init__(
         self,
@@ -101,18 +132,24 @@ class HelixPath:
         branch: Branch = "+",
         duration: float = PAPER_DURATION,
     ) -> None:
-        _check(platform_radius, radius, pitch, height, branch, duration)
+        for name, value in {"radius": radius, "pitch": pitch, "height": height}.items():
+            finite_number(value, name, "metres")
+        if not 0 <= radius <= platform_radius:
+            raise InputError(
+                f"radius = {radius} m: the centre of a platform of radius h = {platform_radius} m "
+                f"reaches 0 to {platform_radius} m sideways"
+            )
+        law = HelixLaw(duration)
         self.radius = radius
         self.pitch = pitch
         self.height = height
-        self.branch = branch
-        self.duration = duration
+        self.branch = choice(branch, "branch", ("+", "-"))
         #: The constant tilt of the platform, rad: r = h/2 (1 - cos(beta)) = h sin^2(beta/2).
         self.tilt = 2 * math.asin(math.sqrt(radius / platform_radius))
         #: Duration of the rise and of the fall of the speed, s.
-        self.ramp = duration * PAPER_RAMP / PAPER_DURATION
-        #: The helix without a time.
-        self.curve = HelixCurve(self.tilt if branch == "+" else -self.tilt, pitch, height)
+        self.ramp = law.ramp
+        tilt = self.tilt if branch == "+" else -self.tilt
+        super().__init__(HelixCurve(tilt, pitch, height), law)
 
     def __repr__(self) -> str:
         return (
@@ -125,31 +162,7 @@ class HelixPath:
 
         The acceleration jumps at the ends of the ramps; there it is the later piece's.
         """
-        times = checked_times(t, self.duration)
-        speed = 2 * math.pi / (self.duration - self.ramp)  # of the middle piece
-        acceleration = speed / self.ramp
-        left = self.duration - times
-        rising, falling = times < self.ramp, left <= self.ramp
-        phi = np.select(
-            [rising, falling],
-            [acceleration * times**2 / 2, 2 * math.pi - acceleration * left**2 / 2],
-            speed * (times - self.ramp / 2),
-        )
-        rate = np.select([rising, falling], [acceleration * times, acceleration * left], speed)
-        return phi, rate, np.select([rising, falling], [acceleration, -acceleration], 0.0)
-
-    def sample(self, t: ArrayLike) -> PathSample:
-        """Return pose, rate and acceleration at times t of shape (...), s; exact.
-
-        Raises
-        ------
-        InputError
-            If a time lies outside the trajectory.
-        """
-        phi, dphi, ddphi = self.turn(t)
-        pose, first, second = self.curve.at(phi)
-        rate = first * dphi[..., None]
-        return PathSample(pose, rate, first * ddphi[..., None] + second * (dphi**2)[..., None])
+        return self.law.at(t)
 
 
 def helix(
@@ -191,22 +204,3 @@ def helix(
 
 def _pose(z: Array, tilt: Array) -> Array:
     return np.concatenate([z[..., None], tilt], axis=-1)
-
-
-def _check(
-    platform_radius: float,
-    radius: float,
-    pitch: float,
-    height: float,
-    branch: str,
-    duration: float,
-) -> None:
-    for name, value in {"radius": radius, "pitch": pitch, "height": height}.items():
-        finite_number(value, name, "metres")
-    if not 0 <= radius <= platform_radius:
-        raise InputError(
-            f"radius = {radius} m: the centre of a platform of radius h = {platform_radius} m "
-            f"reaches 0 to {platform_radius} m sideways"
-        )
-    positive_number(duration, "duration", "seconds")
-    choice(branch, "branch", ("+", "-"))
