@@ -1,16 +1,16 @@
-"""The smallest control loop: a 3-RPS held on its path at 1 kHz, in real time.
+"""A minimal control loop: a 3-RPS tracks a trajectory at 1 kHz in real time.
 
     OPENBLAS_NUM_THREADS=1 python examples/control_loop.py --duration 3
 
-The platform's tilt turns about once a second. The machine is simulated, and is not what the
-controller believes: its masses are 20 % more, its encoders step by 50 nm and are noisy, and forces
-come a tick late. Prints how far the platform was from its target, what the controller said, and
-what became of the clock's ticks.
+The platform's tilt describes a circle once per second. The robot is simulated and differs from
+the controller's model: its masses are 20 % larger, its encoders have a resolution of 50 nm and
+noise, and forces are delayed by one tick. Prints the tracking errors, the controller's status
+and the clock's report.
 
 Exit status: 0 done, Ctrl-C too; 1 the controller stopped; 2 wrong usage.
 
-The simulated machine moves one period in each tick that runs: for a deadline that is skipped it
-waits, which yours will not. `drive_over_socket.py` has a machine with a time of its own.
+The simulated robot moves by one period per tick. At a skipped deadline it waits, unlike a real
+robot; `drive_over_socket.py` simulates a robot with its own clock.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""A control loop that talks to its drive over a socket, where packets get lost.
+"""A control loop that communicates with its drive by UDP, with lost packets.
 
     OPENBLAS_NUM_THREADS=1 python examples/drive_over_socket.py --loss 0.01
 
-The drive, with the simulated machine behind it, is a process of its own (this file, `--drive PORT`)
-with a clock of its own. Each millisecond it sends a reading; the controller waits for it and
-answers with a command, which acts from the drive's next tick on. All is UDP on 127.0.0.1, a packet
-a message, little-endian, without padding; packets of another size are passed over.
+The drive and the simulated robot run in another process (this file, `--drive PORT`) with its own
+clock. Each millisecond the drive sends a reading; the controller waits for it and answers with a
+command, which is applied from the drive's next tick. Messages are UDP packets on 127.0.0.1,
+little-endian, without padding; packets of another size are ignored.
 
     reading, 41 bytes, from the drive       uint64    sequence: 0, 1, 2, ..., one a tick
                                             double    time of the drive's clock, s
@@ -15,16 +15,16 @@ a message, little-endian, without padding; packets of another size are passed ov
                                             double    time of that reading, s
                                             3 double  forces of the legs, N
 
-Ready, the drive has its brakes on, until the first command. Running, it holds its last force while
-no command comes, and passes over commands that are not finite or not newer than the last. When the
-reading that was answered last is older than the watchdog time, it is safe: no force, brakes on, for
-good. For the controller, a reading that did not come is a lost sample (None): a few are bridged,
-more stop it, by its status.
+Ready, the drive has its brakes on, until the first command. Running, it holds its last force
+while no command comes, and passes over commands that are not finite or not newer than the last.
+When the reading that was answered last is older than the watchdog time, it is safe: no force,
+brakes on, for good. For the controller, a reading that did not come is a lost sample (None): a
+few are bridged, more stop it, by its status.
 
-`--loss` drops packets on purpose, both ways; `--silent-from` ends the answers, to see the watchdog.
-Prints what both sides counted, and the errors as the encoders see them. The drive ends with its
-standard input, and so with the controller, however that ends. Exit status: 0 done, Ctrl-C too;
-1 the controller stopped, or the drive is safe or silent; 2 wrong usage.
+`--loss` drops packets on purpose, both ways; `--silent-from` ends the answers, to see the
+watchdog. Prints what both sides counted, and the errors as the encoders see them. The drive
+ends with its standard input, and so with the controller, however that ends. Exit status: 0
+done, Ctrl-C too; 1 the controller stopped, or the drive is safe or silent; 2 wrong usage.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
-"""A control loop that logs every tick, and is seen in the browser while it runs.
+"""A control loop with a log of every tick and a live view in the browser.
 
     OPENBLAS_NUM_THREADS=1 python examples/logging_and_live_view.py --output log
 
-The loop of `control_loop.py`. What a real machine knows of itself is logged: encoders, target,
-estimated pose, forces, status, distance to type II. The log is one array, allocated before
-the loop; files are written after it. The view is a process of its own, which the loop never waits
-for; its address, on this machine only, is printed. `--no-view` leaves it out.
+The loop of `control_loop.py`. The log contains encoder readings, setpoints, estimated poses,
+forces, status and `type_ii`. It is one array, allocated before the loop; files are written
+after it. The view is another process that does not delay the loop; its address, on this machine
+only, is printed. `--no-view` disables it.
 
-Ctrl-C ends the loop, and what has been logged is kept. Prints the tracking error as the encoders
-see it, the clock's report, and the files: `loop.csv` (a row for each tick) and `loop.png`.
+Ctrl-C ends the loop, and the log is kept. Prints the tracking error as measured by the
+encoders, the clock's report, and the files: `loop.csv` (a row for each tick) and `loop.png`.
 Exit status: 0 done, Ctrl-C too; 1 the controller stopped; 2 wrong usage.
 """
 
