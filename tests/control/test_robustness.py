@@ -40,7 +40,8 @@ def run(kind: str, *faults: Fault, duration: float = 0.5, **more: Any) -> LoopRu
     path = circle(height=0.223, tilt=0.08, duration=1.0)
     start = path.sample(0.0).pose
     controller = made(kind, start=start, **more)
-    found = run_loop(controller, Plant(robot, start), path, faults=faults, duration=duration)
+    plant = Plant(robot, start, substeps=1)
+    found = run_loop(controller, plant, path, faults=faults, duration=duration)
     limit = more.get("force_limit", robot.parameters.actuator_force_limit)
     assert np.isfinite(found.command).all()
     assert (np.abs(found.command) <= limit).all()
@@ -92,11 +93,11 @@ def test_stopped_with_readings_it_comes_to_rest_where_it_was(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_jump_of_a_millimetre(kind: str) -> None:
-    spike = run(kind, Fault("jump", 0.2, TICK, leg=1, size=1e-3))
+    spike = run(kind, Fault("jump", 0.2, TICK, leg=1, size=1e-3), duration=0.35)
     np.testing.assert_array_equal(said(spike, Status.JUMP), [200])
     assert LoopSummary.of(spike, begin=0.1).centre_max < 30.0
     for size in (-1e-3, 1e-3):
-        for_good = run(kind, Fault("jump", 0.2, leg=3, size=size))
+        for_good = run(kind, Fault("jump", 0.2, leg=3, size=size), duration=0.4)
         assert said(for_good, Status.JUMP)[0] == 200
         assert said(for_good, Status.STOPPED)[0] == 203
         # It stays within the jump of where it was.
@@ -141,7 +142,7 @@ def test_a_path_through_a_singularity_is_not_followed_into_it(
         made(kind, robot, safe)
     start = np.array([0.4, 0.6, 0.0])
     controller = made(kind, robot, start, force_limit=50.0, near_singular=near)
-    plant = Plant(robot, start)
+    plant = Plant(robot, start, substeps=1)
     held = False
     for k in range(round(0.3e3 / speed)):  # the singularity is at a tilt of 0.7975 rad
         target = (np.array([0.4, 0.6 + 1e-3 * k * speed, 0.0]), [0.0, speed, 0.0], np.zeros(3))
@@ -223,7 +224,7 @@ def test_anti_windup_forgets_what_the_limits_did_not_give() -> None:
         controller = made("task", robot)
         if kind == "without":
             controller._tracking_rate = (0.0, 0.0, 0.0)
-        plant = Plant(robot, START)
+        plant = Plant(robot, START, substeps=1)
         normal = controller._limits.limit
         heights = [0.0]
         for k in range(2500):
