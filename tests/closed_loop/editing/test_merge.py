@@ -230,7 +230,7 @@ def test_what_does_not_fit_is_refused_by_how_much() -> None:
     refused(branch, ["u1", "u2"], "universal", "between 'u1' and 'u2' also carries twig")
     rotors = tree()
     rotors.armature = np.ones(rotors.nv)
-    refused(rotors, ["s1", "s2", "s3"], "spherical", "'s1' has armature = 1, for which")
+    refused(rotors, ["s1", "s2", "s3"], "spherical", "'s1' has armature = 1, which")
     shared = [CARDAN, JointMerge(["u1", "u2"], "universal", "again")]
     with pytest.raises(MechanismError, match="joint 'u1' is merged twice"):
         merged(tree(), shared)

@@ -1,7 +1,7 @@
-"""Several open trees side by side in one world: two arms, and the object they hold.
+"""Composition of several open trees in one world: two arms, and the object they hold.
 
-A part called ``left`` has its joints and frames called ``left/...`` in the whole. The trees stay
-as they are; what joins them to a mechanism are loop closures between their frames.
+The joints and frames of a part called ``left`` are called ``left/...`` in the whole. Loop closures
+between frames of the parts make a mechanism of them.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rps_pin.closed_loop.editing.joint_properties import copy_joint_properties
+from rps_pin.closed_loop.editing.rebuild import copy_joint_properties
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.validation import fixed_array, inertia_fault, positive_number, real_vector
 
 #: Between a part's name and its own names.
 SEPARATOR = "/"
-#: Name of the joint that lets a `body` float.
+#: Name of the free-flyer joint of a `body`.
 FREE_JOINT = "root_joint"
 
 
 @dataclass(frozen=True)
 class Part:
-    """An open tree, and where its world stands in the whole.
+    """An open tree, and the placement of its world in the whole.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ def compose(parts: Mapping[str, Part], *, name: str = "") -> pin.Model:
             whole = pin.appendModel(before, own, parent, part.placement)
         except ValueError as error:  # limits in the wrong order
             raise MechanismError(f"part {key!r}: {error}") from None
-        # What appendModel leaves behind: armature, and some of the limits.
+        # appendModel does not copy armature, and some of the limits.
         for source in (before, own):
             for joint in range(1, source.njoints):
                 new = int(whole.getJointId(source.names[joint]))
@@ -92,12 +92,12 @@ def body(
     com: ArrayLike = (0.0, 0.0, 0.0),
     frames: Mapping[str, pin.SE3] | None = None,
 ) -> pin.Model:
-    """Return a model of one rigid body that floats, on a free-flyer called ``"root_joint"``.
+    """Return a model of one rigid body on a free-flyer joint called ``"root_joint"``.
 
     Parameters
     ----------
     name
-        Of the body's frame, at whose origin and in whose axes the free-flyer stands.
+        Of the body's frame, which is that of the free-flyer.
     mass
         kg, positive.
     inertia
@@ -105,12 +105,12 @@ def body(
     com
         Centre of mass in the body's frame, m, shape (3,).
     frames
-        Further frames fixed in the body, where it is held for instance, by name.
+        Further frames fixed in the body, by name.
 
     Raises
     ------
     InputError
-        If no rigid body has such a mass or inertia.
+        If the mass or the inertia is not that of a rigid body.
     """
     moments = fixed_array(inertia, f"inertia of body {name!r}", (3, 3))
     if fault := inertia_fault(moments):
@@ -166,7 +166,7 @@ def _parent_frame(whole: pin.Model, key: str, part: Part) -> int:
 
 
 def _prefixed(model: pin.Model, key: str) -> pin.Model:
-    """Return a copy of a model with its part's name before all its names."""
+    """Return a copy of a model with the part's name before all names."""
     copy = pin.Model(model)
     for joint in range(1, copy.njoints):
         copy.names[joint] = f"{key}{SEPARATOR}{copy.names[joint]}"

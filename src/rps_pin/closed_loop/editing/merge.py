@@ -1,11 +1,11 @@
-"""Merging revolute joints that meet in a point into one spherical or universal joint.
+"""Merging of revolute joints that meet in a point into one spherical or universal joint.
 
 Files describe a ball joint as three revolute joints with massless links between, or a Cardan joint
-as two. Merged, a spherical joint has no gimbal lock, and one quaternion for its coordinates.
+as two. The merged spherical joint has no gimbal lock, and a quaternion as its coordinates.
 
-The merged joint stands where the last joint of the row stood, turned as that one is when all
-angles are zero; so zero angles are the neutral configuration, and everything the last joint
-carried stays where it was. With P_i the placements of the joints and a_i their axes,
+The placement of the merged joint is that of the last joint of the row at zero angles; so zero
+angles are the neutral configuration, and what the last joint carries is not moved. With P_i the
+placements of the joints and a_i their axes,
 
     spherical:  placement P_1 P_2 P_3,  R = (R_1 R_2 R_3)' R_1 exp(a_1 q_1) R_2 exp(a_2 q_2) ...
     universal:  placement P_1 P_2,      R = exp(R_2' a_1 q_1) exp(a_2 q_2).
@@ -23,7 +23,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.editing.joint_properties import copy_joint_properties
+from rps_pin.closed_loop.editing.rebuild import JointRow, NewJoint, rebuilt
 from rps_pin.errors import MechanismError
 from rps_pin.validation import real_vector
 
@@ -54,7 +54,7 @@ class JointMerge:
     Raises
     ------
     MechanismError
-        If the kind is unknown, or the number of joints is not its own.
+        If the kind is unknown, or the number of joints is not that of the kind.
     """
 
     joints: Sequence[str]
@@ -80,10 +80,10 @@ def merged(model: pin.Model, merges: Sequence[JointMerge]) -> pin.Model:
     """Return a model in which rows of revolute joints are single joints.
 
     Everything else is kept: limits, armature, friction, damping, rotors, frames, gravity,
-    reference configurations. A universal joint has the coordinates of its two joints and keeps
-    what they had. A spherical joint keeps none of the limits, since those of three angles are none
-    of a rotation, and turns every way even if the three could not. Frames on the links between are
-    left out; the frame of the last joint takes the merged joint's name.
+    reference configurations. A universal joint has the coordinates, limits, ... of its two joints.
+    A spherical joint has no limits, since those of three angles are not limits of a rotation.
+    Frames on the links between are left out; the frame of the last joint has the merged joint's
+    name.
 
     Raises
     ------
@@ -93,29 +93,10 @@ def merged(model: pin.Model, merges: Sequence[JointMerge]) -> pin.Model:
     """
     rows = [_row(model, merge) for merge in merges]
     _refuse_shared(model, merges, rows)
-    result = pin.Model()
-    result.name = model.name
-    last = {row[-1]: (merge, row) for merge, row in zip(merges, rows, strict=True)}
-    dropped = {joint for row in rows for joint in row[:-1]}
-    new_ids = {0: 0}
-    for old in range(1, model.njoints):
-        if old in dropped:
-            continue
-        if old in last:
-            new_ids[old] = _add_merged(model, result, *last[old], new_ids)
-        else:
-            new_ids[old] = result.addJoint(
-                new_ids[model.parents[old]],
-                model.joints[old],
-                model.jointPlacements[old],
-                model.names[old],
-            )
-            copy_joint_properties(model, [old], result, new_ids[old])
-    for old, new in new_ids.items():
-        result.inertias[new] = model.inertias[old]
-    renamed = {joint: merge.name for joint, (merge, _) in last.items()}
-    add_frames(model, result, new_ids, renamed)
-    result.gravity = model.gravity
+    joints = {
+        row[-1]: _merged_joint(model, merge, row) for merge, row in zip(merges, rows, strict=True)
+    }
+    result = rebuilt(model, joints, {joint for row in rows for joint in row[:-1]})
     for entry in model.referenceConfigurations:
         result.referenceConfigurations[entry.key()] = merged_configuration(
             model, merges, entry.data()
@@ -124,7 +105,7 @@ def merged(model: pin.Model, merges: Sequence[JointMerge]) -> pin.Model:
 
 
 def merged_configuration(model: pin.Model, merges: Sequence[JointMerge], q: ArrayLike) -> Array:
-    """Return a configuration of the merged model that is one of the model as it was.
+    """Return the configuration of the merged model for one of the model before merging.
 
     Parameters
     ----------
@@ -158,7 +139,7 @@ def merged_configuration(model: pin.Model, merges: Sequence[JointMerge], q: Arra
 
 
 def _turned(model: pin.Model, row: list[int], q: Array) -> Array:
-    """Return R of a row of three joints, as the module has it; shape (3, 3)."""
+    """Return R of a row of three joints, as in the module docstring; shape (3, 3)."""
     straight, turned = np.eye(3), np.eye(3)
     for joint in row:
         placed = model.jointPlacements[joint].rotation
@@ -167,55 +148,15 @@ def _turned(model: pin.Model, row: list[int], q: Array) -> Array:
     return np.asarray(straight.T @ turned)
 
 
-def _add_merged(
-    model: pin.Model, result: pin.Model, merge: JointMerge, row: list[int], new_ids: dict[int, int]
-) -> int:
+def _merged_joint(model: pin.Model, merge: JointMerge, row: list[int]) -> JointRow:
     placement = pin.SE3.Identity()
     for joint in row:
         placement = placement * model.jointPlacements[joint]
-    axes = _axes(model, row)
     if merge.into == "spherical":
         _refuse_lost_armature(model, merge, row)
-        kind = pin.JointModelSpherical()
-    else:
-        kind = pin.JointModelUniversal(axes[0], axes[1])
-    new = int(result.addJoint(new_ids[model.parents[row[0]]], kind, placement, merge.name))
-    if merge.into == "universal":
-        copy_joint_properties(model, row, result, new)
-    return new
-
-
-def add_frames(
-    model: pin.Model, result: pin.Model, new_ids: dict[int, int], renamed: dict[int, str]
-) -> None:
-    """Copy the frames of the joints that are left, each below the nearest frame that is.
-
-    Parameters
-    ----------
-    model
-        The model as it was.
-    result
-        The rebuilt model, all its joints in place.
-    new_ids
-        Index in `result` of the joint that carries what each joint of `model` carried, by index
-        in `model`; the frames of joints that are not among them are left out.
-    renamed
-        New names of joint frames, by the joint's index in `model`.
-    """
-    new_frames = {0: 0}
-    for index in range(1, model.nframes):
-        old = model.frames[index]
-        if old.parentJoint not in new_ids:
-            continue
-        parent = old.parentFrame
-        while parent not in new_frames:
-            parent = model.frames[parent].parentFrame
-        frame = pin.Frame(old)
-        frame.parentJoint = new_ids[old.parentJoint]
-        frame.parentFrame = new_frames[parent]
-        if old.type == pin.FrameType.JOINT and old.parentJoint in renamed:
-            frame.name = renamed[old.parentJoint]
-        new_frames[index] = result.addFrame(frame, False)
+        return JointRow([NewJoint(merge.name, pin.JointModelSpherical(), placement)], [])
+    kind = pin.JointModelUniversal(*_axes(model, row))
+    return JointRow([NewJoint(merge.name, kind, placement)], row)
 
 
 # Checks -------------------------------------------------------------------------------------------
@@ -238,7 +179,7 @@ def _row(model: pin.Model, merge: JointMerge) -> list[int]:
 
 
 def _check_link(model: pin.Model, what: str, first: int, second: int) -> None:
-    """Refuse a link that is more than a point where two joints meet."""
+    """Refuse a link between two joints that has mass, other joints, or a length."""
     before, after = model.names[first], model.names[second]
     if model.parents[second] != first:
         raise MechanismError(
@@ -282,10 +223,12 @@ def _check_axes(model: pin.Model, what: str, merge: JointMerge, row: list[int]) 
 
 
 def _check_reach(what: str, axes: list[Array]) -> None:
-    """Refuse three joints that cannot turn every way: neighbours must not be parallel."""
+    """Refuse three joints with parallel neighbours, which do not reach every rotation."""
     for first, second in pairwise(axes):
         if np.linalg.norm(np.cross(first, second)) < _PARALLEL:
-            raise MechanismError(f"{what}: neighbouring axes are parallel; that is no ball joint")
+            raise MechanismError(
+                f"{what}: neighbouring axes are parallel, so the joints are not a ball joint"
+            )
 
 
 def _refuse_shared(model: pin.Model, merges: Sequence[JointMerge], rows: list[list[int]]) -> None:
@@ -313,7 +256,7 @@ def _refuse_shared(model: pin.Model, merges: Sequence[JointMerge], rows: list[li
 
 
 def _refuse_lost_armature(model: pin.Model, merge: JointMerge, row: list[int]) -> None:
-    """Refuse rotors about axes that turn in the merged joint: it has no constant place for them."""
+    """Refuse rotors about axes that are not constant in the merged joint."""
     for joint in row:
         index = model.idx_vs[joint]
         for name in ("armature", "rotorInertia"):
@@ -321,7 +264,7 @@ def _refuse_lost_armature(model: pin.Model, merge: JointMerge, row: list[int]) -
             if value != 0:
                 raise MechanismError(
                     f"merge {merge.name!r}: joint {model.names[joint]!r} has {name} = {value:.6g}, "
-                    "for which a spherical joint has no place; set it to 0 first"
+                    "which a spherical joint cannot have; set it to 0 first"
                 )
 
 

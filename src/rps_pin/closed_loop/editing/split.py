@@ -1,10 +1,10 @@
-"""Splitting joints whose axes turn with their own coordinates into joints whose axes do not.
+"""Splitting of joints with a variable motion subspace into joints with constant ones.
 
-Pinocchio's derivatives (`pin.computeRNEADerivatives`, `pin.getFrameAccelerationDerivatives` and
-their like) take the motion subspace S of a joint, seen from the body it carries, for constant.
-Those of a universal joint, of one of Z-Y-X angles, and of most composites change with q, and the
-derivatives of a tree with such a joint are wrong without a word. The same tree with joints in a
-row, and massless links between, has constant subspaces, the same q and v, and the same dynamics:
+Pinocchio's derivatives (`pin.computeRNEADerivatives`, `pin.getFrameAccelerationDerivatives`, ...)
+assume that the motion subspace S of a joint is constant in the frame of its body. That of a
+universal joint, of one of Z-Y-X angles, and of most composites depends on q; the derivatives of a
+tree with such a joint are wrong, without an error. The same tree with several joints in a row, and
+massless links between, has constant subspaces, the same q and v, and the same dynamics:
 
     universal, axes a_1 and a_2:    R = exp(a_1 q_1) exp(a_2 q_2)        two revolute joints
     Z-Y-X angles:                   R = R_z(q_1) R_y(q_2) R_x(q_3)       three revolute joints
@@ -20,8 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.editing.joint_properties import copy_joint_properties
-from rps_pin.closed_loop.editing.merge import add_frames
+from rps_pin.closed_loop.editing.rebuild import JointRow, NewJoint, rebuilt
 from rps_pin.errors import MechanismError
 
 _UNIVERSAL = "JointModelUniversal"
@@ -39,7 +38,7 @@ class _Part(NamedTuple):
     """One of the joints in a row that a joint is split into."""
 
     placement: pin.SE3
-    """Against the part before, or against where the joint itself is placed."""
+    """In the part before, or in the joint's own frame."""
     kind: Any
     """A Pinocchio joint model."""
 
@@ -49,8 +48,8 @@ def split(model: pin.Model) -> pin.Model:
 
     q and v keep their entries and order, frames their indices and names, and everything else is
     kept: inertias, limits, armature, rotors, friction, damping, gravity, reference configurations.
-    The last joint of a row has the name of the joint it comes from, and carries what that one
-    carried; those before are called ``name:1``, ``name:2``. They have no frames.
+    The last joint of a row has the name and the body of the joint that was split; those before
+    are called ``name:1``, ``name:2`` and have no frames.
 
     Parameters
     ----------
@@ -74,23 +73,8 @@ def split(model: pin.Model) -> pin.Model:
     if not rows:
         return model
     _refuse_taken(model, rows)
-    result = pin.Model()
-    result.name = model.name
-    new_ids = {0: 0}
-    for old in range(1, model.njoints):
-        new = new_ids[model.parents[old]]
-        row = rows.get(old, [_Part(pin.SE3.Identity(), model.joints[old])])
-        names = _names(model.names[old], len(row))
-        for number, (part, name) in enumerate(zip(row, names, strict=True)):
-            base = pin.SE3.Identity() if number else model.jointPlacements[old]
-            new = int(result.addJoint(new, part.kind, base * part.placement, name))
-        new_ids[old] = new
-    for old, new in new_ids.items():
-        result.inertias[new] = model.inertias[old]
-    # All joints at once: from joint 1 on, the coordinates of both models are the same.
-    copy_joint_properties(model, list(range(1, model.njoints)), result, 1)
-    add_frames(model, result, new_ids, {})
-    result.gravity = model.gravity
+    new = {joint: JointRow(_new_joints(model, joint, row), [joint]) for joint, row in rows.items()}
+    result = rebuilt(model, new)
     for entry in model.referenceConfigurations:
         result.referenceConfigurations[entry.key()] = entry.data()
     return result
@@ -99,7 +83,7 @@ def split(model: pin.Model) -> pin.Model:
 def _changing(model: pin.Model) -> list[int]:
     """Return the indices of the joints whose motion subspace depends on q."""
     neutral = pin.neutral(model)
-    # Tangents with no two entries alike or zero, so that no joint is met at a special angle.
+    # Tangents without equal or zero entries, so that no joint is at a special angle.
     tangents = [np.cos(1.0 + k + np.arange(model.nv)) for k in range(_SAMPLES)]
     samples = [neutral] + [pin.integrate(model, neutral, tangent) for tangent in tangents]
     joints = range(1, model.njoints)
@@ -148,8 +132,16 @@ def _parts(joint: Any, what: str) -> Iterator[_Part]:
         yield _Part(here, joint)
 
 
+def _new_joints(model: pin.Model, joint: int, row: list[_Part]) -> list[NewJoint]:
+    """Return the parts as joints; the first is placed in the joint's parent."""
+    names = _names(model.names[joint], len(row))
+    joints = [NewJoint(name, kind, at) for name, (at, kind) in zip(names, row, strict=True)]
+    first = model.jointPlacements[joint] * row[0].placement
+    return [joints[0]._replace(placement=first), *joints[1:]]
+
+
 def _names(name: str, count: int) -> list[str]:
-    """Return the names of the joints in a row, the last one's being that of the whole."""
+    """Return the names of the joints in a row; the last has that of the whole."""
     return [f"{name}:{number}" for number in range(1, count)] + [name]
 
 
