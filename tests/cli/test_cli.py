@@ -167,7 +167,7 @@ def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
 def test_help_teaches() -> None:
     text = rps_pin("helix", "--help").stdout
     flat = " ".join(text.split())
-    assert "the one reading of it that stays clear of the flat, singular pose" in flat
+    assert "the only interpretation that keeps away from the flat, singular pose" in flat
     assert "rps-pin helix --robot micro" in flat
     for option in ("--robot", "--radius", "--pitch", "--height", "--rate", "--output", "--json"):
         assert option in text

@@ -1,50 +1,36 @@
-"""``rps-pin check``: a path against singularities and limits."""
+"""``rps-pin check``: a helix against singularities and limits."""
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import numpy as np
 import typer
 from rich.console import Console
 
-from rps_pin.cli.console import RobotOption, load_robot
-from rps_pin.cli.helix_options import (
-    DEFAULT_PITCH,
-    DEFAULT_RADIUS,
-    Branch,
-    BranchOption,
-    DurationOption,
-    HeightOption,
-    PitchOption,
-    RadiusOption,
-    chosen_helix,
-)
+from rps_pin.cli import helix_options as helix
+from rps_pin.cli.console import JsonOption, RobotOption, load_robot, print_json
 from rps_pin.rps.singularity.measures import GRAZE
 from rps_pin.rps.singularity.path_check import check_path
 from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck, SingularityEvent
-from rps_pin.trajectories.helix import PAPER_DURATION
 
 
 def check_command(
     robot: RobotOption = "sokolov",
-    radius: RadiusOption = DEFAULT_RADIUS,
-    pitch: PitchOption = DEFAULT_PITCH,
-    height: HeightOption = None,
-    branch: BranchOption = Branch.PLUS,
-    duration: DurationOption = PAPER_DURATION,
+    radius: helix.RadiusOption = helix.DEFAULT_RADIUS,
+    pitch: helix.PitchOption = helix.DEFAULT_PITCH,
+    height: helix.HeightOption = None,
+    branch: helix.BranchOption = helix.Branch.PLUS,
+    duration: helix.DurationOption = helix.DEFAULT_DURATION,
     threshold: Annotated[
         float,
         typer.Option(help="Distance to a singularity (0 to 1) below which a path grazes it."),
     ] = GRAZE,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the findings as JSON, and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Check a helix: where and when it meets a singularity, grazes one, or leaves a limit.
+    """Check a helix for singularities that it crosses or grazes, and limits that it leaves.
 
-    Every event is bracketed to a nanosecond. No force is computed.
+    Each event is located to a nanosecond. No force is computed.
 
     Exit status: 0 the path is clear; 1 it is not; 2 wrong usage.
 
@@ -57,22 +43,21 @@ def check_command(
     - `rps-pin check --radius 0.075 --pitch 0.05 --branch -` crosses none
     """
     machine = load_robot(robot)
-    path = chosen_helix(machine, radius, pitch, height, branch, duration)
+    path = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     found = check_path(machine, path, threshold=threshold)
     if as_json:
-        answer = _plain(found) | {
-            "robot": machine.parameters.name,
-            "ok": found.ok,
-            "singularities": [_plain(event) for event in found.singularities],
-            "limits": [_plain(event) for event in found.limits],
-        }
-        typer.echo(json.dumps(answer, indent=2))
+        events = {name: [_plain(e) for e in getattr(found, name)] for name in _EVENTS}
+        print_json(_plain(found) | events | {"robot": machine.parameters.name, "ok": found.ok})
     else:
         console = Console(soft_wrap=True)
         for line in found.lines():
             console.print(line, highlight=False, markup=False)
     if not found.ok:
         raise typer.Exit(1)
+
+
+#: Fields of `PathCheck` that hold events.
+_EVENTS = ("singularities", "limits")
 
 
 def _plain(found: PathCheck | SingularityEvent | LimitEvent) -> dict[str, object]:

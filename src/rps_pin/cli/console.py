@@ -1,15 +1,23 @@
-"""What the commands share: the robot's option, and how it is read."""
+"""Options and output that commands share: the robot, JSON, files, progress."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
+from rich.console import Console
+from rich.progress import track
 
 from rps_pin.cli.completion import names_or_files, preset_names
 from rps_pin.rps import robot_file
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.unit_doubts import unit_doubts
+
+#: A vector: a pose (z, tilt_x, tilt_y), three leg lengths, a direction.
+Three = tuple[float, float, float]
 
 RobotOption = Annotated[
     str,
@@ -22,11 +30,40 @@ RobotOption = Annotated[
         autocompletion=names_or_files(preset_names),
     ),
 ]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON only.")]
+RateOption = Annotated[float, typer.Option(help="Samples per second, Hz.")]
+#: Of commands with a fixed folder, and of those that name it after their file.
+FolderOption = Annotated[
+    Path, typer.Option("--output", "-o", help="Folder for the results; it is made.")
+]
+NamedFolderOption = Annotated[
+    Path | None,
+    typer.Option("--output", "-o", help="Folder for the results; default: named after the file."),
+]
 
 
 def load_robot(name_or_file: str) -> RPSRobot:
-    """Return the robot of a preset's name or of a parameter file; doubt its units aloud."""
+    """Return the robot of a preset's name or of a parameter file; print doubts about its units."""
     robot = robot_file.load_robot(name_or_file)
     for doubt in unit_doubts(robot.parameters):
         typer.echo(f"note: {name_or_file}: {doubt}. Units are SI: m, kg, kg m^2", err=True)
     return robot
+
+
+def print_json(answer: dict[str, Any]) -> None:
+    """Print a result as JSON, paths as strings."""
+    typer.echo(json.dumps(answer, indent=2, default=str))
+
+
+def print_files(console: Console, files: list[Path]) -> None:
+    """Print which files were written."""
+    console.print("Written:")
+    for file in files:
+        console.print(f"  {file}", highlight=False, soft_wrap=True)
+
+
+def progress_bar(console: Console, task: str) -> Callable[[Iterable[Any]], Iterable[Any]]:
+    """Return a wrapper of loops that shows a progress bar on a terminal."""
+    return lambda items: track(
+        items, task, console=console, transient=True, disable=not console.is_terminal
+    )

@@ -10,8 +10,8 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
+from rps_pin.cli.console import JsonOption, NamedFolderOption, print_files, print_json
 from rps_pin.cli.layer_options import chosen_layers
-from rps_pin.cli.motion_report import print_files
 from rps_pin.errors import RPSPinError
 
 if TYPE_CHECKING:
@@ -28,23 +28,18 @@ def control_command(
     scenario: Annotated[
         Path, typer.Argument(metavar="SCENARIO", help="A YAML file; see docs/control.md.")
     ],
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="Folder for the results; named after SCENARIO."),
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")
-    ] = False,
+    output: NamedFolderOption = None,
+    as_json: JsonOption = False,
 ) -> None:
-    """Run a control loop against a simulated 3-RPS that is not quite what its controller believes.
+    """Run a control loop against a simulated 3-RPS that differs from the controller's model.
 
-    The file says which robot, trajectory, controller, plant (wrong masses, friction, encoders,
-    delay) and faults. Written to the output folder: **report.md** with gains, margins, errors in
-    micrometres and microradians and statuses, **loop.csv** (every tick), figures, **summary.json**,
-    and **viewer.html**, the motion in 3D.
+    The file has the robot, trajectory, controller, plant (wrong masses, friction, encoders, delay)
+    and faults. Output: **report.md** with gains, margins, errors in micrometres and microradians
+    and statuses, **loop.csv** (every tick), figures, **summary.json**, and **viewer.html**, the
+    motion in 3D.
 
-    Exit status: 0 done, whatever the controller said; 1 it cannot be run, or not to the end (why is
-    said); 2 wrong usage; 130 Ctrl-C. What was run until then is written all the same.
+    Exit status: 0 done, also if the controller stopped; 1 it cannot be run, or not to the end (the
+    error says why); 2 wrong usage; 130 Ctrl-C. What was run before the end is written.
 
     Examples:
 
@@ -63,12 +58,7 @@ def control_command(
     with console.status("writing the results"):
         files = _write(folder, scenario.name, loaded, run, summary, window)
     if as_json:
-        answer = {
-            "scenario": str(scenario),
-            **summary.as_dict(),
-            "files": [str(file) for file in files],
-        }
-        typer.echo(json.dumps(answer, indent=2))
+        print_json({"scenario": scenario} | summary.as_dict() | {"files": files})
         if broken is not None:
             raise broken
         return
@@ -88,7 +78,7 @@ def control_command(
 
 
 def _run(scenario: Scenario, console: Console) -> tuple[LoopRun, BaseException | None]:
-    """Return what was run, and what broke it off; raise that if nothing was."""
+    """Return what was run, and the error that ended it; raise the error if nothing was run."""
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("control loop", total=1.0)
         try:

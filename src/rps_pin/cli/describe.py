@@ -1,24 +1,22 @@
-"""``rps-pin describe``: what a mechanism is made of, and how it can move."""
+"""``rps-pin describe``: joints, closures, mobility and actuation of a mechanism."""
 
 from __future__ import annotations
 
 import json
-from typing import Annotated
 
 import typer
 
+from rps_pin.cli.console import JsonOption
 from rps_pin.cli.mechanism_options import FileArgument, load_mechanism
 
 
 def describe_command(
     file: FileArgument,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print it as JSON, and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Describe any mechanism: joints, closures, rank, mobility, and whether its actuators suffice.
 
-    Exit status: 0; 1 if the file is no mechanism, or its loops do not close; 2 wrong usage.
+    Exit status: 0; 1 if the file is not a mechanism, or its loops do not close; 2 wrong usage.
 
     Examples:
 

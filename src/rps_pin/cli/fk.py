@@ -1,8 +1,7 @@
-"""``rps-pin fk``: the poses that leg lengths allow."""
+"""``rps-pin fk``: the poses with given leg lengths."""
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import numpy as np
@@ -10,35 +9,31 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from rps_pin.cli.console import RobotOption, load_robot
+from rps_pin.cli.console import JsonOption, RobotOption, Three, load_robot, print_json
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
 from rps_pin.rps.robot import RPSRobot
 
-Triple = tuple[float, float, float]
-
 
 def fk_command(
-    lengths: Annotated[Triple, typer.Option(metavar="D1 D2 D3", help="The three leg lengths, m.")],
+    lengths: Annotated[Three, typer.Option(metavar="D1 D2 D3", help="The three leg lengths, m.")],
     near: Annotated[
-        Triple | None,
+        Three | None,
         typer.Option(
             metavar="Z TILT_X TILT_Y",
-            help="Only the pose that continues this one (m, rad, rad), if it can be followed.",
+            help="Only the pose that is reached from this one (m, rad, rad).",
         ),
     ] = None,
     robot: RobotOption = "sokolov",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the answer as JSON, and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compute the poses of given leg lengths: every assembly mode, or the one near a known pose.
 
-    Lengths alone leave up to 16 ways to assemble the robot, in pairs mirrored in the base plane
-    (Eq. 8). All of them are listed, whatever the robot's limits. With **--near**, the lengths are
-    followed from those of that pose: the answer is the one a moving robot would be in. A way that
-    meets a singularity is refused.
+    Leg lengths have up to 16 assembly modes, in pairs mirrored in the base plane (Eq. 8). All are
+    listed, also outside the robot's limits. With **--near**, the lengths are followed from those of
+    that pose: the result is the pose that a moving robot reaches. A path that meets a singularity
+    is an error.
 
-    Exit status: 0 found; 1 not (why is said); 2 wrong usage.
+    Exit status: 0 found; 1 not found (the error says why); 2 wrong usage.
 
     Examples:
 
@@ -56,56 +51,45 @@ def fk_command(
         _show_one(machine, lengths, near, as_json=as_json)
 
 
-def _show_one(robot: RPSRobot, lengths: Triple, near: Triple, *, as_json: bool) -> None:
+def _show_one(robot: RPSRobot, lengths: Three, near: Three, *, as_json: bool) -> None:
     pose = robot.forward_kinematics(lengths, near=near)
     position, _ = robot.platform_placement(pose)
     if as_json:
-        answer = {
-            "robot": robot.parameters.name,
-            "length": list(lengths),
-            "pose": pose.tolist(),
-            "position": position.tolist(),
-        }
-        typer.echo(json.dumps(answer, indent=2))
+        answer = {"pose": pose.tolist(), "position": position.tolist()}
+        print_json({"robot": robot.parameters.name, "length": lengths} | answer)
         return
     z, tilt_x, tilt_y = pose
-    x, y, _ = 1e3 * position + 0.0
-    console = Console(soft_wrap=True)
-    console.print(
+    x, y, _ = 1e3 * position + 0.0  # no negative zeros
+    Console(soft_wrap=True).print(
         f"z = {z:.9g} m, tilt = ({tilt_x:.9g}, {tilt_y:.9g}) rad; "
-        f"the centre is ({x:.6g}, {y:.6g}) mm off the middle",
+        f"centre at x = {x:.6g} mm, y = {y:.6g} mm",
         highlight=False,
     )
 
 
-def _show_all(robot: RPSRobot, modes: AssemblyModes, lengths: Triple, *, as_json: bool) -> None:
+def _show_all(robot: RPSRobot, modes: AssemblyModes, lengths: Three, *, as_json: bool) -> None:
     if as_json:
         solutions = [
-            {
-                "pose": modes.pose[k].tolist() if modes.has_pose[k] else None,
-                "position": modes.position[k].tolist(),
-                "rotation": modes.rotation[k].tolist(),
-                "angle": modes.angle[k].tolist(),
-                "above": bool(modes.above[k]),
-                "mirror": int(modes.mirror[k]),
-                "double": bool(modes.double[k]),
-                "residual": float(modes.residual[k]),
-            }
+            {name: getattr(modes, name)[k].tolist() for name in _SHOWN}
+            | {"pose": modes.pose[k].tolist() if modes.has_pose[k] else None}
             for k in range(len(modes.angle))
         ]
-        answer = {"robot": robot.parameters.name, "length": list(lengths), "modes": solutions}
-        typer.echo(json.dumps(answer, indent=2))
+        print_json({"robot": robot.parameters.name, "length": lengths, "modes": solutions})
     else:
         _print_modes(modes)
     if not len(modes.angle):
         raise typer.Exit(1)
 
 
+#: What the JSON has of each assembly mode, besides its pose.
+_SHOWN = ("position", "rotation", "angle", "above", "mirror", "double", "residual")
+
+
 def _print_modes(modes: AssemblyModes) -> None:
     console = Console()
     count = len(modes.angle)
     if not count:
-        console.print("no way was found to assemble the robot with these lengths", highlight=False)
+        console.print("no assembly mode has these lengths", highlight=False)
         return
     table = Table("", "z (m)", "tilt_x (rad)", "tilt_y (rad)", "leg angles (degrees)", "mirror")
     for column in table.columns[:5]:

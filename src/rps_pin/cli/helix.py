@@ -2,64 +2,47 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich.console import Console
 
-from rps_pin.cli.console import RobotOption, load_robot
-from rps_pin.cli.helix_options import (
-    DEFAULT_PITCH,
-    DEFAULT_RADIUS,
-    Branch,
-    BranchOption,
-    DurationOption,
-    HeightOption,
-    PitchOption,
-    RadiusOption,
-    chosen_helix,
-)
-from rps_pin.cli.motion_report import (
-    actuator_table,
-    print_exceeded,
+from rps_pin.cli import helix_options as helix
+from rps_pin.cli.console import (
+    FolderOption,
+    JsonOption,
+    RateOption,
+    RobotOption,
+    load_robot,
     print_files,
-    run_table,
-    sample_progress,
-    write_motion,
+    print_json,
+    progress_bar,
 )
-from rps_pin.rps.dynamics.motion_run import MotionSummary, run_motion, summarise
-from rps_pin.rps.robot import RPSRobot
-from rps_pin.trajectories.helix import PAPER_DURATION, HelixPath
+from rps_pin.cli.motion_report import actuator_table, print_exceeded, run_table, write_motion
+from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 
 
 def helix_command(
     robot: RobotOption = "sokolov",
-    radius: RadiusOption = DEFAULT_RADIUS,
-    pitch: PitchOption = DEFAULT_PITCH,
-    height: HeightOption = None,
-    branch: BranchOption = Branch.PLUS,
-    duration: DurationOption = PAPER_DURATION,
-    rate: Annotated[float, typer.Option(help="Samples a second, Hz.")] = 1000.0,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="Folder for the results; made if need be.")
-    ] = Path("helix"),
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")
-    ] = False,
+    radius: helix.RadiusOption = helix.DEFAULT_RADIUS,
+    pitch: helix.PitchOption = helix.DEFAULT_PITCH,
+    height: helix.HeightOption = None,
+    branch: helix.BranchOption = helix.Branch.PLUS,
+    duration: helix.DurationOption = helix.DEFAULT_DURATION,
+    rate: RateOption = 1000.0,
+    output: FolderOption = Path("helix"),
+    as_json: JsonOption = False,
 ) -> None:
     """Compute the actuator forces of a 3-RPS along the paper's helix.
 
     The platform's centre climbs one turn of a helix (Eq. 26 to 29; the last branch of Eq. 29 is
-    corrected, as it is misprinted). The loops are closed by Pinocchio constraint models and the
-    forces solve the constrained RNEA. Written to the output folder: **helix.csv** (every sample),
-    figures like the paper's 7, 8 and 9 (PNG and SVG), and **viewer.html**, the motion in 3D, which
-    any browser opens from disk.
+    corrected, as it is misprinted). The loops are closed by Pinocchio constraint models, and the
+    forces solve the constrained RNEA. Output: **helix.csv** (every sample), figures like the
+    paper's 7, 8 and 9 (PNG and SVG), and **viewer.html**, the motion in 3D, which any browser
+    opens from disk.
 
-    The defaults are the paper's Table 1 with z_0 read as 0.4 m: the one reading of it that stays
-    clear of the flat, singular pose. At the 0.4 mm it prints the robot lies all but flat in its
-    base, and the motion crosses poses that no actuator force could hold.
+    The defaults are the paper's Table 1 with z_0 read as 0.4 m, the only interpretation that keeps
+    away from the flat, singular pose. At the 0.4 mm that it prints, the robot lies almost flat in
+    its base, and the motion crosses poses that no actuator force can hold.
 
     Examples:
 
@@ -69,49 +52,24 @@ def helix_command(
 
     - `rps-pin helix --robot mine.yaml --rate 100 --output results --json`
 
-    Exit status: 0 done; 1 the robot cannot do it (why is said); 2 wrong usage.
+    Exit status: 0 done; 1 the robot cannot follow it (the error says why); 2 wrong usage.
     """
     machine = load_robot(robot)
-    path = chosen_helix(machine, radius, pitch, height, branch, duration)
+    path = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     console = Console(quiet=as_json)
-    run = run_motion(machine, path, rate, progress=sample_progress(console))
+    run = run_motion(machine, path, rate, progress=progress_bar(console, "inverse dynamics"))
     summary = summarise(run, machine)
     output.mkdir(parents=True, exist_ok=True)
+    name = machine.parameters.name
     with console.status("writing the results"):
-        title = f"3-RPS {machine.parameters.name} along a helix"
-        files = write_motion(output, "helix", title, machine, run)
+        files = write_motion(output, "helix", f"3-RPS {name} along a helix", machine, run)
     if as_json:
-        typer.echo(json.dumps(_as_json(machine, path, summary, files), indent=2))
-    else:
-        _print_tables(console, machine, path, summary, files)
-
-
-def _as_json(
-    robot: RPSRobot, path: HelixPath, summary: MotionSummary, files: list[Path]
-) -> dict[str, object]:
-    return {
-        "robot": robot.parameters.name,
-        "helix": {
-            "radius": path.radius,
-            "pitch": path.pitch,
-            "height": path.height,
-            "branch": path.branch,
-            "tilt": path.tilt,
-        },
-        **summary.as_dict(),
-        "files": [str(file) for file in files],
-    }
-
-
-def _print_tables(
-    console: Console,
-    robot: RPSRobot,
-    path: HelixPath,
-    summary: MotionSummary,
-    files: list[Path],
-) -> None:
+        described = ("radius", "pitch", "height", "branch", "tilt")
+        answer = {"robot": name, "helix": {one: getattr(path, one) for one in described}}
+        print_json(answer | summary.as_dict() | {"files": files})
+        return
     console.print(
-        f"3-RPS [bold]{robot.parameters.name}[/], helix of radius {1e3 * path.radius:g} mm, "
+        f"3-RPS [bold]{name}[/], helix of radius {1e3 * path.radius:g} mm, "
         f"pitch {1e3 * path.pitch:g} mm, from {path.height:g} m",
         highlight=False,
     )

@@ -1,4 +1,4 @@
-"""The options that describe a helix, for every command that takes one."""
+"""Options of a helix, for the commands that take one."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import typer
 from rps_pin.errors import InputError
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.trajectories.helix import HelixPath, helix
+from rps_pin.trajectories.helix import PAPER_DURATION, HelixPath, helix
 
 DEFAULT_RADIUS = 0.75e-3
 DEFAULT_PITCH = 0.5e-3
-#: z_0 of Table 1 as read here, and the base radius g that stands beside it, m.
+DEFAULT_DURATION = PAPER_DURATION
+#: z_0 of Table 1 as interpreted here, and its base radius g, m.
 _PAPER_HEIGHT, _PAPER_BASE_RADIUS = 0.4, 0.46
 
 
@@ -27,12 +28,12 @@ class Branch(StrEnum):
 
 
 RadiusOption = Annotated[float, typer.Option(help="Radius r_h of the helix, m.")]
-PitchOption = Annotated[float, typer.Option(help="Pitch p_h: the climb in its one turn, m.")]
+PitchOption = Annotated[float, typer.Option(help="Pitch p_h: the climb in one turn, m.")]
 HeightOption = Annotated[
     float | None,
     typer.Option(
-        help="Height z_0 of the platform at the start, m. Left out: the middle of the legs' "
-        "stroke; without limits, the paper's 0.4 m, in proportion to the base.",
+        help="Height z_0 of the platform at the start, m. Default: the middle of the legs' "
+        "stroke; without limits, the paper's 0.4 m in proportion to the base.",
         show_default=False,
     ),
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
@@ -10,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rps_pin.arrays import Array
-from rps_pin.cli.console import RobotOption, load_robot
+from rps_pin.cli.console import JsonOption, RobotOption, Three, load_robot, print_json
 from rps_pin.errors import LimitViolation, UnreachableError
 from rps_pin.rps.kinematics.legs import cone_angles
 from rps_pin.rps.parameters import RPSParameters
@@ -19,17 +18,15 @@ from rps_pin.rps.robot import RPSRobot
 
 def ik_command(
     pose: Annotated[
-        tuple[float, float, float],
-        typer.Option(metavar="Z TILT_X TILT_Y", help="The pose: height (m) and tilt (rad)."),
+        Three, typer.Option(metavar="Z TILT_X TILT_Y", help="The pose: height (m), tilt (rad).")
     ],
     robot: RobotOption = "sokolov",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the answer as JSON, and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compute the leg lengths and angles of a pose, and check them against the robot's limits.
 
-    Exit status: 0 the pose is within every limit; 1 it is not (which, and by how much, is said).
+    Exit status: 0 the pose is within all limits; 1 it is not (the error says which limits it
+    exceeds, and by how much).
 
     Example: `rps-pin ik --robot micro --pose 0.22 0.1 -0.05`
     """
@@ -49,7 +46,7 @@ def ik_command(
             "reachable": bool(legs.reachable),
             "violations": [one._asdict() for one in _violations(machine, pose)],
         }
-        typer.echo(json.dumps(answer, indent=2))
+        print_json(answer)
     else:
         console = Console()
         x, y, z = 1e3 * position + 0.0  # no negative zeros
@@ -61,7 +58,7 @@ def ik_command(
         machine.inverse_kinematics(pose)  # raises, and says what is broken
 
 
-def _violations(robot: RPSRobot, pose: tuple[float, float, float]) -> tuple[LimitViolation, ...]:
+def _violations(robot: RPSRobot, pose: Three) -> tuple[LimitViolation, ...]:
     try:
         robot.inverse_kinematics(pose)
     except UnreachableError as error:

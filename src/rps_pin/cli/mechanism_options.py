@@ -1,4 +1,4 @@
-"""What the commands for any mechanism share: the file's argument, and values by joint name."""
+"""Arguments of the commands for any mechanism: its file, and values by joint name."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def mechanism_file(file: Path) -> Path:
     names = mechanism_names()
     if str(file) not in names:
         raise InputError(
-            f"{str(file)!r} is no file, and no mechanism of the package; those are: "
+            f"{str(file)!r} is not a file or a mechanism of the package; those are: "
             f"{', '.join(names)}"
         )
     return Path(str(resources.files("rps_pin"))) / "urdf" / f"{file}.yaml"

@@ -1,12 +1,10 @@
-"""What the commands that compute a motion's forces share: progress, files, tables."""
+"""Files and tables of the commands that compute the forces of a motion."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
 from rps_pin.cli.layer_options import chosen_layers
@@ -14,17 +12,6 @@ from rps_pin.rps.dynamics.motion_csv import write_csv
 from rps_pin.rps.dynamics.motion_run import ActuatorSummary, MotionRun, MotionSummary
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.path import Trajectory, end_states
-
-
-def sample_progress(console: Console) -> Callable[[Iterable[int]], Iterable[int]]:
-    """Return what wraps the loop over a motion's samples with a bar, on a terminal."""
-    return lambda samples: track(
-        samples,
-        "inverse dynamics",
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )
 
 
 def write_motion(
@@ -95,10 +82,3 @@ def print_exceeded(console: Console, summary: MotionSummary) -> None:
     """Print a line for each actuator limit that the motion exceeds."""
     for sentence in summary.exceeded:
         console.print(f"[bold yellow]beyond a limit:[/] {sentence}", highlight=False)
-
-
-def print_files(console: Console, files: list[Path]) -> None:
-    """Print what was written."""
-    console.print("Written:")
-    for file in files:
-        console.print(f"  {file}", highlight=False, soft_wrap=True)

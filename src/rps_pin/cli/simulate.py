@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +13,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from rps_pin.arrays import Array
+from rps_pin.cli.console import JsonOption, NamedFolderOption, print_files, print_json
 from rps_pin.cli.layer_options import LayersOption, chosen_layers
 from rps_pin.cli.mechanism_options import (
     FileArgument,
@@ -37,51 +37,47 @@ class Method(StrEnum):
 
 def simulate_command(
     file: FileArgument,
-    duration: Annotated[float, typer.Option(help="How long, s.")] = 1.0,
-    step: Annotated[float, typer.Option(help="Time step, and between two rows, s.")] = 1e-3,
+    duration: Annotated[float, typer.Option(help="Simulated time, s.")] = 1.0,
+    step: Annotated[float, typer.Option(help="Time step, and time between two rows, s.")] = 1e-3,
     method: Annotated[
-        Method, typer.Option(help="Fixed steps of order 4, or as long as 1e-12 of error allows.")
+        Method,
+        typer.Option(help="Fixed steps of order 4, or adaptive with an error of 1e-12."),
     ] = Method.RK4,
     start: Annotated[
         list[str] | None,
         typer.Option(
             metavar="JOINT=VALUE",
-            help="Where a joint starts, rad or m; the others follow from home.",
+            help="Initial position of a joint, rad or m; the others start from home.",
         ),
     ] = None,
     speed: Annotated[
         list[str] | None,
         typer.Option(
             metavar="JOINT=VALUE",
-            help="How fast an actuated joint starts, rad/s or m/s; zero if left out.",
+            help="Initial speed of an actuated joint, rad/s or m/s; default: 0.",
         ),
     ] = None,
     tau: Annotated[
         list[str] | None,
         typer.Option(
             metavar="JOINT=VALUE",
-            help="Constant force of an actuated joint, N m or N; zero if left out.",
+            help="Constant force of an actuated joint, N m or N; default: 0.",
         ),
     ] = None,
     hold: Annotated[
-        bool, typer.Option("--hold", help="Add the forces that carry the weight at the start.")
+        bool, typer.Option("--hold", help="Add the forces that hold the initial position.")
     ] = False,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="Folder for the results; named after FILE."),
-    ] = None,
+    output: NamedFolderOption = None,
     layers: LayersOption = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Simulate any mechanism from rest or a start of yours, its loops closed at every step.
+    """Simulate a mechanism from rest or a given state, with its loops closed at every step.
 
-    Written to the output folder: **simulation.csv** (every step), **simulation.png** and **.svg**
-    (joints, energy, gap), and **viewer.html**, the motion in 3D (a skeleton where the description
-    names no URDF), with layers to tick: forces, reactions, joint limits and others.
+    Output: **simulation.csv** (every step), **simulation.png** and **.svg** (joints, energy, gap),
+    and **viewer.html**, the motion in 3D (a skeleton if the description names no URDF), with
+    layers: forces, reactions, joint limits and others.
 
-    Exit status: 0 done; 1 the mechanism cannot do it (why, and when, is said); 2 wrong usage.
+    Exit status: 0 done; 1 it cannot be simulated (the error says when and why); 2 wrong usage.
 
     Examples:
 
@@ -112,10 +108,10 @@ def simulate_command(
     files = write_results(folder, file, mechanism, motion, layers)
     summary = _summary(motion)
     if as_json:
-        answer = {"mechanism": mechanism.name, **summary, "files": [str(f) for f in files]}
-        typer.echo(json.dumps(answer, indent=2))
+        print_json({"mechanism": mechanism.name} | summary | {"files": files})
     else:
-        _print(console, mechanism, motion, summary, files)
+        _print(console, mechanism, motion, summary)
+        print_files(console, files)
 
 
 def write_results(
@@ -201,7 +197,6 @@ def _print(
     mechanism: ClosedLoopModel,
     motion: Simulation,
     summary: dict[str, object],
-    files: list[Path],
 ) -> None:
     table = Table(title=f"{mechanism.name}, simulated", title_justify="left", show_header=False)
     rows = {
@@ -217,6 +212,3 @@ def _print(
         console.print(f"note: {passed}", highlight=False)
     if len(motion.limits_passed) > _MOST_NOTES:
         console.print(f"note: so did {len(motion.limits_passed) - _MOST_NOTES} more joints later")
-    console.print("Written:")
-    for file in files:
-        console.print(f"  {file}", highlight=False)

@@ -14,14 +14,13 @@ from rps_pin.files import whole_file
 def urdf_command(
     robot: RobotOption = "sokolov",
     output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="File to write; without it, standard output."),
+        Path | None, typer.Option("--output", "-o", help="File to write; default: standard output.")
     ] = None,
 ) -> None:
-    """Write the URDF of a 3-RPS: a preset's, or a parameter file's.
+    """Write the URDF of a 3-RPS: of a preset, or of a parameter file.
 
-    URDF knows no loops: the file holds the open legs, the free platform, and for each leg the two
-    frames that the spherical joint holds together, *platform_ball_i* and *leg_i_ball*.
+    URDF has no loops: the file holds the open legs, the free platform, and for each leg the two
+    frames that the spherical joint connects, *platform_ball_i* and *leg_i_ball*.
 
     Example: `rps-pin urdf --robot micro -o micro.urdf`
     """

@@ -4,57 +4,44 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import track
 
+from rps_pin.cli import helix_options as helix
 from rps_pin.cli.completion import mechanism_names, names_or_files
-from rps_pin.cli.console import RobotOption, load_robot
-from rps_pin.cli.helix_options import (
-    DEFAULT_PITCH,
-    DEFAULT_RADIUS,
-    Branch,
-    BranchOption,
-    DurationOption,
-    HeightOption,
-    PitchOption,
-    RadiusOption,
-    chosen_helix,
-)
+from rps_pin.cli.console import RobotOption, Three, load_robot, progress_bar
 from rps_pin.cli.layer_options import LayersOption, SizeOption, chosen_layers, chosen_size
 from rps_pin.cli.mechanism_options import load_mechanism, mechanism_file
 from rps_pin.errors import InputError
-from rps_pin.trajectories.helix import PAPER_DURATION
 
 
 def view_command(
     robot: RobotOption = "sokolov",
     pose: Annotated[
-        tuple[float, float, float] | None,
+        Three | None,
         typer.Option(
             metavar="Z TILT_X TILT_Y",
-            help="Show this pose (m, rad, rad) and hold it, instead of playing the helix.",
+            help="Show this pose (m, rad, rad) instead of the helix.",
         ),
     ] = None,
-    radius: RadiusOption = DEFAULT_RADIUS,
-    pitch: PitchOption = DEFAULT_PITCH,
-    height: HeightOption = None,
-    branch: BranchOption = Branch.PLUS,
-    duration: DurationOption = PAPER_DURATION,
+    radius: helix.RadiusOption = helix.DEFAULT_RADIUS,
+    pitch: helix.PitchOption = helix.DEFAULT_PITCH,
+    height: helix.HeightOption = None,
+    branch: helix.BranchOption = helix.Branch.PLUS,
+    duration: helix.DurationOption = helix.DEFAULT_DURATION,
     layers: LayersOption = None,
-    html: Annotated[Path | None, typer.Option(help="Write this page, and start no server.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write this page; start no server.")] = None,
     png: Annotated[
-        Path | None, typer.Option(help="Write this picture (by a Chromium), and start no server.")
+        Path | None, typer.Option(help="Write this picture (with Chromium); start no server.")
     ] = None,
     video: Annotated[
         Path | None,
-        typer.Option(help="Write this film: .mp4, .gif or .webp; and start no server."),
+        typer.Option(help="Write this film: .mp4, .gif or .webp; start no server."),
     ] = None,
-    time: Annotated[float, typer.Option(help="Moment of the picture, s.")] = 0.0,
+    time: Annotated[float, typer.Option(help="Time of the picture, s.")] = 0.0,
     size: SizeOption = "1000x620",
     background: Annotated[
         str | None,
@@ -63,7 +50,7 @@ def view_command(
         ),
     ] = None,
     interactive: Annotated[
-        bool, typer.Option("--interactive", "-i", help="Sliders and readings beside the robot.")
+        bool, typer.Option("--interactive", "-i", help="A panel with sliders and values.")
     ] = False,
     mechanism: Annotated[
         Path | None,
@@ -74,14 +61,14 @@ def view_command(
         ),
     ] = None,
     port: Annotated[
-        int | None, typer.Option(help="Port to serve on; without it, a free one is found.")
+        int | None, typer.Option(help="Port of the server; default: a free one.")
     ] = None,
 ) -> None:
     """Show a 3-RPS in the browser: a pose, or the helix in a loop.
 
-    Starts a Meshcat server that answers to this machine only, prints its address, and runs until
-    Ctrl-C. Or writes files: a page, a picture, a film. Or, with **--interactive**, serves a page
-    with sliders for pose and leg lengths, or for any mechanism's joints.
+    Starts a Meshcat server for this machine only, prints its address, and runs until Ctrl-C. With
+    **--html**, **--png** or **--video** it writes files instead. With **--interactive** it serves a
+    page with sliders for pose and leg lengths, or for the joints of any mechanism.
 
     Examples:
 
@@ -106,7 +93,7 @@ def view_command(
     sides = chosen_size(size)
     motion: Any = pose
     if pose is None:
-        motion = chosen_helix(machine, radius, pitch, height, branch, duration)
+        motion = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     if html is not None:
         save_html(html, machine, motion, layers=shown, hidden=at_hand)
         typer.echo(f"wrote {html}")
@@ -115,7 +102,8 @@ def view_command(
         save_png(png, machine, motion, time=time, **picture)
         typer.echo(f"wrote {png}")
     if video is not None:
-        save_video(video, machine, motion, progress=_progress, **picture)
+        progress = progress_bar(Console(stderr=True), "drawing")
+        save_video(video, machine, motion, progress=progress, **picture)
         typer.echo(f"wrote {video}")
     if html or png or video:
         return
@@ -129,7 +117,7 @@ def view_command(
 
 def _interact(
     robot: str,
-    pose: tuple[float, float, float] | None,
+    pose: Three | None,
     mechanism: Path | None,
     port: int | None,
     layers: str | None,
@@ -154,14 +142,3 @@ def _interact(
         with contextlib.suppress(KeyboardInterrupt):
             threading.Event().wait()
     typer.echo("\nended")
-
-
-def _progress(times: Iterable[float]) -> Iterable[float]:
-    console = Console(stderr=True)
-    return track(
-        times,
-        "drawing",
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    )

@@ -1,18 +1,24 @@
-"""``rps-pin workspace``: where a 3-RPS can go, as in the paper's Section 3."""
+"""``rps-pin workspace``: the workspace of a 3-RPS, as in the paper's Section 3."""
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import track
 from rich.table import Table
 
-from rps_pin.cli.console import RobotOption, load_robot
+from rps_pin.cli.console import (
+    FolderOption,
+    JsonOption,
+    RobotOption,
+    load_robot,
+    print_files,
+    print_json,
+    progress_bar,
+)
 from rps_pin.errors import InputError
 from rps_pin.paper import PaperComparison, paper_comparison
 from rps_pin.rps.robot import RPSRobot
@@ -37,25 +43,21 @@ def workspace_command(
     points: Annotated[
         int, typer.Option(help="Lengths per leg; 51 are the paper's 1 mm steps over 50 mm.")
     ] = 51,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="Folder for the results; made if need be.")
-    ] = Path("workspace"),
+    output: FolderOption = Path("workspace"),
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace results that stand in the folder.")
+        bool, typer.Option("--overwrite", help="Replace existing results.")
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")
-    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compute the workspace of a 3-RPS by discretised leg lengths, as the paper does.
 
     Every triple of leg lengths on the grid is solved by direct kinematics, in the assembly mode
-    above the base, and held against the robot's limits. Written to the output folder: the points
-    and fields over them (**workspace.h5**), the boundary as a mesh (**boundary.stl**), and figures
-    like the paper's 2 to 6. For the paper's robot, **micro**, what the paper states stands beside
-    what is computed, for several base radii g, which the paper does not give.
+    above the base, and checked against the robot's limits. Output: the points with their fields
+    (**workspace.h5**), the boundary as a mesh (**boundary.stl**), and figures like the paper's 2 to
+    6. For the paper's robot, **micro**, the paper's statements are compared with the results for
+    several base radii g, which the paper does not give.
 
-    Exit status: 0 done; 1 not (why is said); 2 wrong usage.
+    Exit status: 0 done; 1 an error; 2 wrong usage.
 
     Example: `rps-pin workspace --points 101 -o results`
     """
@@ -63,31 +65,22 @@ def workspace_command(
     folder = _prepared(output, overwrite=overwrite)
     console = Console(quiet=as_json)
     grid = leg_grid(machine.parameters, points)
-    quiet = as_json or not console.is_terminal
-    found = workspace(
-        machine,
-        grid,
-        progress=lambda blocks: track(
-            blocks, "direct kinematics", console=console, transient=True, disable=quiet
-        ),
-    )
+    found = workspace(machine, grid, progress=progress_bar(console, "direct kinematics"))
     rows = paper_comparison() if machine.parameters.name == "micro" else ()
     summary = _summary(machine, found, rows)
     with console.status("writing the results"):
         files = _write(folder, machine, found, rows, overwrite=overwrite)
     if as_json:
-        typer.echo(json.dumps(summary | {"files": [str(file) for file in files]}, indent=2))
+        print_json(summary | {"files": files})
         return
     console.print(_table(summary))
     if rows:
         console.print(_comparison_table(rows))
-    console.print("Written:")
-    for file in files:
-        console.print(f"  {file}", highlight=False, soft_wrap=True)
+    print_files(console, files)
 
 
 def _prepared(folder: Path, *, overwrite: bool) -> Path:
-    """Make the folder, or refuse one that holds results."""
+    """Make the folder; refuse one that has results."""
     if not overwrite and (folder / "workspace.h5").exists():
         raise InputError(f"{folder / 'workspace.h5'} exists; --overwrite replaces it")
     folder.mkdir(parents=True, exist_ok=True)
@@ -102,7 +95,7 @@ def _write(
     *,
     overwrite: bool,
 ) -> list[Path]:
-    # Only this command draws: the others shall not wait for these to be imported.
+    # Slow to import: only for commands that draw.
     from rps_pin.plots import save_figure
     from rps_pin.plots.workspace import (
         plot_assembly_modes,
