@@ -22,7 +22,7 @@ import numpy as np
 from marked import block, replaced
 
 from rps_pin import RPSRobot, helix
-from rps_pin.paper.three_ways import force_differences
+from rps_pin.paper import lagrange_forces, virtual_work_forces
 from rps_pin.plots import STYLE, plot_force_causes
 from rps_pin.rps import Payload, force_causes, time_optimal
 from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
@@ -76,6 +76,23 @@ def agreement() -> str:
         cells = [f"{found[way]:.1e}" for way in WAYS]
         lines.append(f"| {name} | {len(run.time)} | {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def force_differences(robot: RPSRobot, run: MotionRun) -> dict[str, float]:
+    """Return the largest difference to the constraint models' forces, by the way to compute them.
+
+    Relative to the largest force of the same sample.
+    """
+    motion = run.pose, run.rate, run.acceleration
+    limit = robot.mechanism.max_condition
+    forces = (
+        robot.actuator_forces(*motion),
+        lagrange_forces(robot.parameters, *motion, max_gain=limit).force,
+        virtual_work_forces(robot.parameters, *motion, max_gain=limit),
+    )
+    scale = np.abs(run.force).max(axis=-1)
+    differences = [(np.abs(force - run.force).max(axis=-1) / scale).max() for force in forces]
+    return dict(zip(WAYS, map(float, differences), strict=True))
 
 
 def trajectories() -> str:

@@ -114,18 +114,9 @@ def _agreement(robot: RPSRobot, pose: Array, rate: Array, acceleration: Array) -
     def differ(one: Array, other: Array) -> float:
         return float((np.abs(one - other) / scale).max())
 
-    gap, opening, apart = (float(x) for x in loops.max(axis=0))
-    return Agreement(
-        n,
-        int(near.sum()),
-        gap,
-        opening,
-        apart,
-        float(residual.max()),
-        differ(first, force),
-        differ(second, force),
-        differ(first, second),
-    )
+    gap, opening, apart = map(float, loops.max(axis=0))
+    ways = differ(first, force), differ(second, force), differ(first, second)
+    return Agreement(n, int(near.sum()), gap, opening, apart, float(residual.max()), *ways)
 
 
 def _joined(parts: list[Agreement]) -> Agreement:

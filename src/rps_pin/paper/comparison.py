@@ -152,11 +152,8 @@ def dense_times(duration: float, near: float, samples: int, start: float = 0.0) 
 
 def force_range(force: Array) -> ForceRange:
     """Return the least and greatest forces of legs 1 to 3, of forces (n, 3)."""
-    least, greatest = force.min(axis=0), force.max(axis=0)
-    return ForceRange(
-        (float(least[0]), float(least[1]), float(least[2])),
-        (float(greatest[0]), float(greatest[1]), float(greatest[2])),
-    )
+    (a, b, c), (d, e, f) = force.min(axis=0).tolist(), force.max(axis=0).tolist()
+    return ForceRange((a, b, c), (d, e, f))
 
 
 def distance(found: ForceRange, printed: ForceRange = paper.THIS_STUDY) -> float:

@@ -81,11 +81,8 @@ class MovedFit(NamedTuple):
 
 def mass_fits(paths: Iterable[PathResult], printed: ForceRange = paper.THIS_STUDY) -> list[MassFit]:
     """Return the best platform's mass of every path that has forces, the nearest first."""
-    fits = [
-        fit_mass(result.interpretation, result.parts, printed)
-        for result in paths
-        if result.parts is not None
-    ]
+    regular = ((one.interpretation, one.parts) for one in paths)
+    fits = [fit_mass(path, parts, printed) for path, parts in regular if parts is not None]
     return sorted(fits, key=lambda fit: round(fit.distance, 9))
 
 
@@ -127,11 +124,7 @@ def fit_both_masses(start: MassFit, parts: ForceParts, printed: ForceRange) -> M
 
 def moved_paths(path: PathInterpretation, *, quick: bool = False) -> list[MovedPath]:
     """Return a path with Eq. 29 corrected, with z_0, r_h or p_h moved; `quick` moves z_0 only."""
-    given = {
-        "z_0": path.height,
-        "r_h": path.helix_radius,
-        "p_h": path.helix_pitch,
-    }
+    given = {"z_0": path.height, "r_h": path.helix_radius, "p_h": path.helix_pitch}
     moves = {"z_0": MOVES["z_0"]} if quick else MOVES
     robot = UnitRobot(path.base_radius, path.platform_radius)
     rows = []
@@ -161,11 +154,10 @@ def moved_fits(
     """Return the best mass for each of a path's moved ones."""
     rows = []
     for name, by, parts in moved:
-        if parts is None:
-            rows.append(MovedFit(name, by, math.nan, math.nan))
-        else:
-            fit = fit_mass(path, parts, printed)
-            rows.append(MovedFit(name, by, fit.platform_mass, fit.distance))
+        mass = distance = math.nan
+        if parts is not None:
+            _, mass, _, _, _, distance = fit_mass(path, parts, printed)
+        rows.append(MovedFit(name, by, mass, distance))
     return rows
 
 

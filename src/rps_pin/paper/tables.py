@@ -7,12 +7,14 @@ import io
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from itertools import chain
 
 import numpy as np
 
 from rps_pin.paper.comparison import OUT_OF_REACH, SINGULAR, Comparison, PathResult, distance
 from rps_pin.paper.compute import COLUMNS, Reproduction
 from rps_pin.paper.interpretations import BODIES, PathInterpretation
+from rps_pin.paper.mass_fit import MassFit, MovedFit
 from rps_pin.paper.paper_data import ForceRange
 
 #: Head of the columns that `forces` fills.
@@ -156,28 +158,20 @@ def fits(found: Reproduction) -> str:
         both = ("platform and legs", one.both)
         for free, fit in [*(("platform", fit) for fit in one.fits[:_FITS]), both]:
             masses = [f"{fit.platform_mass:.2f}", f"{fit.leg_mass:.2f}"]
-            rows.append(
-                [
-                    *(column, path_words(fit.path), free, *masses, str(fit.labels)),
-                    *forces(fit.forces),
-                    f"{fit.distance:.3f}",
-                ]
-            )
+            fitted = (column, path_words(fit.path), free, *masses, str(fit.labels))
+            rows.append([*fitted, *forces(fit.forces), f"{fit.distance:.3f}"])
     head = ["column", "path", "free masses", "m (kg)", "m_leg (kg)", "Table 2's d_1, d_2, d_3"]
     return markdown([*head, *FORCES, "distance"], rows)
 
 
 def moved(found: Reproduction) -> str:
     """Return the nearest path's fits with one of its numbers moved."""
-    columns = list(found.fits)
-    rows = [["as it is", *_mass_and_distance(*((fit.fits[0].platform_mass, fit.fits[0].distance)
-             for fit in found.fits.values()))]]  # fmt: skip
-    for each in zip(*(found.fits[column].moved for column in columns), strict=True):
+    fits = found.fits.values()
+    rows = [["as it is", *chain(*(_mass_and_distance(one.fits[0]) for one in fits))]]
+    for each in zip(*(one.moved for one in fits), strict=True):
         name = f"{each[0].moved} {1e3 * each[0].by:+g} mm"
-        rows.append(
-            [name, *_mass_and_distance(*((one.platform_mass, one.distance) for one in each))]
-        )
-    head = [text for column in columns for text in (f"{column}: m (kg)", "distance")]
+        rows.append([name, *chain(*map(_mass_and_distance, each))])
+    head = [text for column in found.fits for text in (f"{column}: m (kg)", "distance")]
     return markdown(["path", *head], rows)
 
 
@@ -256,12 +250,10 @@ def bodies_words(row: Comparison) -> str:
 # Inner workings -----------------------------------------------------------------------------------
 
 
-def _mass_and_distance(*pairs: tuple[float, float]) -> Sequence[str]:
-    return [
-        text
-        for mass, gap in pairs
-        for text in (("crosses", "-") if math.isnan(gap) else (f"{mass:.1f}", f"{gap:.3f}"))
-    ]
+def _mass_and_distance(fit: MassFit | MovedFit) -> tuple[str, str]:
+    if math.isnan(fit.distance):
+        return "crosses", "-"
+    return f"{fit.platform_mass:.1f}", f"{fit.distance:.3f}"
 
 
 def _fields(path: PathInterpretation) -> list[str]:
