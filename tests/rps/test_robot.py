@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import (
+    ClosureError,
     InputError,
     RPSParameters,
     RPSRobot,
@@ -357,11 +358,25 @@ def test_first_refused_pose_of_a_batch_is_named() -> None:
         robot.inverse_kinematics(poses)
 
 
-@pytest.mark.parametrize("errors", ["raise", "mask"])
-def test_leg_without_length_is_refused(errors: str) -> None:
+def test_leg_without_length_is_refused_or_masked() -> None:
     """h = g, level, z = 0: every tip lies on its revolute joint."""
     with pytest.raises(UnreachableError, match="leg 1 would have length 0 m"):
-        limited().inverse_kinematics([0.0, 0.0, 0.0], errors=errors)
+        limited().inverse_kinematics([0.0, 0.0, 0.0])
+    legs = limited().inverse_kinematics([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]], errors="mask")
+    assert not legs.reachable[0]
+    np.testing.assert_array_equal(legs.length[0], 0.0)
+    assert np.isfinite(legs.angle).all()
+
+
+def test_lengths_that_cannot_be_followed_are_masked() -> None:
+    robot, pose = sokolov(), np.array([[0.5, 0.0, 0.0], [0.5, 0.1, -0.2]])
+    length = robot.inverse_kinematics(pose).length
+    length[1] *= [1.0, 1.0, 9.0]
+    with pytest.raises(ClosureError):
+        robot.forward_kinematics(length, pose[0])
+    found = robot.forward_kinematics(length, pose[0], errors="mask")
+    np.testing.assert_array_equal(np.ma.getmaskarray(found), [[False] * 3, [True] * 3])
+    np.testing.assert_allclose(found[0], pose[0], rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

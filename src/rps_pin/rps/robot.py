@@ -8,17 +8,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array, Bools
+from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel, InverseDynamics, LoopClosure
 from rps_pin.closed_loop.io.urdf import model_from_urdf
-from rps_pin.errors import InputError, UnreachableError, shown
-from rps_pin.rps.dynamics import actuator_forces as fast_path
+from rps_pin.errors import InputError, shown
+from rps_pin.rps.dynamics.actuator_forces import actuator_forces
 from rps_pin.rps.dynamics.force_equations import ForceTerms
 from rps_pin.rps.dynamics.friction import friction_effects
 from rps_pin.rps.dynamics.loads import Payload
-from rps_pin.rps.kinematics import legs as leg_kinematics
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes, assembly_modes
 from rps_pin.rps.kinematics.forward_kinematics import forward_kinematics
+from rps_pin.rps.kinematics.inverse_kinematics import inverse_kinematics, reachable_motion
 from rps_pin.rps.kinematics.legs import LegMotion, Legs
 from rps_pin.rps.kinematics.pose import (
     PlatformMotion,
@@ -159,17 +159,10 @@ class RPSRobot:
         InputError
             If the pose has the wrong shape or is not finite.
         UnreachableError
-            If a pose breaks a limit (names leg, value and limits), or gives a leg no length.
+            With ``errors="raise"``, if a pose breaks a limit (names leg, value and limits), or
+            gives a leg no length.
         """
-        if errors not in ("raise", "mask"):
-            raise InputError(f"errors = {errors!r}; it must be 'raise' or 'mask'")
-        x = checked_pose(pose)
-        p = self.parameters
-        turn = rotation(x)
-        tip = leg_kinematics.tips(position(x, p.platform_radius), turn, p.platform_radius)
-        length, angle = leg_kinematics.leg_angles_and_lengths(tip, p.base_radius)
-        reachable = self._reachable(x, length, angle, turn, refuse=errors == "raise")
-        return Legs(length, angle, reachable)
+        return inverse_kinematics(self.parameters, pose, errors=errors)
 
     def assembly_modes(self, length: ArrayLike) -> AssemblyModes:
         """Return every real pose of given leg lengths: all solutions of Eq. 8.
@@ -193,7 +186,9 @@ class RPSRobot:
         p = self.parameters
         return assembly_modes(length, p.base_radius, p.platform_radius)
 
-    def forward_kinematics(self, length: ArrayLike, near: ArrayLike) -> Array:
+    def forward_kinematics(
+        self, length: ArrayLike, near: ArrayLike, *, errors: Literal["raise", "mask"] = "raise"
+    ) -> Array:
         """Return the pose of given leg lengths that continues a known one.
 
         Parameters
@@ -202,13 +197,16 @@ class RPSRobot:
             Leg lengths d, shape (..., 3), m.
         near
             Known poses, of a shape that broadcasts with that of `length`. The lengths are followed
-            from theirs to those wanted, on the straight way.
+            from theirs to those wanted, on the straight line between them.
+        errors
+            ``"raise"`` refuses lengths that cannot be followed to their end; ``"mask"`` returns a
+            masked array (`numpy.ma`), such poses masked.
 
         Returns
         -------
         array
-            Poses, shape (..., 3). `rps_pin.rps.kinematics.forward_kinematics` has the form that
-            masks what cannot be followed, and a tracker for encoders in a loop.
+            Poses, shape (..., 3). `rps_pin.rps.kinematics.forward_kinematics` also tells how far
+            lengths were followed, and has a tracker for encoders in a loop.
 
         Raises
         ------
@@ -220,7 +218,11 @@ class RPSRobot:
             If no pose has the lengths; says by how much they miss.
         """
         p = self.parameters
-        return forward_kinematics(length, near, p.base_radius, p.platform_radius).pose
+        radii = p.base_radius, p.platform_radius
+        found = forward_kinematics(length, near, *radii, errors=errors)
+        if errors == "raise":
+            return found.pose
+        return np.ma.MaskedArray(found.pose, np.repeat(~found.reached[..., None], 3, axis=-1))
 
     def motion(
         self, pose: ArrayLike, rate: ArrayLike, acceleration: ArrayLike
@@ -237,7 +239,9 @@ class RPSRobot:
         InputError, UnreachableError
             As `inverse_kinematics`.
         """
-        return self._motion(*checked_motion(pose, rate, acceleration))
+        x, dx, ddx = checked_motion(pose, rate, acceleration)
+        legs = reachable_motion(self.parameters, x, dx, ddx)
+        return platform_motion(x, dx, ddx, self.parameters.platform_radius), legs
 
     def state(
         self, pose: ArrayLike, rate: ArrayLike, acceleration: ArrayLike
@@ -260,9 +264,14 @@ class RPSRobot:
         InputError, UnreachableError
             As `inverse_kinematics`.
         """
-        x, dx, ddx = checked_motion(pose, rate, acceleration)
-        platform, legs = self._motion(x, dx, ddx)
-        model = self.mechanism.model
+        platform, legs = self.motion(pose, rate, acceleration)
+        return self.state_of(checked_motion(pose, rate, acceleration)[0], platform, legs)
+
+    def state_of(
+        self, pose: Array, platform: PlatformMotion, legs: LegMotion
+    ) -> tuple[Array, Array, Array]:
+        """Return `state` of poses (..., 3) whose `motion` is known."""
+        x, model = pose, self.mechanism.model
         q = np.empty((*x.shape[:-1], model.nq))
         v = np.empty((*x.shape[:-1], model.nv))
         a = np.empty_like(v)
@@ -360,41 +369,12 @@ class RPSRobot:
             If a pose is singular: where ``mechanism.condition`` exceeds
             ``mechanism.max_condition``. Names the sample, the condition and its limit.
         """
-        return fast_path.actuator_forces(
-            self, pose, rate, acceleration, wrench=wrench, errors=errors
+        limit = self.mechanism.max_condition
+        motion = pose, rate, acceleration
+        return actuator_forces(
+            self.parameters, self.force_terms, limit, motion, wrench=wrench, errors=errors
         )
 
     def visual_model(self) -> pin.GeometryModel:
         """Return the shapes of the robot's links, for `rps_pin.viewer`."""
         return pin.buildGeomFromUrdfString(self.mechanism.model, self.urdf, pin.GeometryType.VISUAL)
-
-    # Inner workings -------------------------------------------------------------------------------
-
-    def _motion(
-        self, pose: Array, rate: Array, acceleration: Array
-    ) -> tuple[PlatformMotion, LegMotion]:
-        p = self.parameters
-        platform = platform_motion(pose, rate, acceleration, p.platform_radius)
-        legs = leg_kinematics.leg_motion(pose, rate, acceleration, p.platform_radius, p.base_radius)
-        self._reachable(pose, legs.length, legs.angle, platform.rotation, refuse=True)
-        return platform, legs
-
-    def _reachable(
-        self, pose: Array, length: Array, angle: Array, turn: Array, *, refuse: bool
-    ) -> Bools:
-        """Return whether each pose keeps its limits, or refuse the first that does not."""
-        cone = leg_kinematics.cone_angles(angle, turn, self.parameters.spherical_rest_angle)
-        reachable = leg_kinematics.within_limits(self.parameters, length, angle, cone)
-        if refuse and not reachable.all():
-            first = tuple(int(i) for i in np.argwhere(~reachable)[0])
-            broken = leg_kinematics.violations(
-                self.parameters, length[first], angle[first], cone[first]
-            )
-            where = f" (entry {first} of {reachable.size})" if first else ""
-            z, tilt_x, tilt_y = pose[first]
-            raise UnreachableError(
-                f"pose z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad{where} is out of "
-                f"reach: {'; '.join(map(str, broken))}",
-                broken,
-            )
-        return reachable

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.rps.dynamics.actuator_forces import forces_of
+from rps_pin.rps.dynamics.actuator_forces import ForceShare, forces_of
 from rps_pin.rps.dynamics.force_equations import ForceTerms, inertia_entries, vector_entries
 from rps_pin.rps.dynamics.friction import has_friction
-from rps_pin.rps.dynamics.loads import checked_wrench
+from rps_pin.rps.dynamics.loads import Payload, checked_wrench
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.robot import RPSRobot
 
@@ -76,21 +76,25 @@ def force_causes(
     x, dx, ddx = checked_motion(pose, rate, acceleration)
     robot.actuator_forces(x, dx, ddx, wrench=wrench)  # refuses what has no forces
     load = None if wrench is None else checked_wrench(wrench, x.shape[:-1])
-    zero = np.zeros_like(x)
+    still = np.zeros_like(x)
     bodies = _without_friction(ForceTerms.of(robot.parameters))
     weightless = replace(bodies, gravity=_NO_GRAVITY)
-
-    def part(terms: ForceTerms | None, dx: Array, ddx: Array, load: Array | None = None) -> Array:
-        return zero if terms is None else forces_of(terms, (x, dx, ddx), load)[0]
-
-    nothing = _massless(weightless)
+    shares = {
+        "gravity": ForceShare(bodies, still, still, None),
+        "inertia": ForceShare(weightless, still, ddx, None),
+        "coriolis": ForceShare(weightless, dx, still, None),
+    }
+    if has_friction(robot.parameters):
+        shares["friction"] = ForceShare(_massless(robot.force_terms), dx, still, None)
+    if robot.payload is not None:
+        shares["payload"] = ForceShare(
+            _only_payload(robot.force_terms, robot.payload), dx, ddx, None
+        )
+    if load is not None:
+        shares["external"] = ForceShare(_massless(weightless), still, still, load)
+    parts = dict(zip(shares, forces_of(list(shares.values()), x)[0], strict=True))
     return ForceCauses(
-        gravity=part(bodies, zero, zero),
-        inertia=part(weightless, zero, ddx),
-        coriolis=part(weightless, dx, zero),
-        friction=part(_only_friction(robot), dx, zero),
-        payload=part(_only_payload(robot), dx, ddx),
-        external=part(None if load is None else nothing, zero, zero, load),
+        **{field.name: parts.get(field.name, still) for field in fields(ForceCauses)}
     )
 
 
@@ -116,18 +120,9 @@ def _massless(terms: ForceTerms) -> ForceTerms:
     )
 
 
-def _only_friction(robot: RPSRobot) -> ForceTerms | None:
-    if not has_friction(robot.parameters):
-        return None
-    return _massless(robot.force_terms)
-
-
-def _only_payload(robot: RPSRobot) -> ForceTerms | None:
-    payload = robot.payload
-    if payload is None:
-        return None
+def _only_payload(terms: ForceTerms, payload: Payload) -> ForceTerms:
     return replace(
-        _without_friction(_massless(robot.force_terms)),
+        _without_friction(_massless(terms)),
         platform_mass=payload.mass,
         platform_moment=vector_entries(payload.first_moment),
         platform_inertia=inertia_entries(payload.inertia_about_platform),

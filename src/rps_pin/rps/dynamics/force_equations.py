@@ -99,9 +99,11 @@ def inertia_entries(inertia: Array) -> Inertia:
     return xx, yy, zz, xy, xz, yz
 
 
-class BlockState(NamedTuple):
-    """Where a block's legs are, and what moving its bodies takes; n samples."""
+class LegBlock(NamedTuple):
+    """The legs of a block of poses, and what solves for their forces; n samples."""
 
+    x: Array
+    y: Array
     tilt: TiltFunctions
     slopes: tips.Slopes
     """Of the tips, by h tilt_x and h tilt_y."""
@@ -111,87 +113,83 @@ class BlockState(NamedTuple):
     """cos(phi), shape (3 legs, n)."""
     sine: Array
     """sin(phi), shape (3 legs, n)."""
-    along: Array
-    """F_rod, which the rod takes along the leg, prismatic friction included, shape (3 legs, n)."""
-    across: Array
-    """M/d at the tip across the leg, revolute friction included, shape (3 legs, n), N."""
-    force: Vector
-    """What the legs must exert on the platform, base axes, N."""
-    moment: Vector
-    """Likewise about the platform's centre, platform axes, N m."""
+    cofactors: forces.Rows
+    """Of K, d(length)/d(z, h tilt_x, h tilt_y)."""
+    over_determinant: Array
+    """One over its determinant, shape (n,)."""
+    close: Bools
+    """Whether a pose may be singular, or a leg has no length, shape (n,)."""
 
 
-def block_state(
-    terms: ForceTerms, pose: Array, rate: Array, acceleration: Array, wrench: Array | None
-) -> BlockState:
-    """Return what moving the bodies of a block takes.
+def leg_block(base_radius: float, platform_radius: float, pose: Array) -> LegBlock:
+    """Return the legs of poses with components (z, tilt_x, tilt_y), shape (3, n)."""
+    z, x, y = pose
+    h, tilt = platform_radius, tilt_functions(x * x + y * y)
+    slopes = tips.tip_slopes(x, y, tilt)
+    radial, height = (tips.at_legs(ring) for ring in tips.tips(z, x, y, tilt, h))
+    d, cosine, sine = legs.leg_geometry(radial, height, base_radius)
+    rho_x, rho_y, z_x, z_y = (tips.at_legs(ring) for ring in slopes)
+    by_x = legs.along_leg(cosine, sine, rho_x, z_x)
+    by_y = legs.along_leg(cosine, sine, rho_y, z_y)
+    cofactors, det = forces.cofactors([*zip(sine, by_x, by_y, strict=True)])
+    over = 1.0 / det
+    gain = forces.squared_norm(cofactors) * over * over
+    # The legs' planes hold the platform with forces that grow like 1 / cos(|w| / 2), whose square
+    # is (1 + C) / 2, and a leg turns as fast as its tip moves over its length.
+    lever = np.minimum(1.0, d.min(axis=0) / h)
+    close = ~(gain < CLOSE**2 * (lever * lever) * (0.5 + 0.5 * tilt[2]))
+    return LegBlock(x, y, tilt, slopes, d, cosine, sine, cofactors, over, close)
+
+
+def block_forces(
+    terms: ForceTerms, block: LegBlock, rate: Array, acceleration: Array, wrench: Array | None
+) -> Array:
+    """Return the actuator forces of a block, shape (3 legs, n), N; of no meaning at a singularity.
 
     Parameters
     ----------
     terms
         What takes part.
-    pose, rate, acceleration
-        Components (z, tilt_x, tilt_y) and their time derivatives, shape (3, n) each.
+    block
+        The legs.
+    rate, acceleration
+        Time derivatives of the pose's components, shape (3, n) each.
     wrench
         On the platform, components of shape (6, n), or none.
     """
     h = terms.platform_radius
-    (z, x, y), (dz, dx, dy), (ddz, ddx, ddy) = pose, rate, acceleration
-    tilt = tilt_functions(x * x + y * y)
-    slopes = tips.tip_slopes(x, y, tilt)
-    radial, height = (tips.at_legs(ring) for ring in tips.tips(z, x, y, tilt, h))
-    geometry = legs.leg_geometry(radial, height, terms.base_radius)
+    x, y, tilt, slopes, _, cosine, sine, cofactors, over, _ = block
+    (dz, dx, dy), (ddz, ddx, ddy) = rate, acceleration
     rates = tips.tip_rates(slopes, dz, h * dx, h * dy)
     changes = tips.tip_accelerations((x, y, dx, dy, ddx, ddy), ddz, tilt, h)
-    along, across = _leg_forces(terms, geometry, rates, changes)
+    along, across = _leg_forces(terms, block, rates, changes)
     (_, p_x, p_y), (p_z, _, _) = changes
     centre = (0.5 * p_x, 0.5 * p_y, p_z)
     omega = platform.angular_velocity(x, y, dx, dy, tilt)
     alpha = platform.angular_acceleration(x, y, dx, dy, ddx, ddy, tilt)
     force, moment = platform_wrench(terms, (x, y, tilt), (centre, omega, alpha), wrench)
-    return BlockState(tilt, slopes, *geometry, along, across, force, moment)
-
-
-def solved_forces(terms: ForceTerms, pose: Array, state: BlockState) -> tuple[Array, Bools]:
-    """Return a block's actuator forces, and the samples that must be looked at closely.
-
-    Returns
-    -------
-    force
-        Of the actuators, shape (3 legs, n), N; of no meaning at a singularity.
-    close
-        Whether a pose may be singular, or a leg has no length, shape (n,).
-    """
-    cosine, sine, h = state.cosine, state.sine, terms.platform_radius
-    rho_x, rho_y, z_x, z_y = (tips.at_legs(ring) for ring in state.slopes)
-    by_x = legs.along_leg(cosine, sine, rho_x, z_x)
-    by_y = legs.along_leg(cosine, sine, rho_y, z_y)
-    by_tilt = forces.tilt_couple(pose[1], pose[2], state.tilt, state.moment)
+    by_tilt = forces.tilt_couple(x, y, tilt, moment)
     needed = forces.virtual_work(
-        state.slopes,
-        tips.resultant(sine * state.across),
-        tips.resultant(cosine * state.across),
-        state.force,
+        slopes,
+        tips.resultant(sine * across),
+        tips.resultant(cosine * across),
+        force,
         (by_tilt[0] / h, by_tilt[1] / h),
     )
-    cofactors, det = forces.cofactors([*zip(sine, by_x, by_y, strict=True)])
-    over = 1.0 / det
-    force = np.array(forces.row_products(cofactors, needed)) * over + state.along
-    gain = forces.squared_norm(cofactors) * over * over
-    # The legs' planes hold the platform with forces that grow like 1 / cos(|w| / 2), whose square
-    # is (1 + C) / 2, and a leg turns as fast as its tip moves over its length.
-    lever = np.minimum(1.0, state.length.min(axis=0) / h)
-    return force, ~(gain < CLOSE**2 * (lever * lever) * (0.5 + 0.5 * state.tilt[2]))
+    axial: Array = np.array(forces.row_products(cofactors, needed))
+    axial *= over
+    axial += along
+    return axial
 
 
 def _leg_forces(
     terms: ForceTerms,
-    geometry: tuple[Array, Array, Array],
+    block: LegBlock,
     rates: tuple[tips.Ring, tips.Ring],
     changes: tuple[tips.Ring, tips.Ring],
 ) -> tuple[Array, Array]:
     """Return F_rod and M/d of the legs, shape (3, n) each, N."""
-    d, cosine, sine = geometry
+    d, cosine, sine = block.length, block.cosine, block.sine
     radial, height = (tips.at_legs(ring) for ring in rates)
     speed = legs.along_leg(cosine, sine, radial, height)
     angle_rate = legs.across_leg(cosine, sine, radial, height) / d

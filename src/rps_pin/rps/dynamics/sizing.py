@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, SingularityError, UnreachableError
-from rps_pin.rps.checks import finite_entries
 from rps_pin.rps.dynamics.motion_run import sample_times
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, ActuatorSizing, Margin, SizingSheet
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.measures import singularity_measures
 from rps_pin.rps.singularity.path_refusal import require_clear
 from rps_pin.trajectories.path import Trajectory
+from rps_pin.validation import real_array
 
 
 def size_trajectory(
@@ -89,7 +89,7 @@ def size_motion(
         As `size_trajectory`.
     """
     times = _checked_time(time)
-    x = finite_entries(pose, (3,), "pose")
+    x = real_array(pose, "pose", (3,))
     if x.shape != (len(times), 3):
         raise InputError(f"pose has shape {x.shape}; with these times it must be {len(times), 3}")
     force = robot.actuator_forces(x, rate, acceleration, wrench=wrench, errors="mask")
@@ -125,7 +125,7 @@ def size_actuators(
         raise InputError(f"threshold = {threshold}: it must be between 0 and 1")
     arrays = []
     for name, value in (("force", force), ("speed", speed), ("length", length)):
-        array = finite_entries(value, (3,), name)
+        array = real_array(value, name, (3,))
         if array.shape != (len(times), 3):
             raise InputError(f"{name} has shape {array.shape}; it must be {len(times), 3}")
         arrays.append(array)
@@ -211,7 +211,7 @@ def time_above(values: Array, level: float, time: Array) -> float:
 
 
 def _checked_time(time: ArrayLike) -> Array:
-    times = finite_entries(time, (), "time")
+    times = real_array(time, "time")
     if times.ndim != 1 or len(times) < 2:
         raise InputError(f"time has shape {times.shape}; it must be (n,), with n of 2 or more")
     if not (np.diff(times) > 0).all():

@@ -19,10 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
-from rps_pin.rps.checks import checked_radius, finite_entries, finite_numbers
 from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.pose import checked_motion, checked_pose, platform_motion
 from rps_pin.rps.kinematics.three_quantities import poses_from
+from rps_pin.validation import one_shape, positive_number, real_array
 
 
 class PaperAngles(NamedTuple):
@@ -72,9 +72,10 @@ def pose_from_angles(z: ArrayLike, alpha: ArrayLike, beta: ArrayLike) -> Array:
     InputError
         If they are not finite numbers of shapes that go together.
     """
-    q = finite_numbers(z=z, alpha=alpha, beta=beta)
-    alpha_, beta_ = q["alpha"], q["beta"]
-    return np.stack([q["z"], -beta_ * np.sin(alpha_), beta_ * np.cos(alpha_)], axis=-1)
+    height, a, b = one_shape(
+        z=real_array(z, "z"), alpha=real_array(alpha, "alpha"), beta=real_array(beta, "beta")
+    )
+    return np.stack([height, -b * np.sin(a), b * np.cos(a)], axis=-1)
 
 
 def angles_from_pose(pose: ArrayLike) -> PaperAngles:
@@ -124,7 +125,7 @@ def pose_from_position(
     UnreachableError
         If (p_x, p_y) lies further than h from the axis.
     """
-    centre = finite_entries(position, (3,), "position")
+    centre = real_array(position, "position", (3,))
     try:
         signs = np.asarray(branch)
     except ValueError:  # ragged
@@ -156,7 +157,10 @@ def position_from_pose(pose: ArrayLike, platform_radius: float) -> Centre:
     x = checked_pose(pose)
     wx, wy = x[..., 1], x[..., 2]
     plus = (wx < 0) | ((wx == 0) & (wy >= 0))  # alpha in [0, pi)
-    return Centre(poses.position(x, checked_radius(platform_radius)), np.where(plus, "+", "-"))
+    return Centre(
+        poses.position(x, positive_number(platform_radius, "platform_radius", "metres")),
+        np.where(plus, "+", "-"),
+    )
 
 
 def parasitic_motion(
@@ -180,7 +184,7 @@ def parasitic_motion(
     InputError
         If an argument has the wrong shape or is not finite.
     """
-    h = checked_radius(platform_radius)
+    h = positive_number(platform_radius, "platform_radius", "metres")
     motion = platform_motion(*checked_motion(pose, rate, acceleration), h)
     return ParasiticMotion(
         motion.position[..., :2], motion.velocity[..., :2], motion.acceleration[..., :2]

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from rps_pin.arrays import Array
 from rps_pin.errors import ClosureError, InputError
-from rps_pin.rps.checks import checked_radius, finite_entries, positive_length
 from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.legs import tips
+from rps_pin.validation import positive_number, real_array
 
 #: Largest entry of R'R - I in what is still taken for a rotation.
 _ORTHONORMAL = 1e-6
@@ -36,7 +36,10 @@ def constraint_residuals(position: ArrayLike, rotation: ArrayLike, platform_radi
     InputError
         If an argument has the wrong shape or is not finite, or the rotation is none.
     """
-    return _residuals(*_checked_placement(position, rotation), checked_radius(platform_radius))
+    return _residuals(
+        *_checked_placement(position, rotation),
+        positive_number(platform_radius, "platform_radius", "metres"),
+    )
 
 
 def pose_from_placement(
@@ -72,8 +75,8 @@ def pose_from_placement(
         If the placement breaks the constraints of Eq. 4.
     """
     centre, turn = _checked_placement(position, rotation)
-    h = checked_radius(platform_radius)
-    allowed = positive_length(1e-9 * h if tolerance is None else tolerance, "tolerance")
+    h = positive_number(platform_radius, "platform_radius", "metres")
+    allowed = positive_number(1e-9 * h if tolerance is None else tolerance, "tolerance", "metres")
     x, y, torsion, w = _quaternion(turn)
     # The nearest rotation about an axis in the base plane has (x, y, w) alone, normalised.
     sine = np.hypot(x, y)
@@ -123,7 +126,7 @@ def _quaternion(rotation: Array) -> Array:
 
 def _checked_placement(position: ArrayLike, rotation: ArrayLike) -> tuple[Array, Array]:
     """Return positions (..., 3) and rotations (..., 3, 3) of one batch shape."""
-    p, R = finite_entries(position, (3,), "position"), finite_entries(rotation, (3, 3), "rotation")
+    p, R = real_array(position, "position", (3,)), real_array(rotation, "rotation", (3, 3))
     try:
         batch = np.broadcast_shapes(p.shape[:-1], R.shape[:-2])
     except ValueError:

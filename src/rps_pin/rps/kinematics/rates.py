@@ -41,7 +41,7 @@ from rps_pin.rps.kinematics.pose import (
     tilt_of,
 )
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.validation import one_shape, real_array
+from rps_pin.validation import choice, one_shape, real_array
 
 Errors = Literal["raise", "mask"]
 
@@ -414,8 +414,7 @@ def _refuse_singular(values: Array, determined: Bools, limit: float) -> None:
 
 def check_errors_option(errors: str) -> None:
     """Raise `InputError` unless errors is ``"raise"`` or ``"mask"``."""
-    if errors not in ("raise", "mask"):
-        raise InputError(f"errors = {errors!r}; it must be 'raise' or 'mask'")
+    choice(errors, "errors", ("raise", "mask"))
 
 
 def _check_options(errors: str, max_gain: float) -> None:

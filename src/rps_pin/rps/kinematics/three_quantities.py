@@ -23,7 +23,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, UnreachableError
-from rps_pin.rps.checks import checked_radius, finite_numbers
+from rps_pin.rps.kinematics.rates import check_errors_option
+from rps_pin.validation import one_shape, positive_number, real_array
 
 #: What is asked may miss what is possible by rounding, and no more: by this share of it, and by
 #: this share of h (of 1, for slopes), the digits that a rotation matrix leaves.
@@ -110,14 +111,14 @@ def poses_from(
     UnreachableError
         With ``errors="raise"``, if no pose has them.
     """
-    if errors not in ("raise", "mask"):
-        raise InputError(f"errors = {errors!r}; it must be 'raise' or 'mask'")
-    h = checked_radius(platform_radius)
+    check_errors_option(errors)
+    h = positive_number(platform_radius, "platform_radius", "metres")
     possible = {"z": z, "x": x, "y": y, "alpha": alpha, "beta": beta, "gamma": gamma}
     possible |= {"u_z": u_z, "v_z": v_z, "z_1": z_1, "z_2": z_2, "z_3": z_3}
     given = {name: value for name, value in possible.items() if value is not None}
     solve = _solver(given)
-    q = finite_numbers(**given)
+    arrays = {name: real_array(value, name) for name, value in given.items()}
+    q = dict(zip(arrays, one_shape(**arrays), strict=True))
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is out of reach
         found = solve(h, q | {"alpha": -q["gamma"]} if "gamma" in q else q)
 

@@ -1,0 +1,81 @@
+"""Inverse kinematics: the legs of a pose, and whether they keep their limits (Eq. 1, 4, 6, 7)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array, Bools
+from rps_pin.errors import UnreachableError
+from rps_pin.rps.kernels import legs as kernels
+from rps_pin.rps.kernels import tips
+from rps_pin.rps.kinematics.legs import (
+    LegGeometry,
+    LegMotion,
+    Legs,
+    geometry_of_pose,
+    leg_motion,
+    refuse_vanishing,
+    violations,
+    within_limits,
+)
+from rps_pin.rps.kinematics.pose import checked_pose, tilt_of
+from rps_pin.rps.kinematics.rates import Errors, check_errors_option
+from rps_pin.rps.parameters import RPSParameters
+
+
+def inverse_kinematics(
+    parameters: RPSParameters, pose: ArrayLike, *, errors: Errors = "raise"
+) -> Legs:
+    """Return leg lengths and angles; see `RPSRobot.inverse_kinematics`."""
+    check_errors_option(errors)
+    x = checked_pose(pose)
+    legs = geometry_of_pose(x, parameters.base_radius, parameters.platform_radius)
+    if errors == "raise":
+        refuse_vanishing(legs.length, legs.vanishing)
+    reachable = _reachable(parameters, x, legs, refuse=errors == "raise")
+    return Legs(legs.length, legs.angle, reachable & ~legs.vanishing.any(axis=-1))
+
+
+def reachable_motion(
+    parameters: RPSParameters, pose: Array, rate: Array, acceleration: Array
+) -> LegMotion:
+    """Return how the legs move, or refuse a pose beyond their limits."""
+    g, h = parameters.base_radius, parameters.platform_radius
+    legs = geometry_of_pose(pose, g, h)
+    refuse_vanishing(legs.length, legs.vanishing)
+    _reachable(parameters, pose, legs, refuse=True)
+    return leg_motion(pose, rate, acceleration, h, g)
+
+
+def spherical_angles(parameters: RPSParameters, pose: Array, legs: LegGeometry) -> Array:
+    """Return the angle between each leg and its joint's rest axis, shape (..., 3 legs), rad."""
+    x, y, tilt = tilt_of(pose)
+    rest = math.cos(parameters.spherical_rest_angle), math.sin(parameters.spherical_rest_angle)
+    e, t = (np.asarray(tips.at_legs(ring)) for ring in ((0.0, x, y), (0.0, y, -x)))
+    out, across, up = kernels.rest_axis(e, t, tilt, *rest)
+    cosine, sine = np.moveaxis(legs.cosine, -1, 0), np.moveaxis(legs.sine, -1, 0)
+    angles = np.arctan2(
+        kernels.cone_sine(cosine, sine, out, across, up),
+        kernels.cone_cosine(cosine, sine, out, up),
+    )
+    return np.moveaxis(angles, 0, -1)
+
+
+def _reachable(parameters: RPSParameters, pose: Array, legs: LegGeometry, *, refuse: bool) -> Bools:
+    """Return whether each pose keeps its limits, or refuse the first that does not."""
+    length, angle, cone = legs.length, legs.angle, spherical_angles(parameters, pose, legs)
+    reachable = within_limits(parameters, length, angle, cone)
+    if refuse and not reachable.all():
+        first = tuple(int(i) for i in np.argwhere(~reachable)[0])
+        broken = violations(parameters, length[first], angle[first], cone[first])
+        where = f" (entry {first} of {reachable.size})" if first else ""
+        z, tilt_x, tilt_y = pose[first]
+        raise UnreachableError(
+            f"pose z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad{where} is out of "
+            f"reach: {'; '.join(map(str, broken))}",
+            broken,
+        )
+    return reachable
