@@ -29,8 +29,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
 from rps_pin.paper.lagrange_terms import lagrange_terms
-from rps_pin.paper.lagrange_vectors import times
-from rps_pin.rps.checks import refuse_large_gain
+from rps_pin.paper.lagrange_vectors import refuse_large_gain, times
 from rps_pin.rps.kinematics.legs import leg_motion
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.parameters import RPSParameters

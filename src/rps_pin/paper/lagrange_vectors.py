@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array
+from rps_pin.errors import InputError, SingularityError
 from rps_pin.rps.kinematics.legs import RADIAL
 
 _UP = np.array([0.0, 0.0, 1.0])
@@ -127,3 +128,27 @@ def times(matrix: Array, vector: Array) -> Array:
     """Return the product of matrices (..., m, n) and vectors (..., n), shape (..., m)."""
     product: Array = (matrix @ vector[..., None])[..., 0]
     return product
+
+
+def refuse_large_gain(matrices: Array, limit: float, message: str) -> None:
+    """Raise `SingularityError` at the first matrix whose inverse is larger than a limit.
+
+    Parameters
+    ----------
+    matrices
+        Shape (..., n, n), in one unit.
+    limit
+        Largest norm of the inverse, the gain, that is accepted; positive.
+    message
+        With the fields ``{where}``, ``{gain}`` and ``{limit}``.
+    """
+    if not limit > 0:
+        raise InputError(f"max_gain = {limit}: it must be positive")
+    smallest = np.linalg.svd(matrices, compute_uv=False)[..., -1]
+    singular = ~(smallest * limit >= 1)
+    if not singular.any():
+        return
+    first = tuple(int(i) for i in np.argwhere(singular)[0])
+    where = f" (entry {first} of {singular.size})" if first else ""
+    gain = 1 / float(smallest[first]) if smallest[first] > 0 else math.inf
+    raise SingularityError(message.format(where=where, gain=gain, limit=limit), gain, limit)

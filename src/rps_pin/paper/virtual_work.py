@@ -27,8 +27,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
-from rps_pin.paper.lagrange_vectors import times
-from rps_pin.rps.checks import refuse_large_gain
+from rps_pin.paper.lagrange_vectors import refuse_large_gain, times
 from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.kinematics.pose import checked_motion, platform_motion
 from rps_pin.rps.kinematics.rates import (

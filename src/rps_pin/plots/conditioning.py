@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.plots.style import COLOUR_MAP, STYLE, figure_of
-from rps_pin.rps.checks import finite_entries
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measures import singularity_measures
+from rps_pin.validation import real_array
 
 Measure = Literal["type_ii", "constraint", "determinant"]
 _LABELS = {
@@ -130,11 +130,11 @@ def _map(
 
 
 def _increasing(values: ArrayLike, name: str) -> Array:
-    found = finite_entries(values, (), name)
+    found = real_array(values, name)
     if found.ndim != 1 or found.size < 2 or not (np.diff(found) > 0.0).all():
         raise InputError(f"{name} has shape {found.shape}: it must be two numbers or more, rising")
     return found
 
 
 def _number(value: float) -> float:
-    return float(finite_entries(value, (), "height or direction"))
+    return float(real_array(value, "height or direction"))

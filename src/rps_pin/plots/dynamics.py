@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
 from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, legend_above
-from rps_pin.rps.checks import finite_entries
 from rps_pin.rps.dynamics.force_causes import ForceCauses
 from rps_pin.rps.dynamics.sizing_sheet import SizingSheet
+from rps_pin.validation import real_array
 
 #: Okabe and Ito's colours for the causes, told apart by colour-blind readers; and hatches, so that
 #: print without colour will do.
@@ -56,7 +56,7 @@ def plot_force_causes(
     InputError
         If the shapes do not fit, or there are not three axes.
     """
-    times = finite_entries(time, (), "time")
+    times = real_array(time, "time")
     total = causes.total
     if times.ndim != 1 or total.shape != (times.size, 3):
         raise InputError(

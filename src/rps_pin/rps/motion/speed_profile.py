@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.errors import InputError
-from rps_pin.rps.checks import finite_entries
 from rps_pin.trajectories.curve import LawSample
 from rps_pin.trajectories.path import checked_parameters, checked_times
+from rps_pin.validation import real_array
 
 
 class SpeedProfile:
@@ -148,7 +148,7 @@ class SpeedProfile:
 
 
 def _vector(values: ArrayLike, name: str) -> Array:
-    array = np.array(finite_entries(values, (), name))
+    array = np.array(real_array(values, name))
     if array.ndim != 1:
         raise InputError(f"{name} have shape {array.shape}; they must be a row of numbers")
     array.setflags(write=False)
