@@ -11,10 +11,12 @@ redundant which say again that nothing leaves the plane.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, JointCoupling, JointEffects, LoopClosure
@@ -81,6 +83,33 @@ def case(
         except RefusedError:
             continue
     raise AssertionError(f"no mechanism of seed {seed} is well conditioned")
+
+
+#: Tests of properties take their mechanisms from a pool of so many seeds (and their options).
+POOL = 24
+
+pool = st.integers(0, POOL - 1)
+"""Seeds of the pool."""
+
+
+@cache
+def pooled(
+    seed: int,
+    *,
+    planar: bool = False,
+    massless: bool = False,
+    effects: bool = False,
+    armature: bool = False,
+    joints: tuple[str, ...] | None = None,
+) -> Case:
+    """A case of the pool, as `case` draws it: made once in a process, and not to be changed."""
+    assert 0 <= seed < POOL
+    c = case(
+        seed, planar=planar, massless=massless, effects=effects, armature=armature, joints=joints
+    )
+    for array in (c.q, c.v, c.a):
+        array.setflags(write=False)
+    return c
 
 
 def _drawn(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, InputError, LoopClosure, MechanismError, SingularityError
-from tests.closed_loop import mechanisms
+from tests.closed_loop import mechanisms, random_mechanisms
 from tests.closed_loop.mechanisms import derivative
 from tests.closed_loop.random_mechanisms import (
     ALL_KINDS,
@@ -22,6 +22,7 @@ from tests.closed_loop.random_mechanisms import (
     gap_slope,
     inertia_wrenches,
     mass_of_bodies,
+    pooled,
     random_inertia,
     resisting_force,
     worst_error,
@@ -29,7 +30,7 @@ from tests.closed_loop.random_mechanisms import (
 
 Array = NDArray[np.float64]
 
-seeds = st.integers(0, 10**6)
+seeds = random_mechanisms.pool
 yes_or_no = st.booleans()
 every_kind = pytest.mark.parametrize("kind", ALL_KINDS)
 
@@ -61,7 +62,7 @@ def test_motion_comes_back_from_its_forces(kind: str, seed: int) -> None:
 @given(seeds, yes_or_no)
 def test_forces_come_back_from_their_motion(seed: int, planar: bool) -> None:
     """And the loops stay closed under them, whatever they are."""
-    c = case(seed, planar=planar, massless=True)
+    c = pooled(seed, planar=planar, massless=True)
     tau = forces(c, seed)
     a = c.mechanism.forward_dynamics(c.q, c.v, tau, wrenches=c.wrenches)
     errors = c.mechanism.loop_errors(c.q, c.v, a)
@@ -73,7 +74,7 @@ def test_forces_come_back_from_their_motion(seed: int, planar: bool) -> None:
 @given(seeds, yes_or_no)
 def test_constraint_forces_are_those_of_inverse_dynamics(seed: int, planar: bool) -> None:
     """Of least norm both, once forces and moments have one unit; and they balance."""
-    c = case(seed, planar=planar, effects=True)
+    c = pooled(seed, planar=planar, effects=True)
     found = c.mechanism.inverse_dynamics(c.q, c.v, c.a, wrenches=c.wrenches)
     other = c.mechanism.constraint_forces(c.q, c.v, c.a, found.tau, wrenches=c.wrenches)
     size = np.abs(force_of_bodies(c, c.v, c.a)).max()
@@ -145,7 +146,7 @@ def test_acceleration_is_the_least_constrained_one(seed: int, planar: bool) -> N
 
     M is summed over the bodies, J is the gaps' slope, J' v its rate: all by differences or by hand.
     """
-    c = case(seed, planar=planar, effects=True, armature=True)
+    c = pooled(seed, planar=planar, effects=True, armature=True)
     model = c.mechanism.model
     tau = forces(c, seed)
     mass = mass_of_bodies(model, c.q)
@@ -164,7 +165,7 @@ def test_acceleration_is_the_least_constrained_one(seed: int, planar: bool) -> N
 @settings(max_examples=40)
 def test_no_allowed_change_of_the_acceleration_is_less_constrained(seed: int) -> None:
     """The first-order condition: N' (M a + h - S' tau) = 0, term by term from the bodies."""
-    c = case(seed, massless=True, effects=True)
+    c = pooled(seed, massless=True, effects=True)
     tau = forces(c, seed)
     a = c.mechanism.forward_dynamics(c.q, c.v, tau, wrenches=c.wrenches)
     rest = force_of_bodies(c, c.v, a) - full(c, tau)
@@ -224,7 +225,7 @@ def test_rotors_and_resistances_are_what_their_equations_say(seed: int) -> None:
 
 @given(seeds, yes_or_no)
 def test_reduced_mass_bias_and_gravity_make_the_equation_of_motion(seed: int, planar: bool) -> None:
-    c = case(seed, planar=planar, massless=True, effects=True, armature=True)
+    c = pooled(seed, planar=planar, massless=True, effects=True, armature=True)
     mechanism, at = c.mechanism, c.mechanism.actuated_indices
     mass, bias = mechanism.mass_matrix(c.q), mechanism.bias(c.q, c.v)
     tau = mechanism.inverse_dynamics(c.q, c.v, c.a).tau
@@ -251,7 +252,7 @@ def test_rotors_of_every_joint_count_once_in_the_kinetic_energy(sort: str) -> No
 @settings(max_examples=20)
 def test_reduced_quantities_of_other_joints_are_the_same_motion(seed: int) -> None:
     """u = S_i v: the kinetic energy does not depend on which joints describe it."""
-    c = case(seed, effects=True)
+    c = pooled(seed, effects=True)
     order = list(c.mechanism.actuated)[::-1]
     joints = [c.mechanism.model.joints[c.mechanism.model.getJointId(name)] for name in order]
     at = np.concatenate([np.arange(j.idx_v, j.idx_v + j.nv) for j in joints])

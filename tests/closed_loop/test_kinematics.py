@@ -22,13 +22,14 @@ from rps_pin import (
     MechanismError,
     SingularityError,
 )
-from tests.closed_loop import mechanisms
+from tests.closed_loop import mechanisms, random_mechanisms
 from tests.closed_loop.mechanisms import FOUR_BAR, FourBar, derivative, five_bar, values
 from tests.closed_loop.random_mechanisms import (
     ALL_KINDS,
     Case,
     case,
     gap_slope,
+    pooled,
     random_tree,
     slopes,
     worst_error,
@@ -37,7 +38,7 @@ from tests.closed_loop.test_model import toggle
 
 Array = NDArray[np.float64]
 
-seeds = st.integers(0, 10**6)
+seeds = random_mechanisms.pool
 plane = st.booleans()
 every_kind = pytest.mark.parametrize("kind", ALL_KINDS)
 
@@ -61,7 +62,7 @@ def test_jacobian_is_the_slope_of_the_gaps(kind: str, seed: int) -> None:
 
 @given(seeds, plane)
 def test_velocities_and_accelerations_keep_the_loops_closed(seed: int, planar: bool) -> None:
-    c = case(seed, planar=planar)
+    c = pooled(seed, planar=planar)
     errors = c.mechanism.loop_errors(c.q, c.v, c.a)
     for rows, size in zip(errors, (1.0, np.abs(c.v).max(), np.abs(c.a).max()), strict=True):
         np.testing.assert_allclose(rows, 0, rtol=0, atol=1e-11 * max(1, size))
@@ -71,7 +72,7 @@ def test_velocities_and_accelerations_keep_the_loops_closed(seed: int, planar: b
 @settings(max_examples=25)
 def test_velocities_and_accelerations_are_those_of_closed_paths(seed: int, planar: bool) -> None:
     """The path's first derivatives are v, and its deviation from v and a is of third order."""
-    c = case(seed, planar=planar)
+    c = pooled(seed, planar=planar)
 
     def moved(t: float) -> Array:
         return pin.difference(c.mechanism.model, c.q, along(c, t))
@@ -96,7 +97,7 @@ def test_drift_is_the_jacobian_s_derivative(kind: str, seed: int) -> None:
 @given(seeds, plane)
 def test_motions_complete_from_any_independent_joints(seed: int, planar: bool) -> None:
     """From other joints than the actuated ones, and from the actuated ones in another order."""
-    c = case(seed, planar=planar)
+    c = pooled(seed, planar=planar)
     model, actuated = c.mechanism.model, list(c.mechanism.actuated)
     others = [actuated[::-1]]
     for name in list(model.names)[1:]:
@@ -128,7 +129,7 @@ def _determine(c: Case, names: list[str]) -> bool:
 @given(seeds, plane)
 def test_allowed_motions_are_all_and_only_those(seed: int, planar: bool) -> None:
     """J by differences of the gaps; orthonormal once angles are lengths."""
-    c = case(seed, planar=planar)
+    c = pooled(seed, planar=planar)
     motions = c.mechanism.allowed_motions(c.q)
     jacobian = gap_slope(c.mechanism, c.q)
     rank = np.linalg.matrix_rank(jacobian, tol=1e-7 * np.abs(jacobian).max())
@@ -176,7 +177,7 @@ def _turns(model: pin.Model) -> NDArray[np.bool_]:
 @settings(max_examples=20)
 def test_frame_jacobian_is_the_frame_s_motion_along_closed_paths(axes: str, seed: int) -> None:
     """The twist by differences of the placement, of a path that starts with v."""
-    c = case(seed)
+    c = pooled(seed)
     model = c.mechanism.model
     data = model.createData()
     frame = model.getFrameId("body_2")
@@ -213,7 +214,7 @@ def test_frame_jacobian_of_a_tree_of_one_velocity_is_a_column() -> None:
 @given(seeds, plane)
 def test_random_guesses_close(seed: int, planar: bool) -> None:
     """Every mechanism can be closed: it was, where it was made."""
-    c = case(seed, planar=planar)
+    c = pooled(seed, planar=planar)
     rng = np.random.default_rng(seed)
     guess = pin.integrate(c.mechanism.model, c.q, 0.3 * rng.normal(size=c.mechanism.model.nv))
     found = c.mechanism.close(guess)
@@ -224,7 +225,7 @@ def test_random_guesses_close(seed: int, planar: bool) -> None:
 
 @given(seeds)
 def test_fixed_joints_keep_their_values_exactly(seed: int) -> None:
-    c = case(seed)
+    c = pooled(seed)
     model = c.mechanism.model
     fixed = list(c.mechanism.actuated)
     rng = np.random.default_rng(seed)
@@ -335,7 +336,7 @@ def test_opposite_axes_are_turned_round() -> None:
 @settings(max_examples=30)
 def test_complete_takes_the_joints_where_they_are_asked(seed: int) -> None:
     """From the actuated joints, by names in any order, near the guess: back to the same place."""
-    c = case(seed)
+    c = pooled(seed)
     model = c.mechanism.model
     target = along(c, 0.05)
     named = {}
@@ -393,7 +394,7 @@ def displaced(c: Case, seed: int, size: float) -> Array:
 @given(seeds, plane)
 @settings(max_examples=25)
 def test_projection_is_nearest_among_its_neighbours(seed: int, planar: bool) -> None:
-    c = case(seed, planar=planar, joints=["revolute", "revolute", "prismatic", "turn", "ball"])
+    c = pooled(seed, planar=planar, joints=("revolute", "revolute", "prismatic", "turn", "ball"))
     check_nearest(c, displaced(c, seed, 0.1))
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from rps_pin import InputError, LoopClosure
-from tests.closed_loop import mechanisms
+from tests.closed_loop import mechanisms, random_mechanisms
 from tests.closed_loop.mechanisms import FOUR_BAR, five_bar, values
 from tests.closed_loop.random_mechanisms import (
     Case,
@@ -18,6 +18,7 @@ from tests.closed_loop.random_mechanisms import (
     force_of_bodies,
     inertia_wrenches,
     joint_of,
+    pooled,
     random_placement,
     resisting_force,
     worst_error,
@@ -25,7 +26,7 @@ from tests.closed_loop.random_mechanisms import (
 
 Array = NDArray[np.float64]
 
-seeds = st.integers(0, 10**6)
+seeds = random_mechanisms.pool
 yes_or_no = st.booleans()
 
 
@@ -86,7 +87,7 @@ def solved(c: Case) -> tuple[dict[str, Array], dict[str, Array], Array]:
 
 @given(seeds, yes_or_no)
 def test_every_body_is_in_equilibrium(seed: int, planar: bool) -> None:
-    c = case(seed, planar=planar, massless=bool(seed % 2), effects=bool(seed % 3))
+    c = pooled(seed, planar=planar, massless=bool(seed % 2), effects=bool(seed % 3))
     on_joints, on_closures, _ = solved(c)
     sums, inertia = sums_on_bodies(c, on_joints, on_closures), inertia_about_the_world_s_origin(c)
     size = max(np.abs(w).max() for w in [*on_joints.values(), *on_closures.values(), inertia])
@@ -117,7 +118,7 @@ def _at_origin(c: Case, name: str) -> Array:
 @settings(max_examples=40)
 def test_joints_carry_along_their_motion_what_drives_them(seed: int, planar: bool) -> None:
     """Projected on its motions, a joint's wrench is actuator less resistance, and couplings."""
-    c = case(seed, planar=planar, effects=True)
+    c = pooled(seed, planar=planar, effects=True)
     model = c.mechanism.model
     found = c.mechanism.inverse_dynamics(c.q, c.v, c.a, wrenches=c.wrenches)
     carried = c.mechanism.joint_wrenches(
@@ -144,7 +145,7 @@ def test_joints_carry_along_their_motion_what_drives_them(seed: int, planar: boo
 @settings(max_examples=30)
 def test_closures_exert_nothing_along_the_motions_they_leave(seed: int) -> None:
     """The wrench of frame b's side, on a's, in a's axes, does no work on the joint's twists."""
-    c = case(seed)
+    c = pooled(seed)
     _, on_closures, _ = solved(c)
     model = c.mechanism.model
     data = model.createData()
@@ -198,7 +199,7 @@ def test_free_twists_of_this_file_are_those_of_the_joint() -> None:
 @settings(max_examples=40)
 def test_wrenches_may_be_given_at_any_frame_of_the_same_body(seed: int) -> None:
     """Moved to another point of the body with the moment that takes, nothing changes."""
-    c = case(seed)
+    c = pooled(seed)
     rng = np.random.default_rng(seed)
     model = c.mechanism.model
     data = model.createData()
@@ -229,7 +230,7 @@ def test_actuators_and_wrenches_do_the_work_of_every_virtual_motion(
     seed: int, planar: bool
 ) -> None:
     """Without the closures: whatever they exert, it vanishes from N' (F - S' tau) = 0."""
-    c = case(seed, planar=planar, effects=True)
+    c = pooled(seed, planar=planar, effects=True)
     tau = c.mechanism.inverse_dynamics(c.q, c.v, c.a, wrenches=c.wrenches).tau
     rest = force_of_bodies(c, c.v, c.a)
     rest[c.mechanism.actuated_indices] -= tau
