@@ -12,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools, Indices
+from rps_pin.closed_loop import kinematics
 from rps_pin.closed_loop.assembly.closing import close, closed_gap, complete
 from rps_pin.closed_loop.assembly.projection import project
 from rps_pin.closed_loop.constraints.closures import Closure
@@ -38,12 +39,6 @@ from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts
 from rps_pin.closed_loop.io.urdf import model_from_urdf
-from rps_pin.closed_loop.kinematics import (
-    acceleration,
-    allowed_motions,
-    motion_basis,
-    velocity,
-)
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.errors import ClosureError
@@ -472,7 +467,9 @@ class ClosedLoopModel:
         J N = 0; the columns are orthonormal once angles are made lengths by
         `characteristic_length`.
         """
-        return allowed_motions(self.system, self.system.equations.jacobian(self._configuration(q)))
+        return kinematics.allowed_motions(
+            self.system, self.system.equations.jacobian(self._configuration(q))
+        )
 
     def motion_basis(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
         """Return T, shape (nv, m): v = T u, u the velocities of m joints moving independently.
@@ -489,7 +486,7 @@ class ClosedLoopModel:
         SingularityError
             If these joints do not determine the motion, or do not move independently, here.
         """
-        return motion_basis(
+        return kinematics.motion_basis(
             self.system, self._configuration(q), self.system.independent(independent)
         )
 
@@ -563,7 +560,7 @@ class ClosedLoopModel:
         """
         given = self.system.independent(independent)
         rates = real_vector(v_actuated, given.size, "v_actuated")
-        return velocity(self.system, self._configuration(q), given, rates)
+        return kinematics.velocity(self.system, self._configuration(q), given, rates)
 
     def acceleration(
         self,
@@ -592,7 +589,9 @@ class ClosedLoopModel:
         """
         given = self.system.independent(independent)
         rates = real_vector(a_actuated, given.size, "a_actuated")
-        return acceleration(self.system, self._configuration(q), self._velocity(v), given, rates)
+        return kinematics.acceleration(
+            self.system, self._configuration(q), self._velocity(v), given, rates
+        )
 
     def condition(self, q: ArrayLike) -> float:
         """Return the condition number of J_p, large near a singularity.
@@ -667,8 +666,7 @@ class ClosedLoopModel:
         Solves J' lambda = rnea(q, v, a) + passive joint forces - external forces - S' tau in the
         least-squares sense: exact where a is what `forward_dynamics` returns.
         """
-        state = self.system.state(q, v, a)
-        self.system.closed_jacobian(state[0])
+        state = self.system.state(self._closed_configuration(q), v, a)
         return constraint_forces(self.system, *state, self._forces(tau), wrenches)
 
     # Forward dynamics -----------------------------------------------------------------------------
@@ -721,8 +719,7 @@ class ClosedLoopModel:
         The kinetic energy is u' (T' M T) u / 2, u the velocities of the independent joints (the
         actuated ones if left out).
         """
-        q_ = self._configuration(q)
-        self.system.closed_jacobian(q_)
+        q_ = self._closed_configuration(q)
         basis = self.motion_basis(q_, independent)
         mass: Array = basis.T @ tree_mass(self.system, q_) @ basis
         return mass
@@ -733,8 +730,7 @@ class ClosedLoopModel:
         The forces at the independent joints that keep them from accelerating: a_0 is the
         acceleration with w = 0. Includes gravity, Coriolis forces, damping, friction and springs.
         """
-        q_ = self._configuration(q)
-        self.system.closed_jacobian(q_)
+        q_ = self._closed_configuration(q)
         basis = self.motion_basis(q_, independent)
         a = self.acceleration(q_, v, np.zeros(basis.shape[1]), independent)
         bias: Array = basis.T @ self.generalised_force(q_, v, a)
@@ -742,8 +738,7 @@ class ClosedLoopModel:
 
     def gravity_forces(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
         """Return the forces T' g at the independent joints that carry the weight, shape (m,)."""
-        q_ = self._configuration(q)
-        self.system.closed_jacobian(q_)
+        q_ = self._closed_configuration(q)
         basis = self.motion_basis(q_, independent)
         forces: Array = basis.T @ pin.computeGeneralizedGravity(self.model, self.system.data, q_)
         return forces
@@ -905,6 +900,12 @@ class ClosedLoopModel:
 
     def _configuration(self, q: ArrayLike) -> Array:
         return real_vector(q, self.model.nq, "q")
+
+    def _closed_configuration(self, q: ArrayLike) -> Array:
+        q_ = self._configuration(q)
+        self.system.equations.jacobian(q_)
+        self.system.refuse_open(q_)
+        return q_
 
     def _velocity(self, v: ArrayLike) -> Array:
         return real_vector(v, self.model.nv, "v")

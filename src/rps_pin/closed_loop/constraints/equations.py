@@ -133,14 +133,28 @@ class ClosureEquations:
         self.constraint_data = pin.StdVec_RigidConstraintData()
         self.closed_frames: list[ClosedFrames] = []
         self.couplings: list[tuple[int, _Coupled]] = []
-        self._add_couplings()
-        self._add_constraints()
+        of_frames = [closure for closure in self.closures if isinstance(closure, LoopClosure)]
+        for closure in of_frames:
+            constraint = closure.constraint_model(model)
+            self.constraints.append(constraint)
+            self.constraint_data.append(constraint.createData())
         # Iterating a StdVec makes new Python objects each time: ten times as slow as a list.
         self.calls = [
             (constraint.calc, data)
             for constraint, data in zip(self.constraints, self.constraint_data, strict=True)
         ]
-        self._add_frames()
+        for closure, (_, data) in zip(of_frames, self.calls, strict=True):
+            rows, in_world = self.rows(closure.name), closure.kind in _WORLD_AXES
+            ids = closure.frame_ids(model)
+            self.closed_frames.append(
+                ClosedFrames(closure, rows, *ids, rows_of(closure), in_world, data)
+            )
+        for closure in self.closures:
+            if isinstance(closure, JointCoupling):
+                one, other = (model.joints[index] for index in closure.joint_ids(model))
+                at = (one.idx_q, other.idx_q), (one.idx_v, other.idx_v)
+                coupled = _Coupled(*at, closure.ratio, closure.offset)
+                self.couplings.append((self.rows(closure.name).start, coupled))
         self._points = [f for f in self.closed_frames if f.closure.kind == "spherical"]
         self._frames = [f for f in self.closed_frames if f.closure.kind != "spherical"]
         self.plain = bool(self.closed_frames) and not self.couplings
@@ -158,39 +172,6 @@ class ClosureEquations:
         self._open_limit = (OPEN * self.length) ** 2
         self._open_points, self._open_frames = self._open_tests()
         self._only_spherical = len(self._open_points) == len(self.closures)
-
-    def _add_couplings(self) -> None:
-        for closure in self.closures:
-            if isinstance(closure, JointCoupling):
-                joints = [self.model.joints[index] for index in closure.joint_ids(self.model)]
-                coupled = _Coupled(
-                    (joints[0].idx_q, joints[1].idx_q),
-                    (joints[0].idx_v, joints[1].idx_v),
-                    closure.ratio,
-                    closure.offset,
-                )
-                self.couplings.append((self.rows(closure.name).start, coupled))
-
-    def _add_constraints(self) -> None:
-        for closure in self.closures:
-            if isinstance(closure, LoopClosure):
-                constraint = closure.constraint_model(self.model)
-                self.constraints.append(constraint)
-                self.constraint_data.append(constraint.createData())
-
-    def _add_frames(self) -> None:
-        closures = [closure for closure in self.closures if isinstance(closure, LoopClosure)]
-        for closure, (_, data) in zip(closures, self.calls, strict=True):
-            self.closed_frames.append(
-                ClosedFrames(
-                    closure,
-                    self.rows(closure.name),
-                    *closure.frame_ids(self.model),
-                    rows_of(closure),
-                    closure.kind in _WORLD_AXES,
-                    data,
-                )
-            )
 
     def rows(self, closure: str) -> slice:
         """Return the rows of a closure by its name, or say which there are."""

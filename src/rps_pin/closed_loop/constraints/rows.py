@@ -60,17 +60,20 @@ class Rows(ABC):
     def wrenches(self, placement: pin.SE3) -> Array:
         """Return W, shape (k, 6), (force, moment) at a's origin."""
 
-    @abstractmethod
     def bias(self, placement: pin.SE3, twist: Array) -> Array:
-        """Return W' X, shape (k,), where a moves with the twist X relative to b: -(D X) X."""
+        """Return W' X, shape (k,), where a moves with the twist X relative to b: -(D X) X.
 
-    @abstractmethod
+        This and the next two are zero for a W that does not depend on M.
+        """
+        return np.zeros(self.angular.size)
+
     def slope(self, placement: pin.SE3) -> Array:
         """Return D, shape (k, 6, 6): dW along a relative twist eta is D @ eta."""
+        return np.zeros((self.angular.size, 6, 6))
 
-    @abstractmethod
     def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
         """Return E, shape (k, 6, 6): d(D @ twist) along eta, the twist held, is E @ eta."""
+        return self.slope(placement)
 
 
 class PointRows(Rows):
@@ -210,18 +213,6 @@ class FrameRows(Rows):
         """Return (0, e_i)."""
         return np.hstack([np.zeros((3, 3)), np.eye(3)])
 
-    def bias(self, placement: pin.SE3, twist: Array) -> Array:
-        """Return 0."""
-        return np.zeros(3)
-
-    def slope(self, placement: pin.SE3) -> Array:
-        """Return 0."""
-        return np.zeros((3, 6, 6))
-
-    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
-        """Return 0."""
-        return np.zeros((3, 6, 6))
-
 
 class DistanceRows(Rows):
     """The origins stay a distance apart. Its multiplier is the rod's tension."""
@@ -311,27 +302,23 @@ class Stack(Rows):
         return np.concatenate([part.slope_rate(placement, twist) for part in self.parts])
 
 
-class WholeRows(Stack):
+class WholeRows(Rows):
     """The frames coincide. Of all six rows any basis will do: W = 1, Pinocchio's own rows."""
 
-    def __init__(self) -> None:
-        super().__init__([PointRows(np.eye(3)), FrameRows()])
+    angular = np.arange(6) >= 3
+    _parts = (PointRows(np.eye(3)), FrameRows())
+
+    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
+        """Return the sum of both parts."""
+        return sum([part.squared_gap(lever, p, R) for part in self._parts])
+
+    def gap(self, placement: pin.SE3) -> Array:
+        """Return the distance and the rotation vector from b to a."""
+        return np.concatenate([part.gap(placement) for part in self._parts])
 
     def wrenches(self, placement: pin.SE3) -> Array:
         """Return 1."""
         return np.eye(6)
-
-    def bias(self, placement: pin.SE3, twist: Array) -> Array:
-        """Return 0."""
-        return np.zeros(6)
-
-    def slope(self, placement: pin.SE3) -> Array:
-        """Return 0."""
-        return np.zeros((6, 6, 6))
-
-    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
-        """Return 0."""
-        return np.zeros((6, 6, 6))
 
 
 def _dot(a: Sequence[float], b: Floats) -> float:

@@ -155,12 +155,6 @@ class ConstraintSystem:
 
     # Jacobian -------------------------------------------------------------------------------------
 
-    def closed_jacobian(self, q: Array) -> Array:
-        """Return J at a configuration, or say that it is open."""
-        jacobian = self.equations.jacobian(q)
-        self.refuse_open(q)
-        return jacobian
-
     def scaled(self, jacobian: Array) -> Array:
         """Return J with all entries in one unit."""
         scaled: Array = self._scale * jacobian

@@ -14,6 +14,9 @@ from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 from rps_pin.closed_loop.column_names import column_names
 from rps_pin.files import whole_file
 
+#: Arrays of a `Simulation` with a row for each time, in the order of a table.
+_ARRAYS = ("time", "q", "v", "a", "tau", "kinetic", "potential", "gap", "work")
+
 
 class JointLimitPassed(NamedTuple):
     """A joint that left its limits, when it first did."""
@@ -98,16 +101,17 @@ class Simulation:
 
         Numbers have 17 digits: they read back as they were.
         """
-        names = [
-            "time",
-            *(f"q_{name}" for name in self.q_names),
-            *(f"v_{name}" for name in self.v_names),
-            *(f"a_{name}" for name in self.v_names),
-            *(f"tau_{name}" for name in self.tau_names),
-            *("kinetic", "potential", "gap", "work"),
-        ]
-        columns = [self.time, self.q, self.v, self.a, self.tau]
-        columns += [self.kinetic, self.potential, self.gap, self.work]
+        of_columns = {
+            "q": self.q_names,
+            "v": self.v_names,
+            "a": self.v_names,
+            "tau": self.tau_names,
+        }
+        names: list[str] = []
+        for array in _ARRAYS:
+            found = of_columns.get(array)
+            names += [array] if found is None else [f"{array}_{name}" for name in found]
+        columns = [getattr(self, array) for array in _ARRAYS]
         if self.constraint_forces is not None:
             names += [f"lambda_{row}" for row in range(self.constraint_forces.shape[1])]
             columns.append(self.constraint_forces)
@@ -118,30 +122,13 @@ class Simulation:
 
     def to_npz(self, path: str | os.PathLike[str]) -> None:
         """Write the arrays under their names for `numpy.load`, whole or not at all."""
-        arrays: dict[str, Any] = {
-            name: getattr(self, name)
-            for name in ("time", "q", "v", "a", "tau", "kinetic", "potential", "gap", "work")
-        }
+        arrays: dict[str, Any] = {name: getattr(self, name) for name in _ARRAYS}
         if self.constraint_forces is not None:
             arrays["constraint_forces"] = self.constraint_forces
         for name in ("q_names", "v_names", "tau_names"):
             arrays[name] = np.array(getattr(self, name), dtype=str)
         with whole_file(path) as scratch, scratch.open("wb") as stream:
             np.savez_compressed(stream, **arrays)
-
-
-class Sample(NamedTuple):
-    """A row of a `Simulation`."""
-
-    time: float
-    q: Array
-    v: Array
-    a: Array
-    tau: Array
-    energies: tuple[float, float]
-    gap: float
-    constraint_forces: Array | None
-    work: float
 
 
 class Recorder:
@@ -159,9 +146,15 @@ class Recorder:
         self._model, self._limits = model, JointLimits(model)
         self._watched = np.ones(self._limits.q.size, dtype=bool)
         self._passed: list[JointLimitPassed] = []
-        self._samples: list[Sample] = []
-        self._q_names, self._v_names = column_names(model)
-        self._tau_names = tuple(self._v_names[index] for index in actuated)
+        self._columns: dict[str, list[Any]] = {name: [] for name in (*_ARRAYS, "constraint_forces")}
+        q_names, v_names = column_names(model)
+        self._names: dict[str, Any] = {
+            "q_names": q_names,
+            "v_names": v_names,
+            "tau_names": tuple(v_names[index] for index in actuated),
+        }
+        nv = model.nv
+        self._widths = {"q": model.nq, "v": nv, "a": nv, "tau": actuated.size}
 
     def watch(self, time: float, q: Array) -> None:
         """Note the joints that are outside their limits for the first time."""
@@ -176,29 +169,24 @@ class Recorder:
             passed = JointLimitPassed(limits.names[index], time, float(x[index]), lower, upper)
             self._passed.append(passed)
 
-    def add(self, sample: Sample) -> None:
-        """Keep a sample."""
-        self._samples.append(sample)
+    def add(self, constraint_forces: Array | None = None, **row: Any) -> None:
+        """Keep a row of all arrays of a `Simulation`, by name."""
+        for name, value in row.items():
+            self._columns[name].append(value)
+        if constraint_forces is not None:
+            self._columns["constraint_forces"].append(constraint_forces)
 
     def simulation(self) -> Simulation:
         """Return what was recorded until now."""
-        rows, nv = self._samples, self._model.nv
-        n = len(rows)
-        energies = np.array([row.energies for row in rows]).reshape(n, 2)
-        forces = [row.constraint_forces for row in rows if row.constraint_forces is not None]
+        forces = self._columns["constraint_forces"]
+        arrays: dict[str, Any] = {}
+        for name in _ARRAYS:
+            values = np.array(self._columns[name], dtype=np.float64)
+            wide = name in self._widths
+            arrays[name] = values.reshape(-1, self._widths[name]) if wide else values
         return Simulation(
-            time=np.array([row.time for row in rows]),
-            q=np.array([row.q for row in rows]).reshape(n, self._model.nq),
-            v=np.array([row.v for row in rows]).reshape(n, nv),
-            a=np.array([row.a for row in rows]).reshape(n, nv),
-            tau=np.array([row.tau for row in rows]).reshape(n, len(self._tau_names)),
-            kinetic=energies[:, 0].copy(),
-            potential=energies[:, 1].copy(),
-            gap=np.array([row.gap for row in rows]),
+            **arrays,
+            **self._names,
             constraint_forces=np.array(forces) if forces else None,
             limits_passed=tuple(self._passed),
-            q_names=self._q_names,
-            v_names=self._v_names,
-            tau_names=self._tau_names,
-            work=np.array([row.work for row in rows]),
         )

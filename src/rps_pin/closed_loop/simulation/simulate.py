@@ -35,7 +35,7 @@ from rps_pin.closed_loop.simulation.motion import (
     WrenchesInTime,
     closed_start,
 )
-from rps_pin.closed_loop.simulation.result import Recorder, Sample, Simulation
+from rps_pin.closed_loop.simulation.result import Recorder, Simulation
 from rps_pin.errors import RPSPinError
 from rps_pin.validation import choice, positive_number, whole_number
 
@@ -148,7 +148,7 @@ def simulate(
             with np.errstate(over="ignore", invalid="ignore"):  # refused in words
                 a = motion.acceleration(time, *state)
             if k % record_every == 0 or following is None:
-                recorder.add(_sample(system, drive, (time, *state), a, gap, work, forces))
+                _record(recorder, system, drive, (time, *state), a, forces, gap=gap, work=work)
             if following is None:
                 break
             with np.errstate(over="ignore", invalid="ignore"):
@@ -242,18 +242,20 @@ def _intervals(duration: float, step: float) -> list[tuple[int, float, float | N
     return [(k, t, after) for (k, t), after in zip(grid, [*following, None], strict=True)]
 
 
-def _sample(
+def _record(
+    recorder: Recorder,
     system: ConstraintSystem,
     drive: Drive,
     at: tuple[float, Array, Array],
     a: Array,
-    gap: float,
-    work: float,
     forces: bool,
-) -> Sample:
+    **numbers: float,
+) -> None:
     time, q, v = at
     multipliers = None
     if forces:
         wrenches = drive.wrenches(time, q, v)
         multipliers = constraint_forces(system, q, v, a, drive.tau, wrenches)
-    return Sample(time, q, v, a, drive.tau, energy(system, q, v), gap, multipliers, work)
+    kinetic, potential = energy(system, q, v)
+    row = {"time": time, "q": q, "v": v, "a": a, "tau": drive.tau, **numbers}
+    recorder.add(multipliers, kinetic=kinetic, potential=potential, **row)
