@@ -35,7 +35,7 @@ def motion(name: str) -> tuple[Array, Array, Array]:
 
 
 def jobs(robot: RPSRobot, name: str) -> dict[str, Job]:
-    """Time the closed form, RNEA of the open chains, and the constraint models."""
+    """Return calls of the closed form, of RNEA of the open chains, and of the constraint models."""
     samples = motion(name)
     q, v, a = robot.state(*samples)
     model = robot.mechanism.model
