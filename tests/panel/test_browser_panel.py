@@ -107,16 +107,14 @@ def test_sliders_in_the_page(served: BrowserPanel) -> None:
         page.on("console", lambda one: said.append(one.text) if one.type == "error" else None)
         page.goto(served.url)
         page.get_by_text("within all limits").wait_for(timeout=60_000)
-        time.sleep(2.0)
-        before = _picture(page)
+        before = _settled(page)
         # The first number box is the height's: as someone at the keyboard would.
         box = page.locator("input[type=text], input[type=number]").first
         box.fill("255")
         box.press("Enter")
         page.get_by_text("255.000 mm").first.wait_for(timeout=30_000)
         page.get_by_text("its limits are 0.2 to 0.25 m").first.wait_for(timeout=30_000)
-        time.sleep(2.0)
-        after = _picture(page)
+        after = _settled(page)
         browser.close()
     assert served._panel.pose[0] == pytest.approx(0.255)  # type: ignore[attr-defined]
     robot = (slice(None), slice(0, 550))  # left of the sliders
@@ -150,6 +148,17 @@ def _path() -> str:
     if path is None:
         pytest.skip("there is no browser")
     return path
+
+
+def _settled(page: object) -> np.ndarray:
+    """Return the picture when it no longer changes."""
+    last = _picture(page)
+    while True:
+        time.sleep(0.3)
+        now = _picture(page)
+        if np.array_equal(now, last):
+            return now
+        last = now
 
 
 def _picture(page: object) -> np.ndarray:

@@ -79,8 +79,8 @@ class Watched:
 PANELS_HIDDEN = "#caption, .dg { visibility: hidden !important; }"
 
 
-@pytest.fixture
-def watched(browser: Browser) -> Iterator[Watched]:
+def watching(browser: Browser) -> Watched:
+    """Open an empty page and watch it."""
     page = browser.new_page(viewport={"width": 800, "height": 600})
     watch = Watched(page)
     page.on("request", lambda request: watch.requests.append(request.url))
@@ -93,19 +93,26 @@ def watched(browser: Browser) -> Iterator[Watched]:
             else None
         ),
     )
+    return watch
+
+
+@pytest.fixture
+def watched(browser: Browser) -> Iterator[Watched]:
+    watch = watching(browser)
     yield watch
-    page.close()
+    watch.page.close()
+
+
+def open_text(watch: Watched, text: str, path: Path) -> Watched:
+    """Write a page's text to disk and open it as a file."""
+    path.write_text(text, encoding="utf-8")
+    watch.page.goto(path.as_uri())
+    watch.wait("typeof viewer !== 'undefined' && !viewer.needs_render")
+    return watch
 
 
 @pytest.fixture
 def show(watched: Watched, tmp_path: Path):
     """Write a page's text to disk, open it as a file, and return the watched page."""
 
-    def opened(text: str) -> Watched:
-        path = tmp_path / "page.html"
-        path.write_text(text, encoding="utf-8")
-        watched.page.goto(path.as_uri())
-        watched.wait("typeof viewer !== 'undefined' && !viewer.needs_render")
-        return watched
-
-    return opened
+    return lambda text: open_text(watched, text, tmp_path / "page.html")

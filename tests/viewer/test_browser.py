@@ -1,11 +1,14 @@
 """The pages in a real browser: they draw, they move, they ask nobody for anything."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from playwright.sync_api import Page
 
 from rps_pin.viewer import LocalViewer, Scene
 from rps_pin.viewer.files.html import motion_page
+from tests.viewer.conftest import Watched, open_text, watching
 
 # Mean over the picture of the absolute difference of two pixels, in 1 / 255.
 DIFFERENT = 1.0
@@ -21,6 +24,26 @@ def sample_page(sample, **options) -> str:
     return motion_page(sample.model, sample.visual, sample.times, sample.configurations, **options)
 
 
+@pytest.fixture(scope="module")
+def opened(sample, browser, tmp_path_factory) -> Iterator[Watched]:
+    """One page for all tests that leave it as it is but for its time; it plays by itself."""
+    watch = watching(browser)
+    text = sample_page(sample, title="Sample <robot>")
+    open_text(watch, text, tmp_path_factory.mktemp("page") / "page.html")
+    assert watch.page.evaluate("viewer.animator.playing")
+    watch.page.evaluate("viewer.animator.pause()")
+    yield watch
+    watch.page.close()
+
+
+@pytest.fixture
+def playing(opened) -> Iterator[Watched]:
+    """The same, from its beginning; it pauses for the next test, or would take its processor."""
+    opened.page.evaluate("viewer.animator.reset(); viewer.animator.play()")
+    yield opened
+    opened.page.evaluate("viewer.animator.pause()")
+
+
 def time_of(page: Page) -> float:
     return float(page.evaluate("viewer.animator.time"))
 
@@ -34,8 +57,8 @@ def share_coloured(picture: np.ndarray) -> float:
     return float(((picture.max(axis=2) - picture.min(axis=2)) > 60).mean())
 
 
-def test_the_page_draws_the_robot_without_complaint_or_network(sample, show):
-    watched = show(sample_page(sample, title="Sample <robot>"))
+def test_the_page_draws_the_robot_without_complaint_or_network(opened):
+    watched = opened
     picture = watched.picture()
     assert picture.shape == (600, 800, 3)
     assert picture.std() > 10.0
@@ -60,9 +83,8 @@ def test_the_browser_itself_forbids_the_page_any_network(sample, show):
     assert any("Content Security Policy" in complaint for complaint in watched.complaints)
 
 
-def test_it_plays_by_itself_and_in_a_loop(sample, show):
-    watched = show(sample_page(sample))
-    assert watched.page.evaluate("viewer.animator.playing")
+def test_it_plays_by_itself_and_in_a_loop(playing):
+    watched = playing  # `opened` has seen that it starts by itself
     assert watched.page.evaluate("viewer.animator.duration") == pytest.approx(2.0)
     # Many times its length later it is still within its length, and moving: it has begun again.
     watched.page.evaluate("viewer.animator.mixer.update(21)")
@@ -71,8 +93,8 @@ def test_it_plays_by_itself_and_in_a_loop(sample, show):
     assert watched.page.evaluate("viewer.animator.playing")
 
 
-def test_the_picture_changes_with_the_time_and_only_then(sample, show):
-    watched = show(sample_page(sample))
+def test_the_picture_changes_with_the_time_and_only_then(playing):
+    watched = playing
     stop_at(watched.page, 0.5)
     early = watched.picture()
     watched.page.wait_for_timeout(300)
@@ -83,8 +105,8 @@ def test_the_picture_changes_with_the_time_and_only_then(sample, show):
     assert difference(early, watched.picture()) < SAME
 
 
-def test_the_playback_controls_work(sample, show):
-    watched = show(sample_page(sample))
+def test_the_playback_controls_work(playing):
+    watched = playing
     page = watched.page
     controls = page.locator(".dg.main")
     for name in ("play", "pause", "reset", "time"):
@@ -97,9 +119,9 @@ def test_the_playback_controls_work(sample, show):
     watched.wait(f"viewer.animator.time !== {stopped}")
 
 
-def test_a_link_on_the_page_stands_where_pinocchio_puts_it(sample, show):
+def test_a_link_on_the_page_stands_where_pinocchio_puts_it(sample, playing):
     """Through packing, three.js's interpolation and the scene tree, to the browser's matrices."""
-    page = show(sample_page(sample)).page
+    page = playing.page
     stop_at(page, 1.25)
     found = page.evaluate(
         """() => {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,8 @@ from rps_pin import ClosedLoopModel, RPSRobot, helix
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.viewer import save_html, save_png, save_video
 from rps_pin.viewer.files.browser import find_browser
+from rps_pin.viewer.files.film import write_film
+from rps_pin.viewer.files.pictures import pixels_of
 from tests.viewer.conftest import Watched
 
 STORED = Path(__file__).with_name("pictures")
@@ -127,16 +130,59 @@ def test_a_picture_is_as_stored_and_differs_where_the_robot_moved(robot, chromiu
     assert difference(read(other), stored) > OTHER
 
 
-@pytest.mark.parametrize("name", ["film.gif", "film.webp", "film.mp4"])
-def test_a_film_moves(chromium, tmp_path, name):
+FRAME_RATE = 5.0
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory) -> tuple[Path, list[bytes]]:
+    """A film that `save_video` wrote, and the pictures that it wrote it from."""
+    if find_browser() is None:
+        pytest.skip("no Chromium found")
     four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
     motion = four_bar.simulate(four_bar.home, duration=0.4)
+    film, pictures = tmp_path_factory.mktemp("film") / "film.mp4", []
+
+    def remember(path, given, frame_rate):
+        pictures.extend(given)
+        write_film(path, pictures, frame_rate)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rps_pin.viewer.save.write_film", remember)
+        save_video(film, four_bar, motion, size=(160, 120), frame_rate=FRAME_RATE, captions=False)
+    return film, pictures
+
+
+@pytest.mark.parametrize("name", ["film.gif", "film.webp", "film.mp4"])
+def test_a_film_moves(drawn, tmp_path, name):
+    saved, drawings = drawn
     film = tmp_path / name
-    save_video(film, four_bar, motion, size=(160, 120), frame_rate=5.0, captions=False)
+    write_film(film, drawings, FRAME_RATE)
+    if film.suffix == saved.suffix:
+        assert film.read_bytes() == saved.read_bytes()
     pictures = frames_of(film)
     assert len(pictures) == 2
-    assert pictures[0].shape == (120, 160, 3)
+    for picture, drawing in zip(pictures, drawings, strict=True):
+        assert picture.shape == (120, 160, 3)
+        assert np.abs(picture.astype(float) - pixels_of(drawing)).mean() < 3.0
     assert np.abs(pictures[0].astype(float) - pictures[1]).mean() > 1.0
+
+
+def test_a_film_has_its_rate_begins_again_and_may_have_odd_sides(tmp_path):
+    rng, pictures = np.random.default_rng(0), []
+    for _ in range(3):
+        picture = io.BytesIO()
+        Image.fromarray(rng.integers(0, 256, (121, 161, 3), dtype=np.uint8)).save(picture, "PNG")
+        pictures.append(picture.getvalue())
+    for name in ("film.gif", "film.webp", "film.mp4"):
+        write_film(tmp_path / name, pictures, 25.0)
+    with Image.open(tmp_path / "film.gif") as gif:
+        assert [one.info["duration"] for one in ImageSequence.Iterator(gif)] == [40] * 3
+        assert gif.info["loop"] == 0
+        assert gif.size == (161, 121)
+    with Image.open(tmp_path / "film.webp") as webp:
+        assert (webp.n_frames, webp.size, webp.info["loop"]) == (3, (161, 121), 0)
+    details = next(imageio_ffmpeg.read_frames(tmp_path / "film.mp4"))
+    assert (details["fps"], details["size"], details["codec"]) == (25.0, (160, 120), "h264")
 
 
 def frames_of(film: Path) -> list[np.ndarray]:

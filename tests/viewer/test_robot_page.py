@@ -1,4 +1,4 @@
-"""The page that `rps-pin helix` writes, opened from disk in a real browser."""
+"""The page of a run, as `rps-pin helix` writes it, opened from disk in a real browser."""
 
 from pathlib import Path
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rps_pin import RPSRobot, helix
-from rps_pin.cli.motion_report import write_motion
 from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
+from rps_pin.viewer import fitting_layers, save_html
 
 
 @pytest.fixture(scope="module")
@@ -21,8 +21,8 @@ def run(robot: RPSRobot) -> MotionRun:
 
 
 def test_the_helix_page_loads_shows_the_robot_and_moves(robot, run, watched, tmp_path: Path):
-    page = write_motion(tmp_path, "helix", "a helix", robot, run)[-1]
-    assert page.name == "viewer.html"
+    page = tmp_path / "viewer.html"
+    save_html(page, robot, run, layers=fitting_layers(robot.mechanism), title="a helix")
     watched.page.context.set_offline(True)
     watched.page.goto(page.as_uri())
     watched.wait("typeof viewer !== 'undefined' && !viewer.needs_render")
