@@ -19,6 +19,7 @@ from rps_pin.config import (
     read_yaml,
 )
 from rps_pin.errors import InputError, MechanismError
+from tests.each import each
 
 
 def held(folder: Path, content: str | bytes) -> Path:
@@ -56,7 +57,7 @@ def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
     assert read_yaml(held(tmp_path, "\ufeffa: 1\n"), "file").values == {"a": 1}
 
 
-@pytest.mark.parametrize(
+@each(
     ("content", "why"),
     [
         ("", "must hold 'key: value' lines; it holds nothing"),
@@ -172,7 +173,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("text", WRONG)
+@each("text", WRONG)
 def test_every_schema_is_read_with_the_same_messages(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError) as caught:
         read_config(held(tmp_path, text), "test", Whole)

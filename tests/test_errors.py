@@ -8,6 +8,7 @@ import pytest
 
 from rps_pin import errors
 from rps_pin.errors import LimitExcess, LimitViolation
+from tests.each import each
 
 EXAMPLES = [
     errors.RPSPinError("text"),
@@ -30,7 +31,7 @@ def test_every_error_class_has_an_example_here() -> None:
     assert {type(example) for example in EXAMPLES} == classes
 
 
-@pytest.mark.parametrize("error", EXAMPLES, ids=lambda error: type(error).__name__)
+@each("error", EXAMPLES, ids=lambda error: type(error).__name__)
 def test_errors_share_one_base_class(error: Exception) -> None:
     assert isinstance(error, errors.RPSPinError)
 
@@ -75,7 +76,7 @@ def test_unreachable_error_keeps_its_violations() -> None:
     assert errors.UnreachableError("text").violations == ()
 
 
-@pytest.mark.parametrize("error", EXAMPLES, ids=lambda error: type(error).__name__)
+@each("error", EXAMPLES, ids=lambda error: type(error).__name__)
 def test_errors_travel_between_processes(error: Exception) -> None:
     """Sweeps run in pools of processes, whose errors are pickled."""
     twin = pickle.loads(pickle.dumps(error))

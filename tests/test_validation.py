@@ -25,6 +25,7 @@ from rps_pin.validation import (
     real_vector,
     whole_number,
 )
+from tests.each import each
 
 
 def test_arrays_of_floats_pass_uncopied() -> None:
@@ -137,7 +138,7 @@ def test_a_fixed_array_is_a_read_only_copy() -> None:
     np.testing.assert_array_equal(fixed_array([1e50, -1e50], "x", (None,)), [1e50, -1e50])
 
 
-@pytest.mark.parametrize(
+@each(
     ("bad", "message"),
     [
         ([0.2, 0.1], r"start has shape \(2,\); it must be \(3,\): z, tilt_x, tilt_y"),

@@ -13,6 +13,7 @@ from rps_pin.control import ComputedTorque, Gains, PDControl, effective_inertia
 from rps_pin.control.simulation.scenario import load_scenario
 from rps_pin.control.simulation.wrong_parameters import wrong_parameters
 from rps_pin.errors import RPSPinError
+from tests.each import each
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = sorted((ROOT / "docs" / "scenarios").glob("*.yaml"))
@@ -132,7 +133,7 @@ def test_gains_in_the_law_s_own_units(tmp_path: Path) -> None:
         scenario.margins()
 
 
-@pytest.mark.parametrize(
+@each(
     ("wrong", "right", "words"),
     [
         ("robot: micro", "", r"a scenario needs robot"),
@@ -178,7 +179,7 @@ def test_mistakes_are_told_with_their_place(
         assert "scenario.yaml" in str(told.value)
 
 
-@pytest.mark.parametrize(
+@each(
     ("line", "words"),
     [
         ("plant: {masses: 0.0}", "line 4: plant.masses = 0.0: .*greater than 0"),

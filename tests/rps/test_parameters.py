@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from rps_pin import InputError, ParameterError, RPSParameters
 from rps_pin.rps.parameters import INERTIA_ROUNDING
 from tests import strategies
+from tests.each import each
 
 #: A legal robot with masses everywhere, and nothing at its default.
 LEGAL = {
@@ -123,7 +124,7 @@ def test_unknown_preset_is_refused_with_those_there_are(name: str) -> None:
 # Immutability and equality ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("field", LEGAL)
+@each("field", LEGAL)
 def test_fields_cannot_be_assigned(field: str) -> None:
     p = legal()
     with pytest.raises(ValueError, match="frozen"):
@@ -183,7 +184,7 @@ DIFFERENT = {
 }
 
 
-@pytest.mark.parametrize("field", LEGAL)
+@each("field", LEGAL)
 def test_parameters_that_differ_in_one_field_are_not_equal(field: str) -> None:
     other = DIFFERENT[field] if field in DIFFERENT else np.nextafter(LEGAL[field], np.inf)
     assert legal(**{field: other}) != legal()
@@ -212,31 +213,29 @@ def test_replace_validates_anew() -> None:
 # Bad values ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("field", FLOATS)
-@pytest.mark.parametrize("bad", [math.nan, "0.1 m", None, [0.1], True, False, 1j])
+@each("field", FLOATS)
+@each("bad", [math.nan, "0.1 m", None, [0.1], True, False, 1j])
 def test_floats_that_are_no_numbers_are_refused(field: str, bad: object) -> None:
     refused(field, bad)
 
 
-@pytest.mark.parametrize("field", FLOATS)
+@each("field", FLOATS)
 def test_numbers_written_as_strings_are_refused(field: str) -> None:
     """YAML's quoted "0.1" is a mistake, not a number."""
     refused(field, "0.1")
 
 
-@pytest.mark.parametrize(
+@each(
     "field",
     sorted({*FLOATS} - {"spherical_cone_limit", "actuator_force_limit", "actuator_speed_limit"}),
 )
-@pytest.mark.parametrize("bad", [math.inf, -math.inf])
+@each("bad", [math.inf, -math.inf])
 def test_infinite_sizes_and_masses_are_refused(field: str, bad: float) -> None:
     refused(field, bad)
 
 
-@pytest.mark.parametrize(
-    "field", ["base_radius", "platform_radius", "platform_mass", "friction_speed"]
-)
-@pytest.mark.parametrize("bad", [0.0, -0.1])
+@each("field", ["base_radius", "platform_radius", "platform_mass", "friction_speed"])
+@each("bad", [0.0, -0.1])
 def test_what_must_exist_is_positive(field: str, bad: float) -> None:
     refused(field, bad, "greater than 0")
 
@@ -271,10 +270,8 @@ def test_arrays_are_finite(field: str, bad: float) -> None:
         refused(field, value, "finite")
 
 
-@pytest.mark.parametrize("field", ARRAYS)
-@pytest.mark.parametrize(
-    "bad", [0.1, [0.1, 0.1], np.eye(4), np.eye(3)[None], "full", None, [[1], [1, 2]]]
-)
+@each("field", ARRAYS)
+@each("bad", [0.1, [0.1, 0.1], np.eye(4), np.eye(3)[None], "full", None, [[1], [1, 2]]])
 def test_arrays_have_their_shape(field: str, bad: object) -> None:
     refused(field, bad, r"shape|numbers")
 
@@ -287,8 +284,8 @@ def test_arrays_hold_numbers(field: str, bad: object) -> None:
     refused(field, value.tolist())
 
 
-@pytest.mark.parametrize("field", PAIRS)
-@pytest.mark.parametrize(
+@each("field", PAIRS)
+@each(
     "bad",
     [(0.5, 0.2), (0.3, 0.3), (math.nan, 0.5), (0.2, math.nan), 0.5, (0.5,), (0.1, 0.2, 0.3), None],
 )
@@ -298,8 +295,8 @@ def test_limits_that_are_no_interval_are_refused(field: str, bad: object) -> Non
     assert caught.value.field == field
 
 
-@pytest.mark.parametrize("field", PAIRS)
-@pytest.mark.parametrize("bad", [("0.2", 0.5), (False, 0.5), (0.2, True), ("a", "b")])
+@each("field", PAIRS)
+@each("bad", [("0.2", 0.5), (False, 0.5), (0.2, True), ("a", "b")])
 def test_limits_hold_numbers(field: str, bad: object) -> None:
     with pytest.raises(ParameterError) as caught:
         legal(**{field: bad})
@@ -326,7 +323,7 @@ def test_rest_axis_is_the_platform_s_normal_unless_told() -> None:
         assert RPSParameters.from_preset(name).spherical_rest_angle == 0
 
 
-@pytest.mark.parametrize("bad", ["", "3rps", "a b", "a/b", "a\n", "<robot>", 7, None, "ä"])
+@each("bad", ["", "3rps", "a b", "a/b", "a\n", "<robot>", 7, None, "ä"])
 def test_names_are_plain(bad: object) -> None:
     refused("name", bad)
 
@@ -498,7 +495,7 @@ def test_message_about_a_nest_of_aliases_stays_short(tmp_path: Path, field: str)
     assert len(str(caught.value)) < 2000
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "message"),
     [
         (MINIMAL + "gravity: [0, 0\nrod_mass: 1\n", "line 9"),

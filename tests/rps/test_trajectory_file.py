@@ -20,6 +20,7 @@ from rps_pin.rps.motion.trajectory_schema import KINDS
 from rps_pin.trajectories import circle, lissajous, point_to_point, spline
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.path import Trajectory
+from tests.each import each
 
 ROBOT = RPSRobot.from_preset("micro")
 STEP = "kind: point_to_point\nstart: [0.215, 0, 0]\nend: [0.225, 0.12, 0]\n"
@@ -90,7 +91,7 @@ def table(path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(("text", "expected"), DESCRIBED)
+@each(("text", "expected"), DESCRIBED)
 def test_a_file_describes_what_its_function_returns(
     tmp_path: Path, text: str, expected: Trajectory
 ) -> None:
@@ -130,7 +131,7 @@ def test_the_files_in_the_documents_move_from_rest_to_rest(file: Path) -> None:
     assert np.abs(path.sample([0.0, path.duration]).rate).max() < 1e-12 * fastest
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "words"),
     [
         ("height: 1\n", " needs the key 'kind', one of helix, point_to_point, spline, circle"),

@@ -20,6 +20,7 @@ from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.helix import HelixPath
 from rps_pin.trajectories.spline import spline
+from tests.each import each
 from tests.trajectories.csv_files import SI, good_lines, read, refuse, save, swings
 
 Array = NDArray[np.float64]
@@ -152,7 +153,7 @@ def test_a_longest_step_is_a_positive_number(tmp_path: Path, bad: Any) -> None:
 # Derivatives that are not -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
+@each(
     ("columns", "factor", "words"),
     [
         (
@@ -185,7 +186,7 @@ def test_wrong_units_show_in_the_derivatives(
         read_csv(file)
 
 
-@pytest.mark.parametrize("column", range(1, 10))
+@each("column", range(1, 10))
 def test_one_wrong_entry_is_told_with_its_line_and_values(tmp_path: Path, column: int) -> None:
     t = np.linspace(0, 2, 101)
     rows = np.column_stack([t, 0.1 * swings(6)(t)])

@@ -13,6 +13,7 @@ from rps_pin import InputError, RPSRobot, helix
 from rps_pin.rps.dynamics.motion_csv import motion_columns
 from rps_pin.rps.dynamics.motion_run import run_motion
 from rps_pin.trajectories.csv_file import IGNORED, READ, read_csv
+from tests.each import each
 from tests.trajectories.csv_files import QUANTITIES, SI, good_lines, refuse, save, swings
 
 
@@ -31,9 +32,9 @@ UNITS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("length", ["m", "mm", "um"])
-@pytest.mark.parametrize("angle", ["rad", "mrad", "urad", "deg"])
-@pytest.mark.parametrize("time", ["s", "ms", "us"])
+@each("length", ["m", "mm", "um"])
+@each("angle", ["rad", "mrad", "urad", "deg"])
+@each("time", ["s", "ms", "us"])
 def test_units_are_converted(tmp_path: Path, time: str, length: str, angle: str) -> None:
     t, at = np.linspace(0, 2, 60), swings(3)
     units = [length if name.startswith("z") else angle for name in QUANTITIES]
@@ -59,7 +60,7 @@ def test_columns_may_stand_in_any_order(tmp_path: Path) -> None:
     assert_array_equal(found.poses, at(t)[:, :3])
 
 
-@pytest.mark.parametrize(
+@each(
     ("header", "words"),
     [
         ("time_s,z,tilt_x_rad,tilt_y_rad", "'z' has no unit: it can be z_m, z_mm, z_um$"),

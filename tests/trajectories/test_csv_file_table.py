@@ -11,10 +11,11 @@ from numpy.testing import assert_array_equal
 from rps_pin import InputError
 from rps_pin.trajectories import csv_file
 from rps_pin.trajectories.csv_file import read_csv
+from tests.each import each
 from tests.trajectories.csv_files import HEADER, SI, good_lines, read, refuse
 
 
-@pytest.mark.parametrize(
+@each(
     "change",
     [
         lambda text: "\ufeff" + text,
@@ -38,7 +39,7 @@ def test_the_usual_dialects_are_read(tmp_path: Path, change: Any) -> None:
     assert_array_equal(found.poses, expected.poses)
 
 
-@pytest.mark.parametrize(
+@each(
     ("line", "words"),
     [
         ("0.5,,0.1,0.1", "z_m is empty"),
@@ -66,7 +67,7 @@ def test_the_usual_dialects_are_read(tmp_path: Path, change: Any) -> None:
         ("0.5,223,0.1,0.1", "z_m = 223: .* 100 m; is it in millimetres.* z_mm"),
     ],
 )
-@pytest.mark.parametrize("comments", [False, True])
+@each("comments", [False, True])
 def test_a_bad_row_is_told_with_its_line(
     tmp_path: Path, line: str, words: str, comments: bool
 ) -> None:
@@ -79,7 +80,7 @@ def test_a_bad_row_is_told_with_its_line(
     refuse(tmp_path, "\n".join(lines), number, words)
 
 
-@pytest.mark.parametrize(
+@each(
     ("content", "line", "words"),
     [
         ("", None, "is empty"),

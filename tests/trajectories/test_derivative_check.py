@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from rps_pin.trajectories.derivative_check import disagreement
 from rps_pin.trajectories.time_laws import time_law
+from tests.each import each
 
 SEEDS = st.integers(0, 2**32 - 1)
 T = np.linspace(0, 2, 41)
@@ -27,8 +28,8 @@ def test_a_sine_of_four_samples_a_period_is_right(
     assert disagreement(angle / w, x, v) is None
 
 
-@pytest.mark.parametrize("profile", ["quintic", "trapezoidal", "s-curve"])
-@pytest.mark.parametrize("count", [12, 13, 50, 501])
+@each("profile", ["quintic", "trapezoidal", "s-curve"])
+@each("count", [12, 13, 50, 501])
 def test_accelerations_that_jump_are_right(profile: str, count: int) -> None:
     law = time_law(0.3, profile, duration=1.7)  # type: ignore[arg-type]
     t = np.linspace(0, law.duration, count)
@@ -75,7 +76,7 @@ def test_what_stands_still_has_no_rate(rest: float) -> None:
     assert found.given == 0.3
 
 
-@pytest.mark.parametrize(
+@each(
     ("factor", "words"),
     [
         (1e3, "thousandths"),

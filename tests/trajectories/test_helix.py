@@ -12,6 +12,7 @@ from rps_pin import InputError, RPSRobot, helix
 from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.trajectories import HelixPath
 from rps_pin.trajectories.helix import PAPER_DURATION
+from tests.each import each
 
 Array = NDArray[np.float64]
 
@@ -166,7 +167,7 @@ def test_sample_keeps_the_shape_of_the_times() -> None:
         assert [x.shape for x in path().sample(t)] == [(*np.shape(t), 3)] * 3
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "message"),
     [
         ({"radius": 0.2301}, "radius = 0.2301 m: .* reaches 0 to 0.23 m"),

@@ -12,6 +12,7 @@ from scipy.interpolate import PPoly
 from rps_pin import InputError
 from rps_pin.trajectories.piecewise_law import PiecewiseLaw
 from rps_pin.trajectories.time_laws import SCurveLaw, TrapezoidalLaw
+from tests.each import each
 
 Array = NDArray[np.float64]
 
@@ -56,8 +57,8 @@ def test_at_a_jump_the_acceleration_is_the_later_piece_s() -> None:
     np.testing.assert_array_equal(before, [1, 2, 3, 4, 5])
 
 
-@pytest.mark.parametrize("ramp", [1e-3, 1e-9, 1e-15, 1e-20])
-@pytest.mark.parametrize("kind", [TrapezoidalLaw, SCurveLaw])
+@each("ramp", [1e-3, 1e-9, 1e-15, 1e-20])
+@each("kind", [TrapezoidalLaw, SCurveLaw])
 def test_the_end_is_at_rest_however_short_the_brake(
     kind: type[TrapezoidalLaw] | type[SCurveLaw], ramp: float
 ) -> None:

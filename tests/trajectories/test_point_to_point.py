@@ -20,6 +20,7 @@ from rps_pin.trajectories import (
     TrapezoidalLaw,
     point_to_point,
 )
+from tests.each import each
 from tests.trajectories.differences import difference
 from tests.trajectories.law_checks import inside, peaks, uncertainty
 
@@ -136,7 +137,7 @@ def test_repr_tells_the_ends_and_the_law() -> None:
     )
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "message"),
     [
         ({"end": START}, "start and end are the same pose"),

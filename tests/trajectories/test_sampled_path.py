@@ -17,6 +17,7 @@ from rps_pin import InputError
 from rps_pin.trajectories.path import PathSample
 from rps_pin.trajectories.sampled_path import SampledPath
 from rps_pin.trajectories.time_laws import QuinticLaw
+from tests.each import each
 
 Array = NDArray[np.float64]
 SEEDS = st.integers(0, 2**32 - 1)
@@ -241,7 +242,7 @@ POSES = np.random.default_rng(0).normal(size=(8, 3))
 TIMES = np.arange(8.0)
 
 
-@pytest.mark.parametrize(
+@each(
     ("arguments", "message"),
     [
         ((TIMES[:7], POSES), "7 times for 8 poses"),

@@ -26,6 +26,7 @@ from rps_pin.trajectories import (
     TrapezoidalLaw,
     spline,
 )
+from tests.each import each
 from tests.trajectories.differences import difference
 
 Array = NDArray[np.float64]
@@ -139,7 +140,7 @@ def test_steps_too_unequal_for_rounding_are_refused(step: float) -> None:
         TimedSpline([0.0, step, 1.0, 2.0], POSES)
 
 
-@pytest.mark.parametrize(
+@each(
     ("times", "message"),
     [
         ([0, 1, 2], "3 times for 4 poses: one each is needed"),
@@ -268,7 +269,7 @@ def test_profile_and_tilt_scale_if_left_out_are_those_documented() -> None:
     assert other.curve.length > path.curve.length
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "message"),
     [
         ({"poses": POSES[[0, 1, 1, 2]]}, "poses 1 and 2 are the same: the chord has no length"),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rps_pin import InputError
 from rps_pin.trajectories import HarmonicCurve, SCurveLaw, TimedCurve, circle, lissajous
+from tests.each import each
 from tests.trajectories.differences import difference
 
 Array = NDArray[np.float64]
@@ -169,7 +170,7 @@ def test_times_and_parameters_outside_are_refused() -> None:
 NUMBERS = [np.nan, np.inf, "wide", None, True]
 
 
-@pytest.mark.parametrize(
+@each(
     ("name", "bad"),
     [
         *(("height", bad) for bad in NUMBERS),
@@ -191,7 +192,7 @@ def test_a_figure_needs_a_duration() -> None:
         circle(height=0.3, tilt=0.2, duration=None)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
+@each(
     ("change", "message"),
     [
         ({"amplitude": (0.0, 0.0)}, "amplitude and lift are zero: nothing moves"),

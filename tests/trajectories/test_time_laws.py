@@ -19,6 +19,7 @@ from scipy.optimize import brentq, linprog
 from rps_pin import InputError
 from rps_pin.trajectories import QuinticLaw, SCurveLaw, TimeLaw, TrapezoidalLaw
 from rps_pin.trajectories.time_laws import RAMP, time_law
+from tests.each import each
 from tests.trajectories.differences import difference
 from tests.trajectories.law_checks import (
     DISTANCES,
@@ -129,8 +130,8 @@ def test_a_ramp_of_a_half_leaves_no_cruise() -> None:
     np.testing.assert_array_equal(SCurveLaw(1.0, 8.0, ramp=0.5).knots, [0, 2, 4, 6, 8])
 
 
-@pytest.mark.parametrize("kind", LAWS)
-@pytest.mark.parametrize("shape", [(), (1,), (2, 3), (0,)])
+@each("kind", LAWS)
+@each("shape", [(), (1,), (2, 3), (0,)])
 def test_values_have_the_shape_of_the_times(kind: type[Law], shape: tuple[int, ...]) -> None:
     assert [x.shape for x in kind(1.0, 2.0).at(np.ones(shape))] == [shape] * 3
 
@@ -292,10 +293,8 @@ def farthest(steps: int, h: float, v: float, a: float, j: float) -> float:
     return -float(solved.fun)
 
 
-@pytest.mark.parametrize("rise", [3, 6])
-@pytest.mark.parametrize(
-    ("steady", "cruise"), [(4, 7), (4, 0), (0, 7), (0, 0)], ids=["all", "v-", "a-", "neither"]
-)
+@each("rise", [3, 6])
+@each(("steady", "cruise"), [(4, 7), (4, 0), (0, 7), (0, 0)], ids=["all", "v-", "a-", "neither"])
 def test_nothing_is_shorter_than_the_s_curve(rise: int, steady: int, cruise: int) -> None:
     """In its duration, no jerk within the limits goes farther: a program that can do its pieces."""
     h, j = 0.1, 2.0
@@ -320,7 +319,7 @@ def test_with_much_jerk_the_s_curve_is_the_trapezoid(D: float, v: float, a: floa
     assert -1e-12 * quick.duration <= late <= 2 * a / jerk + 1e-12 * quick.duration
 
 
-@pytest.mark.parametrize(
+@each(
     ("kind", "limits", "message"),
     [
         (QuinticLaw, {}, "quintic law needs a limit of speed, acceleration or jerk"),
@@ -362,8 +361,8 @@ BAD_NUMBERS = [
 ]
 
 
-@pytest.mark.parametrize("kind", LAWS)
-@pytest.mark.parametrize("bad", BAD_NUMBERS)
+@each("kind", LAWS)
+@each("bad", BAD_NUMBERS)
 def test_distances_and_durations_that_are_none_are_refused(kind: Any, bad: Any) -> None:
     with pytest.raises(InputError, match="distance = "):
         kind(bad, 1.0)
@@ -373,8 +372,8 @@ def test_distances_and_durations_that_are_none_are_refused(kind: Any, bad: Any) 
         kind.within(bad, acceleration=1.0, **({} if kind is TrapezoidalLaw else {"jerk": 1.0}))
 
 
-@pytest.mark.parametrize("kind", [TrapezoidalLaw, SCurveLaw])
-@pytest.mark.parametrize("bad", [*BAD_NUMBERS, np.nextafter(0.5, 1)])
+@each("kind", [TrapezoidalLaw, SCurveLaw])
+@each("bad", [*BAD_NUMBERS, np.nextafter(0.5, 1)])
 def test_ramps_that_are_none_are_refused(kind: Any, bad: Any) -> None:
     with pytest.raises(InputError, match="ramp = "):
         kind(1.0, 1.0, ramp=bad)

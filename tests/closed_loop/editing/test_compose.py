@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rps_pin import InputError, MechanismError
 from rps_pin.closed_loop.editing.compose import Part, body, compose
+from tests.each import each
 
 Array = NDArray[np.float64]
 
@@ -259,7 +260,7 @@ def test_a_body_falls_and_turns_as_euler_says() -> None:
     np.testing.assert_allclose(pin.rnea(model, data, q, v, a), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
+@each(
     ("changes", "why"),
     [
         ({"mass": 0}, r"mass of body .bar. = 0: .* positive"),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rps_pin import InputError, MechanismError
 from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
+from tests.each import each
 
 Array = NDArray[np.float64]
 
@@ -112,10 +113,8 @@ def mapped(
     return q_new, v_new, a_new
 
 
-@pytest.mark.parametrize(
-    "merges", [[BALL], [CARDAN], [BALL, CARDAN]], ids=["ball", "cardan", "both"]
-)
-@pytest.mark.parametrize("seed", range(5))
+@each("merges", [[BALL], [CARDAN], [BALL, CARDAN]], ids=["ball", "cardan", "both"])
+@each("seed", range(5))
 def test_the_merged_model_is_the_same_mechanism(merges: list[JointMerge], seed: int) -> None:
     """Frames, energies, and the power of the inverse dynamics' forces."""
     old = tree(seed)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rps_pin import MechanismError
 from rps_pin.closed_loop.editing.merge import JointMerge, merged
 from rps_pin.closed_loop.editing.split import split
+from tests.each import each
 from tests.worst import worst
 
 Array = NDArray[np.float64]
@@ -169,8 +170,8 @@ def relative(found: Array, wanted: Array) -> float:
     return worst(found - wanted) / worst(1.0, wanted)
 
 
-@pytest.mark.parametrize("kind", CHANGING)
-@pytest.mark.parametrize("places", ["root", "middle", "leaf", "root middle leaf"])
+@each("kind", CHANGING)
+@each("places", ["root", "middle", "leaf", "root middle leaf"])
 def test_the_split_tree_is_the_same_mechanism(kind: str, places: str) -> None:
     rng = np.random.default_rng(len(kind) + len(places))
     make, parts = CHANGING[kind]
@@ -250,7 +251,7 @@ def test_derivatives_are_right_once_split_and_wrong_before(kind: str) -> None:
         assert max(derivative_errors(old, state)) > 1e-2
 
 
-@pytest.mark.parametrize("kind", CONSTANT)
+@each("kind", CONSTANT)
 def test_joints_left_as_they_are_have_right_derivatives(kind: str) -> None:
     rng = np.random.default_rng(len(kind))
     model = tree(CONSTANT[kind], rng)

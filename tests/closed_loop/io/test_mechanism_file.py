@@ -12,6 +12,7 @@ from rps_pin import ClosedLoopModel, InputError, LoopClosure, MechanismError
 from rps_pin.closed_loop.constraints.closures import JointCoupling
 from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from tests.closed_loop.mechanisms import FOUR_BAR, joint, link, robot
+from tests.each import each
 
 FOUR_BAR_FILE = """\
 name: bars
@@ -323,7 +324,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize(("text", "line", "why"), WRONG.values(), ids=WRONG)
+@each(("text", "line", "why"), WRONG.values(), ids=WRONG)
 def test_what_is_wrong_is_told_in_a_line(text: str, line: int, why: str, tmp_path: Path) -> None:
     file = written(tmp_path, text)
     with pytest.raises(InputError) as caught:

@@ -14,6 +14,7 @@ from rps_pin import InputError, LoopClosure, MechanismError
 from rps_pin.closed_loop.constraints.closures import JointCoupling
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts
+from tests.each import each
 
 Array = NDArray[np.float64]
 
@@ -268,8 +269,8 @@ def test_key_frames_are_configurations() -> None:
     np.testing.assert_array_equal(home, parts.model.referenceConfigurations["up"])
 
 
-@pytest.mark.parametrize("kind", ["hinge", "slide"])
-@pytest.mark.parametrize(
+@each("kind", ["hinge", "slide"])
+@each(
     "limits",
     [
         'range="-30 40"',
@@ -280,7 +281,7 @@ def test_key_frames_are_configurations() -> None:
         'actuatorfrcrange="-2 3" actuatorfrclimited="false"',
     ],
 )
-@pytest.mark.parametrize("settings", ["", '<compiler angle="radian"/>'])
+@each("settings", ["", '<compiler angle="radian"/>'])
 def test_limits_of_joints_are_mujocos(kind: str, limits: str, settings: str) -> None:
     text = mujoco_file(BODY.replace('"j"', f'"j" type="{kind}" {limits}'), settings)
     model, m = parts_from_mjcf(text).model, mujoco.MjModel.from_xml_string(text)
@@ -595,7 +596,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("text", "why"), REFUSED.values(), ids=REFUSED)
+@each(("text", "why"), REFUSED.values(), ids=REFUSED)
 def test_what_is_not_read_is_refused_with_its_line(text: str, why: str, tmp_path: Path) -> None:
     file = tmp_path / "robot.xml"
     file.write_text("\n\n" + text.replace("><", ">\n<"))

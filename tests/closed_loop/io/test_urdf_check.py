@@ -11,13 +11,14 @@ import pytest
 from rps_pin.closed_loop.io.urdf import model_from_urdf, xml_root, xml_text
 from rps_pin.closed_loop.io.urdf_check import refuse_mistakes
 from rps_pin.errors import MechanismError
+from tests.each import each
 
 ROOT = Path(__file__).resolve().parents[3]
 FILE = ROOT / "urdf" / "four_bar.urdf"
 TEXT = FILE.read_text("utf-8")
 
 
-@pytest.mark.parametrize(
+@each(
     ("right", "wrong", "message"),
     [
         (
