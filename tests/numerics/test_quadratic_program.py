@@ -13,8 +13,8 @@ from rps_pin.numerics.quadratic_program import (
     EXACT,
     LeastDistance,
     NearestPoint,
+    active_limits,
     by_least_squares,
-    holding,
     least_violation,
 )
 
@@ -148,7 +148,7 @@ def test_proxqp_is_not_misled_by_a_warm_start_that_is_feasible() -> None:
     rows = np.eye(2)
     first = solver.solve(rows, np.array([3.0, 2.0]), np.array([9.0, 9.0]), 1.0)
     assert first is not None and first.x == pytest.approx([3, 2])
-    solver._held = type(solver._held)(np.array([0]), np.array([True]))  # a wrong memory
+    solver._active = type(solver._active)(np.array([0]), np.array([True]))  # a wrong memory
     second = solver.solve(rows, np.array([1.0, 0.5]), np.array([9.0, 9.0]), 1.0)
     assert second is not None
     assert second.x == pytest.approx([1, 0.5], abs=1e-14)
@@ -157,8 +157,11 @@ def test_proxqp_is_not_misled_by_a_warm_start_that_is_feasible() -> None:
 
 def test_what_holds_back_a_point_near_the_solution() -> None:
     limits = np.eye(2), np.array([1.0, -np.inf]), np.array([np.inf, -0.5])
-    held = holding(np.array([1.0, -0.5]) + 1e-9, *limits)
-    assert dict(zip(held.limits.tolist(), held.upper.tolist(), strict=True)) == {0: False, 1: True}
+    active = active_limits(np.array([1.0, -0.5]) + 1e-9, *limits)
+    assert dict(zip(active.limits.tolist(), active.upper.tolist(), strict=True)) == {
+        0: False,
+        1: True,
+    }
     np.testing.assert_allclose(by_least_squares(*limits), [1.0, -0.5], rtol=0, atol=EXACT)
 
 

@@ -64,7 +64,7 @@ class ClosedLoopModel:
     model
         The open tree. Its gravity, and its armature, are used as they stand.
     closures
-        What closes its loops: `LoopClosure` and `JointCoupling` objects.
+        Its loop closures: `LoopClosure` and `JointCoupling` objects.
     actuated
         Names of the actuated joints; `tau` comes in this order.
     home
@@ -87,7 +87,7 @@ class ClosedLoopModel:
     model, closures, actuated, effects, name, max_condition
         As given; `closures` and `actuated` as tuples.
     system : ConstraintSystem
-        What the algorithms take: the tree with its closure equations and their factorisation.
+        The tree with its closure equations and their factorisation, for the algorithms.
 
     Raises
     ------
@@ -178,7 +178,7 @@ class ClosedLoopModel:
         Raises
         ------
         InputError, MechanismError
-            If a file cannot be read, or what it says does not hold together; with file and line.
+            If a file cannot be read, or its contents are not consistent; with file and line.
         ClosureError
             If the loops do not close from there; says by how much, and which.
         """
@@ -195,7 +195,7 @@ class ClosedLoopModel:
         """Build a mechanism from a MuJoCo file: its path, or its text (which begins with ``<``).
 
         Its ``equality`` elements (connect, weld, joint) are the closures, its ``actuator`` elements
-        say what is actuated. MuJoCo itself is not needed.
+        are the actuated joints. MuJoCo itself is not needed.
 
         Parameters
         ----------
@@ -402,7 +402,7 @@ class ClosedLoopModel:
         InputError
             If the guess has the wrong shape, is not finite, or holds a quaternion of length zero.
         ClosureError
-            If the loops do not close; says by how much, which, and what joints stand at a limit.
+            If the loops do not close; says by how much, which, and which joints are at a limit.
         """
         return close(
             self.system,
@@ -645,7 +645,7 @@ class ClosedLoopModel:
     def generalised_force(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, wrenches: Wrenches | None = None
     ) -> Array:
-        """Return what actuators and closures together must produce, S' tau + J' lambda, (nv,).
+        """Return the force of actuators and closures together, S' tau + J' lambda, shape (nv,).
 
         That is ``rnea(q, v, a)`` plus the passive joint forces less the external wrenches (as in
         `inverse_dynamics`).
@@ -896,7 +896,7 @@ class ClosedLoopModel:
         """
         return simulate(self, q, v, duration=duration, **options)
 
-    # Arguments, and what is made when first needed -----------------------------------------------
+    # Arguments and lazily made parts --------------------------------------------------------------
 
     def _configuration(self, q: ArrayLike) -> Array:
         return real_vector(q, self.model.nq, "q")

@@ -2,13 +2,13 @@
 
     minimise |x|^2 / 2   subject to   lower <= C x <= upper
 
-At the solution x = -C' z; z, one multiplier a limit, is positive where an upper limit holds x back,
-negative where a lower one does, and zero elsewhere. These are the conditions that make a point the
-solution, and no point is returned for which they were not checked.
+At the solution x = -C' z. z has a multiplier for each limit: positive where an upper limit is
+active, negative where a lower one is, and zero elsewhere. These are the optimality conditions; they
+are checked for every point that is returned.
 
-In a sequence of similar problems mostly the same limits hold x back. So those of the last solution
-are tried first, and ProxQP, warm-started, says which they are where that fails. From the limits
-alone x follows by a small factorisation, to rounding rather than to ProxQP's tolerance.
+In a sequence of similar problems mostly the same limits are active. So those of the last solution
+are tried first; where that fails, ProxQP, warm-started, finds the active ones. From them alone x
+follows by a small factorisation, to rounding error rather than to ProxQP's tolerance.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rps_pin.arrays import Array, Bools, Indices
 
 #: How far beyond a limit x may be, relative to the size of the problem.
 EXACT = 1e-10
-#: ProxQP's tolerances, in the same units: enough to tell which limits hold x back.
+#: ProxQP's tolerances, in the same units: enough to tell which limits are active.
 _PROXQP_TOLERANCE = 1e-9
 #: ProxQP converges in tens of iterations or not at all.
 _PROXQP_ITERATIONS = 200
@@ -37,15 +37,15 @@ _CONSTANT = 1e-10
 _DEPENDENT = 1e-14
 
 
-class Held(NamedTuple):
-    """Which limits hold x back, their rows independent."""
+class ActiveSet(NamedTuple):
+    """Active limits, their rows independent."""
 
     limits: Indices
     upper: Bools
     """Whether it is the upper limit, of each of these."""
 
 
-NOTHING = Held(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.bool_))
+NONE_ACTIVE = ActiveSet(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.bool_))
 
 
 class NearestPoint(NamedTuple):
@@ -54,7 +54,7 @@ class NearestPoint(NamedTuple):
     x: Array
     """Shape (n,)."""
     limits: Indices
-    """Which limits hold it back."""
+    """The active limits."""
     multipliers: Array
     """z of these limits, positive for upper ones."""
     iterations: int
@@ -75,13 +75,13 @@ class LeastDistance:
     def __init__(self, limits: int) -> None:
         self._solvers: dict[int, Any] = {}
         self._multipliers = np.zeros(limits)  # of the scaled problem that ProxQP sees
-        self._held = NOTHING
+        self._active = NONE_ACTIVE
 
     def reset(self) -> None:
         """Forget the last solution: the next problem is solved as if it were the first."""
         self._solvers.clear()
         self._multipliers[:] = 0
-        self._held = NOTHING
+        self._active = NONE_ACTIVE
 
     def solve(self, rows: Array, lower: Array, upper: Array, size: float) -> NearestPoint | None:
         """Return the nearest point, or None if none was found that all limits allow.
@@ -95,13 +95,13 @@ class LeastDistance:
         size
             Of what the limits are compared with, in the unit of x: sets the scale of tolerances.
         """
-        if self._held.limits.size:
-            point = nearest_held_by(self._held, rows, lower, upper, EXACT * size)
+        if self._active.limits.size:
+            point = nearest_with(self._active, rows, lower, upper, EXACT * size)
             if point is not None:
                 return point
         if max(lower.max(initial=0.0), -upper.min(initial=0.0)) <= EXACT * size:
-            self._held = NOTHING
-            return NearestPoint(np.zeros(rows.shape[1]), NOTHING.limits, np.zeros(0), 0)
+            self._active = NONE_ACTIVE
+            return NearestPoint(np.zeros(rows.shape[1]), NONE_ACTIVE.limits, np.zeros(0), 0)
         if not rows.shape[1]:
             return None
         scaled = _scaled(rows, lower, upper, size)
@@ -109,18 +109,18 @@ class LeastDistance:
             return None
         problem, (of_limits, of_x) = scaled
         x, iterations = self._by_proxqp(*problem)
-        held = holding(x, *problem)
-        point = nearest_held_by(held, *problem, EXACT)
+        active = active_limits(x, *problem)
+        point = nearest_with(active, *problem, EXACT)
         if point is None:  # ProxQP did not converge, rarely; or there is no point
-            held = holding(by_least_squares(*problem), *problem)
-            point = nearest_held_by(held, *problem, EXACT)
+            active = active_limits(by_least_squares(*problem), *problem)
+            point = nearest_with(active, *problem, EXACT)
         if point is None:
             return None
-        self._held = held
+        self._active = active
         self._multipliers[:] = 0
-        self._multipliers[held.limits] = point.multipliers
-        multipliers = point.multipliers * of_limits[held.limits]
-        return NearestPoint(of_x * point.x, held.limits, multipliers, iterations)
+        self._multipliers[active.limits] = point.multipliers
+        multipliers = point.multipliers * of_limits[active.limits]
+        return NearestPoint(of_x * point.x, active.limits, multipliers, iterations)
 
     def _by_proxqp(self, rows: Array, lower: Array, upper: Array) -> tuple[Array, int]:
         n = rows.shape[1]
@@ -134,27 +134,27 @@ class LeastDistance:
         return np.array(solver.results.x), int(solver.results.info.iter)
 
 
-def nearest_held_by(
-    held: Held, rows: Array, lower: Array, upper: Array, tolerance: float
+def nearest_with(
+    active: ActiveSet, rows: Array, lower: Array, upper: Array, tolerance: float
 ) -> NearestPoint | None:
-    """Return the solution if exactly these limits hold it back, None if they do not."""
-    limits = held.limits
+    """Return the solution if exactly these limits are active, or else None."""
+    limits = active.limits
     if not 0 < limits.size <= rows.shape[1]:
         return None
-    own = rows.take(limits, axis=0)
-    target = np.where(held.upper, upper.take(limits), lower.take(limits))
-    factor, info = dpotrf(own @ own.T)
+    chosen = rows.take(limits, axis=0)
+    target = np.where(active.upper, upper.take(limits), lower.take(limits))
+    factor, info = dpotrf(chosen @ chosen.T)
     pivots = factor.diagonal().tolist()  # few: quicker in Python, here and below
     if info or not min(pivots) ** 2 > _DEPENDENT * max(pivots) ** 2:
         return None
     pull = dpotrs(factor, target)[0]  # x = C' pull, C x = target
-    pull += dpotrs(factor, target - own @ (pull @ own))[0]  # refined
-    x = pull @ own
+    pull += dpotrs(factor, target - chosen @ (pull @ chosen))[0]  # refined
+    x = pull @ chosen
     values = rows @ x
     beyond = np.maximum(lower - values, values - upper).max()
     if not beyond <= tolerance:
         return None
-    for limit, pulls, is_upper in zip(limits, pull.tolist(), held.upper.tolist(), strict=True):
+    for limit, pulls, is_upper in zip(limits, pull.tolist(), active.upper.tolist(), strict=True):
         # z = -pull has the sign of its limit, unless the limits are one
         if (pulls > 0) == is_upper and lower[limit] < upper[limit]:
             return None
@@ -198,8 +198,8 @@ def _new_problem(n: int, limits: int) -> Any:
     return problem
 
 
-def holding(x: Array, rows: Array, lower: Array, upper: Array) -> Held:
-    """Return which limits hold back a point that is near the solution.
+def active_limits(x: Array, rows: Array, lower: Array, upper: Array) -> ActiveSet:
+    """Return the active limits at a point near the solution.
 
     Of those that are tight, a smallest set with x = -C' z.
     """
@@ -208,11 +208,11 @@ def holding(x: Array, rows: Array, lower: Array, upper: Array) -> Held:
     at_upper, at_lower = upper - values < tight, values - lower < tight
     columns = np.concatenate([rows[at_upper], -rows[at_lower]]).T
     if not (columns.size and np.isfinite(x).all()):
-        return NOTHING
+        return NONE_ACTIVE
     pushing = nnls(columns, -x)[0] > 0  # its choice is independent
     limits = np.concatenate([np.flatnonzero(at_upper), np.flatnonzero(at_lower)])
     is_upper = np.arange(limits.size) < np.count_nonzero(at_upper)
-    return Held(limits[pushing], is_upper[pushing])
+    return ActiveSet(limits[pushing], is_upper[pushing])
 
 
 def by_least_squares(rows: Array, lower: Array, upper: Array) -> Array:

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array, Bools
 
-#: Relative to the limit: what still counts as standing at it.
+#: Distance from a limit, relative to it, within which a joint counts as standing at it.
 _AT = 1e-12
 
 

@@ -1,10 +1,10 @@
-"""Loop closures: what holds two frames, or two joints, of an open tree together.
+"""Loop closures: constraints between two frames, or two joints, of an open tree.
 
-A `LoopClosure` joins frame a and frame b by a joint that has no coordinates of its own. It takes
-away some of b's freedom to move relative to a, a row each:
+A `LoopClosure` joins frame a and frame b by a joint without coordinates. It removes some of b's
+degrees of freedom relative to a, one by each row:
 
 ==================  ====  =========================================================================
-kind                rows  demands
+kind                rows  condition
 ==================  ====  =========================================================================
 ``spherical``       3     the origins coincide
 ``rigid``           6     the frames coincide
@@ -21,7 +21,7 @@ kind                rows  demands
 A `JointCoupling` (1 row) ties two joints' coordinates, as a gear or a parallelogram does.
 
 Each closure of frames is built on one Pinocchio constraint model, of a point (``spherical``) or
-of a whole frame (all others), of which it keeps some combinations of rows; see `closure_rows`.
+of a whole frame (all others), of which it selects some combinations of rows; see `rows`.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _WITH_AXIS_OF_B = ("revolute", "cylindrical", "universal", "planar")
 
 @dataclass(frozen=True)
 class LoopClosure:
-    """Two frames of a tree, by name, that a joint without coordinates holds together.
+    """Two frames of a tree, by name, that a joint without coordinates connects.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ class LoopClosure:
 
 @dataclass(frozen=True)
 class JointCoupling:
-    """Two joints whose coordinates stay in proportion: q_joint = ratio * q_other + offset.
+    """Two joints of proportional coordinates: q_joint = ratio * q_other + offset.
 
     Its row is q_joint - ratio q_other - offset = 0; its force is the generalised force (N or N m)
     that the coupling exerts on `joint`.

@@ -81,7 +81,7 @@ class ClosureEquations:
     model
         The open tree.
     closures
-        What closes its loops.
+        Its loop closures.
     characteristic_length
         See `ClosedLoopModel`.
 
@@ -279,7 +279,7 @@ class ClosureEquations:
         return np.array(sorted(starts), dtype=np.intp)
 
     def _open_tests(self) -> tuple[list[_Reader], list[_OpenTest]]:
-        """Return what reads c1Mc2 of spherical closures; and of the others, with their gaps."""
+        """Return readers of c1Mc2 of spherical closures; and of the others, with their gaps."""
         points: list[_Reader] = []
         others: list[_OpenTest] = []
         for frames in self.closed_frames:

@@ -23,7 +23,7 @@ from scipy.linalg.lapack import dgeqp3, dormqr
 from rps_pin.arrays import Array, Indices
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, condition_number, rank
 
-#: What no well conditioned J_p, in one unit, makes of a right side of 1.
+#: Size of a solution, relative to the right side, that no well conditioned J_p gives in one unit.
 HUGE = 1e12
 
 
@@ -157,9 +157,9 @@ class _TallFactors:
         return self._rows * turned
 
     def passive_motion(self, right: Array) -> tuple[Array, float]:
-        """Return x_p (np, k) with J_p x_p = b (nc, k) in the least-squares sense, and what is left.
+        """Return x_p (np, k) with J_p x_p = b (nc, k) in the least-squares sense, and the rest.
 
-        What is left is the largest entry of b outside the range of J_p, relative to J_p.
+        The rest is the largest entry of b outside the range of J_p, relative to J_p.
         """
         turned = self._turn(np.asfortranarray(self._rows[:, None] * right), "T")
         solved = np.empty((self._size, right.shape[1]))

@@ -14,7 +14,7 @@ In independent coordinates y the rest of the mechanism follows them:
     dq = T dy,    dv = T dy' + V_y dy,    da = T dy'' + A_y dy + A_y' dy',
     J V_y = -(J v)_q T,    J A_y = -(c_q T + c_v V_y),    J A_y' = -c_v T,
 
-the independent joints' own rows of V_y, A_y and A_y' being zero.
+the independent joints' rows of V_y, A_y and A_y' being zero.
 """
 
 from __future__ import annotations
@@ -190,7 +190,7 @@ class DynamicsDerivatives:
         return _ForceDerivatives(by_q, by_v, mass), rows
 
     def _solution(self, q: Array) -> Solved:
-        """Return what solves J x = b at q: of x, the passive joints' rows if they determine it."""
+        """Return a solver of J x = b at q: x has passive rows only, if they determine it."""
         system = self._system
         jacobian = system.equations.jacobian(q).copy()
         solve = system.factorisation.passive_motion

@@ -1,8 +1,8 @@
-"""Limits on what closures carry, for `ForceDistribution`.
+"""Limits on constraint forces, for `ForceDistribution`.
 
-A closure's force is what frame b's side exerts on frame a's side, in the closure's own rows: in
-world axes for spherical and rigid closures, in frame a's axes for the others; positive pulls the
-two origins together in a ``distance`` closure (tension).
+A closure's force is that of frame b's side on frame a's side, in the closure's rows: in world axes
+for spherical and rigid closures, in frame a's axes for the others. It is positive in tension for a
+``distance`` closure.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rps_pin.validation import real_vector
 
 @dataclass(frozen=True)
 class ForceBound:
-    """Limits on one component of what a closure carries: lower <= direction . force <= upper.
+    """Limits on one component of a closure's force: lower <= direction . force <= upper.
 
     Parameters
     ----------
@@ -33,14 +33,14 @@ class ForceBound:
         A combination of the closure's rows, of any length: as many numbers as it has rows, or three
         where its first three rows are a force (spherical, rigid, revolute, universal).
     lower, upper
-        N (N m for a row that is a moment); no limit if left out.
+        N (N m for a moment); no limit if left out.
     name
         For messages; made of the closure and the row if left out.
 
     Raises
     ------
     InputError
-        If the limits leave nothing, or the direction is none.
+        If no force is within the limits, or not one of row and direction is given.
     """
 
     closure: str
@@ -96,8 +96,8 @@ def friction_pyramid(
 ) -> tuple[ForceBound, ...]:
     """Return bounds that keep a contact's force within a pyramid inside its friction cone.
 
-    For a closure whose frame a stands on the ground of its frame b: the force on a's side presses
-    along the normal, and its part across is at most `friction` times that.
+    For a closure of a body (frame a) on the ground (frame b): the force on the body has a positive
+    component along the normal, and a tangential one of at most `friction` times that.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def friction_pyramid(
     friction
         Coefficient of dry friction; not negative.
     normal
-        Direction in which the ground presses, shape (3,), of any length, in the closure's axes.
+        Direction of the normal force on the body, shape (3,), of any length, in the closure's axes.
     sides
         Number of faces, at least 3. The pyramid lies within the cone and touches it along its
         edges; with n faces it holds at least cos(pi / n) of the friction.

@@ -63,7 +63,7 @@ class DistributedForces(NamedTuple):
     effort: float
     """|W (tau - tau_0)|."""
     at_limit: tuple[str, ...]
-    """Names of the actuators and bounds whose limits hold the forces back."""
+    """Names of the actuators and bounds whose limits are active."""
     iterations: int
     """Of ProxQP; 0 where it was not needed."""
 
@@ -71,8 +71,9 @@ class DistributedForces(NamedTuple):
 class ForceDistribution:
     """Finds the forces of least effort within limits, at one state after another.
 
-    Build once, call often: scratch memory and solver are kept, and each call starts from the limits
-    that held the last. For that reason one object serves one thread (as its mechanism does).
+    Build once, call often: memory and solver are allocated once, and each call starts from the
+    limits that were active in the last. For that reason one object serves one thread (as its
+    mechanism does).
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ class ForceDistribution:
         upper), each a number or shape (na,), or ``"model"`` for those of the model (of its file).
         An array of shape (2,) is two actuators' limits; a tuple of two is a pair. None: no limits.
     bounds
-        Limits on what closures carry; see `ForceBound` and `friction_pyramid`.
+        Limits on constraint forces; see `ForceBound` and `friction_pyramid`.
 
     Raises
     ------
@@ -109,14 +110,14 @@ class ForceDistribution:
         self._rows, self._columns = mechanism.row_scale, mechanism.velocity_scale
         na = self._actuated.size
         self._angular = mechanism.angular_velocities
-        self._own_columns = self._columns[self._actuated]
+        self._actuated_columns = self._columns[self._actuated]
         self._scale = self._rows[:, None] * self._columns
-        self.weights = self._own_columns.copy()
+        self.weights = self._actuated_columns.copy()
         if weights is not None:
             self.weights = _spread(weights, na, "weights")
             if not (self.weights > 0).all():
                 raise InputError(f"weights = {self.weights}: they must be positive")
-        self._levers = self._own_columns / self.weights
+        self._levers = self._actuated_columns / self.weights
         self._largest_lever = float(self._levers.max())
         self.lower, self.upper = self._torque_limits(torque_limits)
         self.bounds: Sequence[ForceBound] = tuple(bounds)
@@ -156,14 +157,14 @@ class ForceDistribution:
         q, v, a, wrenches
             As for `ClosedLoopModel.inverse_dynamics`.
         preferred
-            tau_0, shape (na,): what tau should be near; zero if left out.
+            tau_0, shape (na,), that tau should be near; zero if left out.
 
         Raises
         ------
         InputError
             If an argument has the wrong shape or is not finite.
         InfeasibleError
-            If the limits leave no such forces (says which would have to give way, and by how
+            If the limits leave no such forces (says which would have to be wider, and by how
             much), or the actuators cannot produce them at all.
         SingularityError
             If the actuators hardly move one of the motions here.
@@ -209,10 +210,10 @@ class ForceDistribution:
         """
         motions = factors.right[factors.rank :]  # N' in scaled units
         rest = self._columns * force
-        rest[self._actuated] -= self._own_columns * aim
+        rest[self._actuated] -= self._actuated_columns * aim
         reduced = motions @ rest
-        own = (motions.take(self._actuated, axis=1) * self._levers).T  # W^-1 S N
-        best = least_effort(own, reduced, size=self._largest_lever)
+        of_actuators = (motions.take(self._actuated, axis=1) * self._levers).T  # W^-1 S N
+        best = least_effort(of_actuators, reduced, size=self._largest_lever)
         refuse_nearly_singular(best.values, self.mechanism.max_condition, self._largest_lever)
         if best.missing @ best.missing > RESIDUAL**2 * (reduced @ reduced):
             motions = self._columns[:, None] * motions.T
@@ -222,7 +223,7 @@ class ForceDistribution:
     def _multipliers(self, factors: _Factors, force: Array, tau: Array) -> Array:
         """Return lambda of least norm, shape (nc,): J' lambda = f - S' tau."""
         rest = self._columns * force
-        rest[self._actuated] -= self._own_columns * tau
+        rest[self._actuated] -= self._actuated_columns * tau
         multipliers: Array = self._rows * factors.least_norm(rest)
         return multipliers
 
@@ -252,7 +253,7 @@ class ForceDistribution:
     def _infeasible(
         self, problem: tuple[Array, Array, Array, float], values: Array
     ) -> InfeasibleError:
-        """Return the error that names the limits that would have to give way."""
+        """Return the error that names the limits that would have to be wider."""
         rows, _, _, size = problem
         x, beyond = least_violation(*problem)
         units = np.concatenate([self.weights, np.ones(len(self.bounds))])

@@ -24,7 +24,7 @@ from rps_pin.closed_loop.kinematics import actuated_basis
 from rps_pin.errors import SingularityError
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, rank
 
-#: Relative to the largest pivot: what counts as no inertia at all.
+#: A squared pivot below this, relative to the largest, counts as no inertia.
 _NO_INERTIA = 1e-14
 
 

@@ -54,9 +54,10 @@ class InverseDynamics:
         Generalised forces of the actuated joints, in the order of `ClosedLoopModel.actuated`; N for
         prismatic joints, N m for revolute ones. Positive does work when the coordinate grows.
     constraint_forces : (nc,) array
-        The multipliers lambda: what each closure's frame b side exerts on its frame a side, in
-        world axes at frame a's origin; N, and N m for the angular rows. ``mechanism.rows(name)``
-        tells which are a closure's.
+        The multipliers lambda, in the rows of the closures: the force of each closure's frame b
+        side on its frame a side, in world axes (spherical, rigid) or frame a's axes (the others)
+        at frame a's origin; N, and N m for the angular rows. ``mechanism.rows(name)`` are those of
+        a closure.
     residual : float
         Norm of the KKT equations' error on the passive rows, in the units of generalised forces.
     unproduced : (nv,) array or None
@@ -217,7 +218,7 @@ def _by_null_space(system: ConstraintSystem, jacobian: Array, force: Array) -> I
 
 
 class NullSpaceSolution(NamedTuple):
-    """Actuator and constraint forces, and what neither produces."""
+    """Actuator and constraint forces, and the residual force."""
 
     tau: Array
     """Shape (na,)."""

@@ -20,7 +20,7 @@ Wrenches = Mapping[str, ArrayLike]
 
 
 def closure_wrenches(equations: ClosureEquations, q: Array, multipliers: Array) -> dict[str, Array]:
-    """Return, by closure name, what frame b's side exerts on frame a's, at a, in world axes.
+    """Return, by closure name, the wrench of frame b's side on frame a's, at a, in world axes.
 
     Couplings have none: theirs is a generalised force of two joints.
     """

@@ -1,7 +1,7 @@
 """Steps in time of a mechanism's state (q, v), q on its configuration manifold.
 
-Both work with the velocity field (v, a(t, q, v)), v in the joints' own axes as Pinocchio has it,
-and move along the manifold by `pin.integrate` alone, written q (+) v here.
+Both take the velocity field (v, a(t, q, v)), v in joint axes as in Pinocchio, and move along the
+manifold by `pin.integrate`, written q (+) v here.
 """
 
 from __future__ import annotations

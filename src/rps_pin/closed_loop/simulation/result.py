@@ -59,13 +59,13 @@ class Simulation:
     constraint_forces : (n, nc) array, or None
         The closures' multipliers (see `InverseDynamics`), if they were asked for.
     limits_passed : tuple of JointLimitPassed
-        The joints that left their limits on the way, which nothing keeps them from, in the order
-        in which they did.
+        The joints that left their limits (which are not enforced), in the order in which they
+        did.
     q_names, v_names, tau_names : tuples of str
         Names of the columns, for tables.
     work : (n,) array
-        Work done since the start by what adds or takes energy, J: actuator forces, external
-        wrenches, damping and friction (negative where it takes). Integrated along the steps, to
+        Work done since the start, J, by actuator forces, external wrenches, damping and friction
+        (negative where energy is lost). Integrated along the steps, to
         their order.
     """
 

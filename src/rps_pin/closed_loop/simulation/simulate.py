@@ -3,7 +3,7 @@
 The state (q, v) moves by the reduced dynamics of `manifold`, in steps of `integrators`. With
 ``closing="projection"`` each step ends with a projection to the closed configurations and the
 velocities that keep them closed: gaps stay at rounding error, and since the correction is as small
-as the step's own error the order of the method stays what it is. With ``closing="baumgarte"``
+as the step's error the order of the method is kept. With ``closing="baumgarte"``
 nothing is projected; gaps that the steps' errors open decay like exp(-alpha t), and stay at the
 size where as much is opened as decays.
 """
@@ -76,7 +76,7 @@ def simulate(
     duration
         s; positive.
     step
-        Time between two calls of the controller, and two rows of the answer (but see
+        Time between two calls of the controller, and two rows of the result (but see
         `record_every`), s; the last is shorter where it does not divide the duration. For
         ``"rk4"``, also the length of the steps.
     method
