@@ -1,4 +1,4 @@
-"""The paper: its Lagrange equations, virtual work, and its figures and tables beside ours.
+"""The paper: its Lagrange equations, virtual work, and its figures and tables compared with ours.
 
 `lagrange_forces` and `virtual_work_forces` are inverse dynamics by independent derivations; the
 other modules reproduce the paper as one page (``rps-pin reproduce``). Nothing else of the package

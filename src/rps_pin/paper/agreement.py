@@ -1,4 +1,4 @@
-"""How well the three ways to the forces agree, and how well the closed forms close the loops.
+"""Agreement of the three ways to the forces, and of the closed forms with the loop closures.
 
 The constraint models (a constrained RNEA on Pinocchio's rigid-body algorithms), Lagrange's
 equations of the first kind in the paper's coordinates, and virtual work share the kinematics of a

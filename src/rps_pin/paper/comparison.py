@@ -1,7 +1,7 @@
 """Forces of every interpretation of Table 1, compared with Table 2.
 
 A path that is out of reach, or crosses a singularity, has no least and greatest force: it is
-refused, and the reason is kept.
+refused, with the reason.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Everything the reproduction page shows, computed in one go."""
+"""Results of the whole reproduction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The reproduction's pictures: the paper's Figures 1 to 9, and those about Table 2."""
+"""Pictures of the reproduction: the paper's Figures 1 to 9, and those on Table 2."""
 
 from __future__ import annotations
 

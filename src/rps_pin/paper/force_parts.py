@@ -1,7 +1,8 @@
-"""The actuator forces of a path by cause, so that a path is computed once for all masses.
+"""Actuator forces of a path by cause, computed once for all masses.
 
-The forces are the paper's own, Lagrange's equations of the first kind. They are linear in the
-masses and inertias: those of a few unit robots give those of every interpretation of the bodies.
+The forces are those of the paper's method, Lagrange's equations of the first kind. They are linear
+in the masses and inertias: those of a few unit robots give those of every interpretation of the
+bodies.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The paper's formulas that hold as printed, typed here and compared with what is computed.
+"""The formulas that hold as printed, typed here and compared with the package's results.
 
 Random poses and motions of Table 1's robot. Errors are relative to the size of what is compared
 (lengths to h), the largest over all states.

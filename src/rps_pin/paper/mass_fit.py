@@ -101,10 +101,9 @@ def fit_mass(path: PathInterpretation, parts: ForceParts, printed: ForceRange) -
 
 
 def fit_both_masses(start: MassFit, parts: ForceParts, printed: ForceRange) -> MassFit:
-    """Return the same with the legs' mass free, too, from a fit of one mass.
+    """Return a fit of the platform's and the legs' mass that starts from a fit of one mass.
 
-    The legs' mass is at least Table 1's, and at most I_leg / r^2: more would not have so small an
-    inertia about the joint.
+    The legs' mass is at least Table 1's and at most I_leg / r^2, the largest with this inertia.
     """
     heaviest = paper.LEG_INERTIA / (1e-3 * paper.LEG_COM_MM) ** 2
 

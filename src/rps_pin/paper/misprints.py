@@ -1,8 +1,9 @@
-"""The paper's misprints in Sections 2 and 4, each beside what is right, by computation.
+"""Misprints in Sections 2 and 4 of the paper, each compared with the correct form by computation.
 
-Every check computes the printed formula and the right one at random states, against something that
-knows neither: rotations from SciPy's Euler angles, rigid bodies made of point masses, central
-differences, the constraint models' forces. Formulas are typed here as the paper prints them.
+Every check computes the printed formula and the correct one at random states and compares both with
+a computation that uses neither: rotations from SciPy's Euler angles, rigid bodies made of point
+masses, central differences, the constraint models' forces. Formulas are typed here as the paper
+prints them.
 """
 
 from __future__ import annotations

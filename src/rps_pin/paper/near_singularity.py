@@ -1,8 +1,8 @@
-"""Why hundreds of newtons: the forces of Table 1's light robot near a parallel singularity.
+"""Forces of Table 1's robot near a parallel singularity.
 
-Three looks: the forces on the way into a crossing; what a program reports that steps across a
-crossing without noticing; and helices that come ever nearer to a singularity. The last are probes,
-not interpretations of Table 1.
+Three computations: the forces on the way into a crossing; the forces that a program reports if it
+samples a path without checking for crossings; and helices at decreasing distances to a singularity.
+The last are probes, not interpretations of Table 1.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Approach(NamedTuple):
 
 
 class Sampled(NamedTuple):
-    """What a program reports that samples a path and does not look for crossings."""
+    """Force ranges of a path that is sampled without checking for crossings."""
 
     path: str
     crossings: int
@@ -114,8 +114,7 @@ def approach(points: int = 60) -> Approach:
 def sampled_across() -> list[Sampled]:
     """Return least and greatest forces, by sample rate, of paths that cross singularities.
 
-    There are no such forces: what is found depends on how near to a crossing a sample happens to
-    lie.
+    The forces are infinite at a crossing: the values depend on how near to it a sample lies.
     """
     robot = RPSRobot.from_preset("sokolov")
     paths: list[tuple[str, PaperHelix]] = [

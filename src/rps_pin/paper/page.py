@@ -1,4 +1,4 @@
-"""The reproduction as a page of Markdown: a template, and every number in it from computation."""
+"""The reproduction as a Markdown page: a template, and the computed numbers in it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The paper's own numbers, as printed: Tables 1 and 2, and what Section 3 states. SI units.
+"""Numbers of the paper as printed: Tables 1 and 2, and what Section 3 states. SI units.
 
 Typed from the paper once, here; everything else in `rps_pin.paper` takes them from here.
 """

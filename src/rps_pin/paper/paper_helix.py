@@ -1,4 +1,4 @@
-"""The helix with Eq. 5 and 29 corrected or exactly as printed; and parts of trajectories."""
+"""The helix with Eq. 5 and 29 corrected or as printed, and parts of trajectories."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def regular_helix(robot: RPSRobot, branch: Branch = "+") -> HelixPath:
 
 
 class PartOfPath:
-    """A stretch of a trajectory, as a trajectory of its own that begins at time 0."""
+    """A part of a trajectory, as a trajectory that begins at time 0."""
 
     def __init__(self, whole: Trajectory, start: float, end: float) -> None:
         self.whole = whole
@@ -134,7 +134,7 @@ class PartOfPath:
 
 
 def smooth_parts(path: PaperHelix) -> tuple[PartOfPath, ...]:
-    """Return the stretches in which a helix does not jump: two if Eq. 29 is as printed."""
+    """Return the parts in which a helix does not jump: two if Eq. 29 is as printed."""
     if path.jumps:
         # The first ends on the middle branch's side of the jump.
         return PartOfPath(path, 0.0, BRAKE_START - 1e-12), PartOfPath(path, BRAKE_START, END)
@@ -142,7 +142,7 @@ def smooth_parts(path: PaperHelix) -> tuple[PartOfPath, ...]:
 
 
 class HelixLaw(NamedTuple):
-    """What Eq. 29, corrected, does."""
+    """Times, angles and speeds that follow from Eq. 29."""
 
     end: float
     """First time after the brakes go on at which phi' is zero, s."""
@@ -161,7 +161,7 @@ class HelixLaw(NamedTuple):
 
 
 def helix_law() -> HelixLaw:
-    """Return what Eq. 29 does, corrected and as printed, by root finding and sampling."""
+    """Return the properties of Eq. 29, corrected and as printed, by root finding and sampling."""
 
     def rate(t: float) -> float:
         return float(corrected_turn(t)[1])

@@ -1,4 +1,4 @@
-"""Pictures about Table 2: forces near singularities, and the interpretations of Table 1."""
+"""Pictures on Table 2: forces near singularities, and the interpretations of Table 1."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def plot_interpretations(found: Reproduction) -> Figure:
 
 
 def plot_table_2(found: Reproduction) -> Figure:
-    """Draw the least and greatest forces of Table 2 beside computed ones, leg by leg."""
+    """Draw the least and greatest forces of Table 2 and computed ones, by leg."""
     clean = force_range(found.runs["+"].force)
     closest = min(found.comparisons, key=lambda row: row.distance_relabelled)
     bars = [

@@ -53,7 +53,7 @@ def between(values: Iterable[float], unit: float = 1e-3, digits: int = 3) -> str
 
 
 def reach(found: Reproduction) -> str:
-    """Return the workspace of several base radii beside the paper's statement."""
+    """Return the workspace of several base radii, compared with the paper's statement."""
     return markdown(
         ["g (mm)", "p_x (mm)", "p_y (mm)", "p_z (mm)", "within the paper's 2.5 mm"],
         [

@@ -1,4 +1,4 @@
-"""Inverse dynamics of the 3-RPS by virtual work: every body, the moving rods among them.
+"""Inverse dynamics of the 3-RPS by virtual work of all bodies, moving rods included.
 
 Of the pose's rate p' every body's velocities are linear functions. In a virtual motion the
 actuators' work is what the bodies' inertia and weight take up (d'Alembert),
@@ -39,7 +39,7 @@ from rps_pin.rps.parameters import RPSParameters
 
 
 class PoseForces(NamedTuple):
-    """What the bodies' inertia and weight ask for, as forces on the pose (z, tilt_x, tilt_y).
+    """Generalised forces of the bodies' inertia and weight on the pose (z, tilt_x, tilt_y).
 
     Shape (..., 3) each: N, N m, N m.
     """
@@ -104,7 +104,7 @@ def virtual_work_forces(
 def pose_forces(
     parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike, acceleration: ArrayLike
 ) -> PoseForces:
-    """Return the generalised forces Q that the motion asks for, by body.
+    """Return the generalised forces Q of a motion, by body.
 
     Their work in a motion of the pose is that of the actuators: Q . p' = F . d'. They are finite at
     singularities too.

@@ -1,4 +1,4 @@
-"""What the paper's Section 3 states of the workspace beside what is computed."""
+"""Workspace statements of the paper's Section 3, compared with computed workspaces."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STATED_STROKE = 50e-3
 
 
 class PaperComparison(NamedTuple):
-    """The workspace of one base radius beside the paper's statement. SI units."""
+    """The workspace of one base radius, compared with the paper's statement. SI units."""
 
     base_radius: float
     """g, which the paper does not give, m."""
@@ -57,7 +57,7 @@ def paper_comparison(
     *,
     points: int = 51,
 ) -> tuple[PaperComparison, ...]:
-    """Return, for each base radius g, what the paper states and what is computed.
+    """Return the paper's statement and the computed workspace for each base radius g.
 
     The paper limits the legs' lengths only; limits of angles and spherical joints are left out.
 

@@ -1,4 +1,4 @@
-"""The reproduction as files: the page, its pictures and every interpretation that was tried."""
+"""Files of the reproduction: the page, its pictures and a CSV of all interpretations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def write(
 ) -> list[Path]:
     """Write ``reproduction.md``, and its pictures and the CSV into ``reproduction/`` beside it.
 
-    Each file is written whole or not at all, the page last. What stands there is replaced.
+    Each file is written whole or not at all, the page last. Existing files are replaced.
 
     Parameters
     ----------
