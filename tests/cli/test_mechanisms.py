@@ -147,6 +147,27 @@ def test_speeds_and_forces_are_those_asked_for(tmp_path: Path) -> None:
     assert (table["tau_left_joint"] == 0.0).all()
 
 
+def test_the_work_of_an_actuator_is_no_error_of_the_energy(tmp_path: Path) -> None:
+    """The largest change of the energy used to be reported, which holds the actuators' work."""
+    command = ("simulate", str(URDF / "five_bar.yaml"), "--duration", "0.1", "--tau")
+    run = rps_pin(*command, "left_joint=2.0", "--json", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)
+    table = np.genfromtxt(
+        tmp_path / "five_bar-simulation" / "simulation.csv", delimiter=",", names=True
+    )
+    energy = table["kinetic"] + table["potential"]
+    # A constant torque's work is its angle's change times it.
+    work = 2.0 * (table["q_left_joint"][-1] - table["q_left_joint"][0])
+    assert abs(work) > 1e-3
+    assert summary["work"] == pytest.approx(work, rel=1e-6)
+    assert summary["energy_change"] == pytest.approx(energy[-1] - energy[0], rel=1e-9)
+    assert summary["energy_balance"] < 1e-6
+    printed = " ".join(rps_pin(*command, "left_joint=2.0", folder=tmp_path).stdout.split())
+    assert f"{summary['work']:.6g} J" in printed
+    assert f"{summary['energy_balance']:.2g} of the energy" in printed
+
+
 @pytest.mark.parametrize(
     ("option", "words"),
     [

@@ -65,7 +65,7 @@ def test_over_height_and_tilt_on_ones_own_axes(direction: float) -> None:
 
 
 def test_nonsense_is_refused() -> None:
-    with pytest.raises(InputError, match="there are: type_ii, constraint, determinant"):
+    with pytest.raises(InputError, match="must be 'type_ii' or 'constraint' or 'determinant'"):
         plot_tilt_conditioning(SOKOLOV, 0.4, measure="type_i")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="rising"):
         plot_tilt_conditioning(SOKOLOV, 0.4, [0.1, 0.1])

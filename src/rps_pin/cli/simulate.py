@@ -179,15 +179,16 @@ def _of_actuated(mechanism: ClosedLoopModel, pairs: list[str] | None, option: st
 
 
 def _summary(motion: Simulation) -> dict[str, object]:
-    energy = motion.energy
-    scale = max(float(motion.kinetic.max()), float(np.ptp(motion.potential)), 1e-300)
+    energy, work = motion.energy, np.abs(motion.work).max()
+    scale = max(float(motion.kinetic.max()), float(np.ptp(motion.potential)), float(work), 1e-300)
     return {
         "duration": float(motion.time[-1]),
         "rows": len(motion.time),
         "largest_gap": float(motion.gap.max()),
         "kinetic_peak": float(motion.kinetic.max()),
         "energy_change": float(energy[-1] - energy[0]),
-        "energy_drift": float(np.abs(energy - energy[0]).max() / scale),
+        "work": float(motion.work[-1]),
+        "energy_balance": float(np.abs(motion.energy_balance).max() / scale),
         "limits_passed": [str(passed) for passed in motion.limits_passed],
     }
 
@@ -203,7 +204,9 @@ def _print(
         "duration": f"{summary['duration']:.6g} s ({summary['rows']} rows)",
         "largest loop gap": f"{summary['largest_gap']:.2g} m",
         "largest kinetic energy": f"{summary['kinetic_peak']:.6g} J",
-        "largest change of the energy": f"{summary['energy_drift']:.2g} of the energy in motion",
+        "change of the energy": f"{summary['energy_change']:.6g} J",
+        "work of actuators, friction and wrenches": f"{summary['work']:.6g} J",
+        "energy balance (change less work)": f"{summary['energy_balance']:.2g} of the energy",
     }
     for name, value in rows.items():
         table.add_row(name, value)

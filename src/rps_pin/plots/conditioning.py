@@ -1,4 +1,4 @@
-"""Maps of the distance to a singularity over poses."""
+"""Maps of singularity measures over poses."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.plots.style import COLOUR_MAP, STYLE, figure_of
+from rps_pin.plots.style import COLOUR_MAP, STYLE, figure_of, new_axes
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measures import singularity_measures
-from rps_pin.validation import real_array
+from rps_pin.validation import choice, finite_number, real_array
 
 Measure = Literal["type_ii", "constraint", "determinant"]
 _LABELS = {
@@ -55,9 +55,9 @@ def plot_tilt_conditioning(
     """
     across = _increasing(np.linspace(-1.5, 1.5, 161) if tilts is None else tilts, "tilts")
     x, y = np.meshgrid(across, across)
-    pose = np.stack([np.full_like(x, _number(height)), x, y], axis=-1)
+    pose = np.stack([np.full_like(x, finite_number(height, "height", "m")), x, y], axis=-1)
     with matplotlib.rc_context(STYLE):
-        axes = axes or Figure(figsize=(5.6, 4.6), layout="constrained").add_subplot()
+        axes = new_axes(axes, (5.6, 4.6))
         _map(axes, parameters, pose, (np.degrees(x), np.degrees(y)), measure)
         axes.set_xlabel("tilt about x (degrees)")
         axes.set_ylabel("tilt about y (degrees)")
@@ -97,11 +97,11 @@ def plot_height_conditioning(
     """
     across = _increasing(np.linspace(-1.5, 1.5, 161) if tilts is None else tilts, "tilts")
     up = _increasing(heights, "heights")
-    angle = _number(direction)
+    angle = finite_number(direction, "direction", "rad")
     tilt, z = np.meshgrid(across, up)
     pose = np.stack([z, tilt * np.cos(angle), tilt * np.sin(angle)], axis=-1)
     with matplotlib.rc_context(STYLE):
-        axes = axes or Figure(figsize=(5.6, 4.2), layout="constrained").add_subplot()
+        axes = new_axes(axes, (5.6, 4.2))
         _map(axes, parameters, pose, (np.degrees(tilt), 1e3 * z), measure)
         axes.set_xlabel(f"tilt about the axis at {np.degrees(angle):.4g} degrees (degrees)")
         axes.set_ylabel("height $p_z$ (mm)")
@@ -115,8 +115,7 @@ def _map(
     at: tuple[Array, Array],
     measure: str,
 ) -> None:
-    if measure not in _LABELS:
-        raise InputError(f"measure = {measure!r}; there are: {', '.join(_LABELS)}")
+    choice(measure, "measure", tuple(_LABELS))
     found = singularity_measures(parameters, pose, errors="mask")
     values = getattr(found, measure)
     levels: Any = 20
@@ -134,7 +133,3 @@ def _increasing(values: ArrayLike, name: str) -> Array:
     if found.ndim != 1 or found.size < 2 or not (np.diff(found) > 0.0).all():
         raise InputError(f"{name} has shape {found.shape}: it must be two numbers or more, rising")
     return found
-
-
-def _number(value: float) -> float:
-    return float(real_array(value, "height or direction"))

@@ -1,6 +1,6 @@
 """Figures of a controlled motion: errors in micrometres and microradians, forces, statuses.
 
-Each function draws on axes of your own, or makes a figure. Nothing here opens a window.
+Each function draws on given axes, or makes a figure. No window is opened.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from rps_pin.arrays import Array
 from rps_pin.control.loop.status import Status
 from rps_pin.control.simulation.loop_run import LoopRun
 from rps_pin.control.simulation.loop_summary import TrackingErrors, status_name
-from rps_pin.errors import InputError
-from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of
+from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, three_axes
 
 #: Above the axes, where it hides nothing.
 _LEGEND: Any = {
@@ -33,16 +32,16 @@ _LEGEND: Any = {
 def plot_tracking(
     run: LoopRun, axes: Sequence[Axes] | None = None, *, begin: float = 0.0
 ) -> Figure:
-    """Draw the errors (is less target): of centre (um), orientation (urad) and legs (um).
+    """Draw the errors (actual minus target) of centre (um), orientation (urad) and legs (um).
 
     Parameters
     ----------
     run
         The run.
     axes
-        Three axes to draw on; a new figure's if left out.
+        Three axes to draw on; default: those of a new figure.
     begin
-        From when on, s.
+        Start of what is drawn, s.
 
     Raises
     ------
@@ -52,7 +51,7 @@ def plot_tracking(
     errors, here = TrackingErrors.of(run), run.time >= begin
     time = run.time[here]
     with matplotlib.rc_context(STYLE):
-        figure, (centre, turn, legs) = _three(axes, "Errors: actual minus target")
+        centre, turn, legs = three_axes(axes, "Errors: actual minus target")
         for part, (name, colour) in enumerate(zip("xyz", LEG_COLOURS, strict=True)):
             style = LEG_STYLES[part]
             shown = 1e6 * errors.centre[here, part]
@@ -66,7 +65,7 @@ def plot_tracking(
         for own in (centre, legs):
             own.legend(**_LEGEND)
         _finish((centre, turn, legs), time)
-    return figure
+    return figure_of(centre)
 
 
 def plot_loop_forces(
@@ -79,9 +78,9 @@ def plot_loop_forces(
     run
         The run.
     axes
-        Three axes to draw on; a new figure's if left out.
+        Three axes to draw on; default: those of a new figure.
     begin
-        From when on, s.
+        Start of what is drawn, s.
 
     Raises
     ------
@@ -91,7 +90,7 @@ def plot_loop_forces(
     here = run.time >= begin
     time = run.time[here]
     with matplotlib.rc_context(STYLE):
-        figure, (forces, distance, statuses) = _three(axes, "Forces and what the controller said")
+        forces, distance, statuses = three_axes(axes, "Forces and statuses of the controller")
         limit = run.parameters.actuator_force_limit
         for leg, colour in enumerate(LEG_COLOURS):
             forces.plot(
@@ -112,7 +111,7 @@ def plot_loop_forces(
         distance.set_ylabel("distance to\ntype II (1)")
         _draw_statuses(statuses, run)
         _finish((forces, distance, statuses), time)
-    return figure
+    return figure_of(forces)
 
 
 def _draw_statuses(axes: Axes, run: LoopRun) -> None:
@@ -127,17 +126,6 @@ def _draw_statuses(axes: Axes, run: LoopRun) -> None:
     if not flags:
         axes.text(0.5, 0.5, "ok throughout", transform=axes.transAxes, ha="center", va="center")
     axes.set_ylabel("status")
-
-
-def _three(axes: Sequence[Axes] | None, title: str) -> tuple[Figure, Sequence[Axes]]:
-    if axes is None:
-        figure = Figure(figsize=(6.4, 7.2), layout="constrained")
-        axes = list(figure.subplots(3, 1, sharex=True))
-        figure.suptitle(title)
-        return figure, axes
-    if len(axes) != 3:
-        raise InputError(f"axes: {len(axes)} given; three are needed")
-    return figure_of(axes[0]), axes
 
 
 def _finish(axes: Sequence[Axes], time: Array) -> None:

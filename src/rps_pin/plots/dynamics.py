@@ -1,6 +1,6 @@
-"""Figures of what moves a robot: forces by cause, and the actuators' forces over their speeds.
+"""Figures of actuator forces: by cause, and over speeds.
 
-Each function draws on axes of your own, or makes a figure. Nothing here opens a window.
+Each function draws on given axes, or makes a figure. No window is opened.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
-from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, legend_above
+from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, legend_above, three_axes
 from rps_pin.rps.dynamics.force_causes import ForceCauses
 from rps_pin.rps.dynamics.sizing_sheet import SizingSheet
 from rps_pin.validation import real_array
@@ -49,7 +49,7 @@ def plot_force_causes(
     causes
         Of n samples.
     axes
-        Three axes to draw on; a new figure's if left out.
+        Three axes to draw on; default: those of a new figure.
 
     Raises
     ------
@@ -64,12 +64,7 @@ def plot_force_causes(
             "(n, 3)"
         )
     with matplotlib.rc_context(STYLE):
-        if axes is None:
-            figure = Figure(figsize=(6.4, 7.2), layout="constrained")
-            axes = list(figure.subplots(3, 1, sharex=True))
-            figure.suptitle("Actuator forces by cause")
-        if len(axes) != 3:
-            raise InputError(f"axes: {len(axes)} given; one is needed for each of 3 actuators")
+        axes = three_axes(axes, "Actuator forces by cause")
         shown = {name: part for name, part in causes.parts().items() if part.any()}
         for leg, own in enumerate(axes):
             _stacks(own, times, {name: part[:, leg] for name, part in shown.items()})
@@ -114,12 +109,7 @@ def _stacks(axes: Axes, time: np.ndarray, parts: dict[str, np.ndarray]) -> None:
     for name, part in parts.items():
         colour, hatch = _CAUSES[name]
         upper, lower = above + np.maximum(part, 0.0), below + np.minimum(part, 0.0)
-        look: dict[str, Any] = {
-            "facecolor": colour,
-            "edgecolor": "white",
-            "linewidth": 0.0,
-            "hatch": hatch,
-        }
+        look: Any = {"facecolor": colour, "edgecolor": "white", "linewidth": 0.0, "hatch": hatch}
         axes.fill_between(time, above, upper, label=_LABELS.get(name, name), **look)
         axes.fill_between(time, below, lower, **look)
         above, below = upper, lower

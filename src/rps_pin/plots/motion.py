@@ -1,20 +1,25 @@
-"""Figures of a motion, like the paper's 7, 8 and 9: axes with units, colours told apart by all.
+"""Figures of a motion, like the paper's 7, 8 and 9, in colours that all readers can tell apart.
 
-Each function draws on a figure of your own, or makes one. Nothing here opens a window.
+Each function draws on a given figure, or makes one. No window is opened.
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from rps_pin.arrays import Array
-from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, legend_above
+from rps_pin.plots.style import (
+    LEG_COLOURS,
+    LEG_STYLES,
+    STYLE,
+    axes_in_space,
+    figure_of,
+    legend_above,
+    new_axes,
+)
 from rps_pin.rps.dynamics.motion_run import MotionRun
 
 
@@ -25,8 +30,7 @@ def plot_path(run: MotionRun, figure: Figure | None = None) -> Figure:
     """
     with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(5.6, 5.0), layout="constrained")
-        axes = figure.add_subplot(projection="3d")
-        assert isinstance(axes, Axes3D)  # what the projection "3d" makes
+        axes = axes_in_space(figure)
         x, y, z = 1e3 * run.position.T
         base = float(z.min())
         axes.plot(x, y, z - base, color=LEG_COLOURS[0])
@@ -56,7 +60,7 @@ def plot_forces(run: MotionRun, axes: Axes | None = None) -> Figure:
 def plot_length_phase(run: MotionRun, axes: Axes | None = None) -> Figure:
     """Draw each leg's speed over its length: mm/s over mm. Crosses mark the start."""
     with matplotlib.rc_context(STYLE):
-        axes = axes or Figure(figsize=(5.6, 4.2), layout="constrained").add_subplot()
+        axes = new_axes(axes, (5.6, 4.2))
         legs = zip(LEG_COLOURS, LEG_STYLES, 1e3 * run.length.T, 1e3 * run.speed.T, strict=True)
         for leg, (colour, style, length, speed) in enumerate(legs, start=1):
             axes.plot(length, speed, color=colour, linestyle=style, label=f"leg {leg}")
@@ -76,10 +80,8 @@ def _over_time(
     axes: Axes | None,
 ) -> Figure:
     with matplotlib.rc_context(STYLE):
-        if axes is None:
-            axes = Figure(figsize=(6.4, 3.8), layout="constrained").add_subplot()
-        legs: Sequence[tuple[str, str]] = list(zip(LEG_COLOURS, LEG_STYLES, strict=True))
-        for leg, (colour, style) in enumerate(legs):
+        axes = new_axes(axes, (6.4, 3.8))
+        for leg, (colour, style) in enumerate(zip(LEG_COLOURS, LEG_STYLES, strict=True)):
             axes.plot(time, values[:, leg], color=colour, linestyle=style, label=f"leg {leg + 1}")
         axes.set_xlabel("time (s)")
         axes.set_ylabel(label)

@@ -1,6 +1,6 @@
-"""Figures of a simulated motion: axes with units, colours told apart by all.
+"""Figures of a simulated motion: with units, in colours that all readers can tell apart.
 
-Nothing here opens a window.
+No window is opened.
 """
 
 from __future__ import annotations

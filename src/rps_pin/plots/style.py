@@ -1,14 +1,17 @@
-"""What all figures share: colours and lines told apart by all readers, legends, files."""
+"""Style of all figures: colours and lines that all readers can tell apart, axes, legends, files."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 
 #: Okabe and Ito's colours, told apart by colour-blind readers.
@@ -16,7 +19,7 @@ BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 ORANGE, SKY, YELLOW, BLACK = "#E69F00", "#56B4E9", "#F0E442", "#000000"
 GREY = "#999999"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
-#: Of legs 1, 2, 3; or of x, y, z. Line styles, so that print without colour will do.
+#: Of legs 1, 2, 3; or of x, y, z. Line styles tell them apart in print without colour.
 LEG_COLOURS = (BLUE, VERMILION, GREEN)
 LEG_STYLES = ("-", "--", "-.")
 #: From dark to light, in print without colour too.
@@ -34,14 +37,37 @@ STYLE: Any = {
 
 
 def figure_of(axes: Axes) -> Figure:
-    """Return the figure that axes stand on."""
+    """Return the figure of axes."""
     figure = axes.get_figure(root=True)
     assert figure is not None  # axes of a figure have one
     return figure
 
 
+def new_axes(axes: Axes | None, size: tuple[float, float]) -> Axes:
+    """Return the axes given, or those of a new figure of a size in inches."""
+    return axes or Figure(figsize=size, layout="constrained").add_subplot()
+
+
+def three_axes(axes: Sequence[Axes] | None, title: str) -> Sequence[Axes]:
+    """Return the three axes given, or those of a new figure with a title."""
+    if axes is None:
+        figure = Figure(figsize=(6.4, 7.2), layout="constrained")
+        figure.suptitle(title)
+        return list(figure.subplots(3, 1, sharex=True))
+    if len(axes) != 3:
+        raise InputError(f"axes: {len(axes)} given; three are needed")
+    return axes
+
+
+def axes_in_space(figure: Figure, place: tuple[int, int, int] = (1, 1, 1)) -> Axes3D:
+    """Return new three-dimensional axes on a figure."""
+    axes = figure.add_subplot(*place, projection="3d")
+    assert isinstance(axes, Axes3D)  # what the projection "3d" makes
+    return axes
+
+
 def legend_above(axes: Axes, columns: int) -> None:
-    """Put the legend in a row above the axes, where it hides nothing."""
+    """Put the legend in a row above the axes."""
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(0, 1),

@@ -1,6 +1,6 @@
 """The paper's figures of the workspace, 2 to 6, and a map of a slice: axes with units.
 
-Each function makes a figure, or draws on one of your own. Nothing here opens a window.
+Each function makes a figure, or draws on a given one. No window is opened.
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ from rps_pin.plots.style import (
     STYLE,
     VERMILION,
     YELLOW,
+    axes_in_space,
+    figure_of,
+    new_axes,
 )
 from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.parameters import RPSParameters
@@ -83,7 +86,7 @@ def plot_assembly_modes(
         Solutions for one triple of leg lengths: `angle` (k, 3), `position` (k, 3) and `rotation`
         (k, 3, 3).
     figure
-        To draw on; a new one if None.
+        To draw on; default: a new one.
 
     Raises
     ------
@@ -103,13 +106,11 @@ def plot_assembly_modes(
     with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(3.0 * columns, 3.4 * rows), layout="constrained")
         for k in range(count):
-            axes = _space(figure, (rows, columns, k + 1))
+            axes = axes_in_space(figure, (rows, columns, k + 1))
             _draw_robot(axes, base, tips[k])
             degrees = ", ".join(f"{angle:.0f}" for angle in np.rad2deg(modes.angle[k]))
             axes.set_title(f"{k + 1}: $\\phi$ = {degrees}°", fontsize=9)
-            axes.set_xlim(-reach, reach)
-            axes.set_ylim(-reach, reach)
-            axes.set_zlim(low, high)
+            axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(low, high))
             _label_space(axes, size=7)
             axes.set_box_aspect((1, 1, (high - low) / (2 * reach)), zoom=0.8)
     return figure
@@ -124,7 +125,7 @@ def plot_theoretical(parameters: RPSParameters, figure: Figure | None = None) ->
     h = 1e3 * parameters.platform_radius
     with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(5.6, 5.2), layout="constrained")
-        axes = _space(figure, (1, 1, 1))
+        axes = axes_in_space(figure)
         _draw_cylinder(axes, h, -h, h)
         axes.scatter([0], [0], [0], color="black", s=20, label="level, $p_x = p_y = 0$")
         # Tilt by pi along alpha: p = h (cos 2a', ...), on the cylinder (Eq. 4)
@@ -152,7 +153,7 @@ def plot_effective(workspace: Workspace, figure: Figure | None = None) -> Figure
     low, high = float(points[:, 2].min()), float(points[:, 2].max())
     with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(5.6, 5.2), layout="constrained")
-        axes = _space(figure, (1, 1, 1))
+        axes = axes_in_space(figure)
         _draw_cylinder(axes, h, low, high)
         axes.add_collection3d(Poly3DCollection(points[mesh.faces], color=_INSIDE))
         reach = float(np.abs(points[:, :2]).max())
@@ -164,9 +165,7 @@ def plot_effective(workspace: Workspace, figure: Figure | None = None) -> Figure
             transform=axes.transAxes,
             fontsize=8,
         )
-        axes.set_xlim(-h, h)
-        axes.set_ylim(-h, h)
-        axes.set_zlim(low, high)
+        axes.set(xlim=(-h, h), ylim=(-h, h), zlim=(low, high))
         _label_space(axes)
         axes.set_title("Effective and theoretical workspace")
         axes.set_box_aspect((1, 1, 1), zoom=0.88)
@@ -182,15 +181,13 @@ def plot_space(workspace: Workspace, figure: Figure | None = None) -> Figure:
     points = 1e3 * mesh.vertices
     with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(5.6, 5.4), layout="constrained")
-        axes = _space(figure, (1, 1, 1))
+        axes = axes_in_space(figure)
         triangles = points[mesh.faces]
         axes.add_collection3d(
             Poly3DCollection(triangles, facecolors=_shaded(triangles), linewidths=0)
         )
         low, high = points.min(axis=0), points.max(axis=0)
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
-        axes.set_zlim(low[2], high[2])
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         _label_space(axes)
         axes.set_title("Effective workspace of the platform's centre")
         axes.set_box_aspect((1, 1, 1.2), zoom=0.85)
@@ -215,7 +212,7 @@ def plot_views(workspace: Workspace, figure: Figure | None = None) -> Figure:
 
 
 def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) -> Figure:
-    """Draw which tilts are inside at a height, and why the others are not.
+    """Draw which tilts are inside at a height, and the reasons of the others.
 
     Parameters
     ----------
@@ -224,7 +221,7 @@ def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) 
     height
         Of the slice, m; the grid's nearest plane is drawn.
     axes
-        To draw on; those of a new figure if None.
+        To draw on; default: those of a new figure.
 
     Raises
     ------
@@ -236,17 +233,14 @@ def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) 
     plane = workspace.plane(0, height)
     if min(plane.grid.shape[1:]) < 2:
         raise InputError("a map needs at least 2 values of tilt_x and of tilt_y")
-    colours = [to_rgba("white")] * (len(_FAMILIES) + 1)
-    colours[0] = to_rgba(_INSIDE)
-    colours[1:] = [to_rgba(colour) for colour in _REASON_COLOURS]
+    colours = [to_rgba(colour) for colour in (_INSIDE, *_REASON_COLOURS)]
     reason = plane.reason[0]
     family = np.zeros(reason.shape, dtype=int)
     for i, (_, bits) in reversed(list(enumerate(_FAMILIES))):  # the first family wins
         family[(reason & np.uint16(bits)) != 0] = i + 1
     _, x, y = (np.rad2deg(axis) for axis in plane.grid.axes)
     with matplotlib.rc_context(STYLE):
-        if axes is None:
-            axes = Figure(figsize=(6.4, 4.4), layout="constrained").add_subplot()
+        axes = new_axes(axes, (6.4, 4.4))
         image = np.array(colours)[family]
         half_x, half_y = (x[1] - x[0]) / 2, (y[1] - y[0]) / 2
         axes.imshow(
@@ -263,9 +257,7 @@ def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) 
         axes.set_ylabel("tilt about y (°)")
         axes.set_title(f"Tilts at $p_z$ = {1e3 * plane.grid.axes[0][0]:.5g} mm", loc="left")
         axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1), frameon=False)
-        figure = axes.get_figure(root=True)
-        assert figure is not None  # axes of a figure have one
-    return figure
+    return figure_of(axes)
 
 
 class _Reach(Protocol):
@@ -282,21 +274,20 @@ class _Reach(Protocol):
 
 
 def plot_comparison(rows: Sequence[_Reach], axes: Axes | None = None) -> Figure:
-    """Draw the reach in x and y over the base radius g beside what the paper states.
+    """Draw the reach in x and y over the base radius g, and what the paper states.
 
     Parameters
     ----------
     rows
         As `paper_comparison` returns them.
     axes
-        To draw on; those of a new figure if None.
+        To draw on; default: those of a new figure.
     """
     if len(rows) == 0:
         raise InputError("there is nothing to compare: rows is empty")
     radius = [1e3 * row.base_radius for row in rows]
     with matplotlib.rc_context(STYLE):
-        if axes is None:
-            axes = Figure(figsize=(6.4, 3.8), layout="constrained").add_subplot()
+        axes = new_axes(axes, (6.4, 3.8))
         lines = (
             ("greatest $|p_x|$", [1e3 * max(map(abs, row.x)) for row in rows], "-o"),
             ("greatest $|p_y|$", [1e3 * max(map(abs, row.y)) for row in rows], "--s"),
@@ -309,27 +300,13 @@ def plot_comparison(rows: Sequence[_Reach], axes: Axes | None = None) -> Figure:
         axes.set_ylim(bottom=0)
         axes.set_title("Parasitic reach for 50 mm of leg stroke", loc="left")
         axes.legend(loc="upper left", frameon=False)
-        figure = axes.get_figure(root=True)
-        assert figure is not None  # axes of a figure have one
-    return figure
-
-
-def _space(figure: Figure, place: tuple[int, int, int]) -> Axes3D:
-    axes = figure.add_subplot(*place, projection="3d")
-    assert isinstance(axes, Axes3D)  # what the projection "3d" makes
-    return axes
+    return figure_of(axes)
 
 
 def _label_space(axes: Axes3D, z_label: str = "$p_z$ (mm)", size: int = 9) -> None:
-    if size < 9:
-        axes.set_xlabel("x (mm)", fontsize=size)
-        axes.set_ylabel("y (mm)", fontsize=size)
-        axes.set_zlabel("z (mm)", fontsize=size)
-    else:
-        axes.set_xlabel("$p_x$ (mm)")
-        axes.set_ylabel("$p_y$ (mm)")
-        axes.set_zlabel(z_label)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+    labels = ("$p_x$ (mm)", "$p_y$ (mm)", z_label) if size == 9 else ("x (mm)", "y (mm)", "z (mm)")
+    for axis, label in zip((axes.xaxis, axes.yaxis, axes.zaxis), labels, strict=True):
+        axis.set_label_text(label, fontsize=size if size < 9 else None)
         axis.set_major_locator(MaxNLocator(5 if size == 9 else 3))
         axis.set_tick_params(labelsize=size)
 
