@@ -99,7 +99,7 @@ class YamlFile:
         what
             The name of the whole in messages: ``"a mechanism"``.
         root
-            The path whose line is told if the whole lacks a key.
+            The path whose line is named if the whole lacks a key.
 
         Raises
         ------

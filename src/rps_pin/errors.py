@@ -19,7 +19,7 @@ _REPR.maxlevel, _REPR.maxlist, _REPR.maxstring, _REPR.maxother = 3, 9, _LONGEST,
 
 
 def shown(value: object) -> str:
-    """Return a value as it was given, or the beginning of it if it is large or deeply nested."""
+    """Return a value's repr, shortened if it is large or deeply nested."""
     text = _REPR.repr(value)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
@@ -31,10 +31,10 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 
 
 class RPSPinError(Exception):
-    """Base class of every error that rps_pin raises on purpose."""
+    """Base class of the errors of rps_pin."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let errors travel between processes, whatever their constructors take."""
+        """Pickle without calling the constructor, whose arguments differ."""
         return _rebuilt, (type(self), self.args, self.__dict__)
 
 
@@ -50,7 +50,7 @@ class InputError(RPSPinError, ValueError):
 
 
 class ParameterError(InputError):
-    """A parameter of a robot breaks a rule.
+    """A parameter of a robot is not possible.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class ParameterError(InputError):
 
 
 class MechanismError(InputError):
-    """A mechanism's description does not hold together (unknown frame, joint, closure, file)."""
+    """A mechanism's description is not consistent (unknown frame, joint, closure, file)."""
 
 
 class LimitViolation(NamedTuple):
@@ -83,9 +83,9 @@ class LimitViolation(NamedTuple):
     leg: int
     """Leg number, 1 to 3, as in the paper."""
     quantity: str
-    """What is beyond its limit: ``"length"``, ``"angle"`` or ``"spherical joint"``."""
+    """The quantity: ``"length"``, ``"angle"`` or ``"spherical joint"``."""
     value: float
-    """The value asked for, in `unit`."""
+    """Its value, in `unit`."""
     lower: float
     """Smallest allowed value, in `unit`."""
     upper: float
@@ -101,12 +101,12 @@ class LimitViolation(NamedTuple):
 
 
 class UnreachableError(RPSPinError, ValueError):
-    """A pose asks more of a leg than its limits, or its geometry, allow.
+    """A pose is not reachable within the limits or the geometry of a leg.
 
     Attributes
     ----------
     violations : tuple of LimitViolation
-        Every limit that the first refused pose breaks; empty where no limit is the reason.
+        All limits that the first refused pose exceeds; empty if no limit is the reason.
     """
 
     def __init__(self, message: str, violations: Sequence[LimitViolation] = ()) -> None:
@@ -120,7 +120,7 @@ class ClosureError(RPSPinError):
     Attributes
     ----------
     gap : float
-        How far the worst closure is from being satisfied, in the unit the message states.
+        Largest error of a closure, in the unit of the message.
     """
 
     def __init__(self, message: str, gap: float) -> None:
@@ -134,7 +134,7 @@ class SingularityError(RPSPinError, ArithmeticError):
     Attributes
     ----------
     condition : float
-        Condition number that was found (``inf`` at an exact singularity).
+        The condition number (``inf`` at an exact singularity).
     limit : float
         Largest condition number that is accepted.
     """
@@ -146,14 +146,14 @@ class SingularityError(RPSPinError, ArithmeticError):
 
 
 class LimitExcess(NamedTuple):
-    """One force that would have to go beyond its limit."""
+    """A force beyond its limit."""
 
     name: str
     """Of the actuator, or of the bound."""
     value: float
-    """What it would have to be, in `unit`."""
+    """The force, in `unit`."""
     limit: float
-    """The limit it breaks, in `unit`."""
+    """The limit that it exceeds, in `unit`."""
     unit: str
     """``"N"`` or ``"N m"``."""
 
@@ -171,13 +171,13 @@ class LimitExcess(NamedTuple):
 
 
 class InfeasibleError(RPSPinError, ArithmeticError):
-    """No forces do what is asked: the limits leave none, or the actuators cannot produce them.
+    """No forces within the limits, or none of the actuators at all, produce the motion.
 
     Attributes
     ----------
     violations : tuple of LimitExcess
-        The limits that would have to give way, by how much: of all ways to break the limits, that
-        of the least sum. Empty where no limit is the reason.
+        The limits that must be exceeded, and by how much, for the smallest sum of excesses. Empty
+        if no limit is the reason.
     unproduced : (nv,) array or None
         Where the actuators cannot do it even without limits: the smallest generalised force that
         would have to be added (see `least_effort.residual_force`).

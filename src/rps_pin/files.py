@@ -44,15 +44,14 @@ def opened(path: str | os.PathLike[str], what: str) -> Iterator[BinaryIO]:
 
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path beside `path`; move it into place when the block ends well.
+    """Yield a temporary path next to `path`; rename it to `path` if the block ends without error.
 
-    An exception, Ctrl-C included, removes the temporary file and leaves whatever stood at `path`
-    before untouched.
+    An exception, Ctrl-C included, removes the temporary file and leaves `path` unchanged.
 
     Parameters
     ----------
     path
-        Where the finished file shall stand. Its folder must exist.
+        Path of the finished file. Its folder must exist.
 
     Yields
     ------
@@ -64,7 +63,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         handle, name = tempfile.mkstemp(
             dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix
         )
-    except OSError as error:  # say the name that was asked for
+    except OSError as error:  # name the file that was asked for
         raise type(error)(error.errno, error.strerror, str(target)) from None
     os.close(handle)
     scratch = Path(name)

@@ -1,4 +1,4 @@
-"""Public names that have moved: the old name keeps working, and says where it went."""
+"""Public names that have moved: the old name works, with a warning that gives the new one."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ def moved_names(module: str, names: Mapping[str, str]) -> Callable[[str], Any]:
     Parameters
     ----------
     module
-        The module that had the names, for messages.
+        The module with the old names, for messages.
     names
-        The module that has each now, by name.
+        The new module of each name.
     """
 
     def __getattr__(name: str) -> Any:  # noqa: N807

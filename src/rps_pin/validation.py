@@ -1,7 +1,7 @@
-"""Arguments from callers, checked once: numbers, arrays, shapes and choices.
+"""Checks of arguments: numbers, arrays, shapes and choices.
 
-Each function returns what it was given as plain floats or float64 arrays, or raises `InputError`
-with the argument's name, what was given, and what is possible.
+Each function returns its argument as a float or a float64 array, or raises `InputError` with the
+argument's name, its value, and what is possible.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def choice(value: object, name: str, options: Sequence[str]) -> str:
 def real_array(
     value: ArrayLike, name: str, ending: tuple[int, ...] = (), meaning: str = ""
 ) -> Array:
-    """Return finite real numbers whose shape ends as told, (..., *ending).
+    """Return finite real numbers of shape (..., *ending).
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def real_array(
 
 
 def real_vector(value: ArrayLike, size: int, name: str) -> Array:
-    """Return finite real numbers of shape (size,): the fast way, for control loops."""
+    """Return finite real numbers of shape (size,); fast, for control loops."""
     if (
         isinstance(value, np.ndarray)
         and value.dtype == np.float64
@@ -188,7 +188,7 @@ def one_shape(**arrays: Array) -> tuple[Array, ...]:
 
 
 def read_only(array: Array) -> Array:
-    """Return a copy that nobody writes to."""
+    """Return a read-only copy."""
     copy = array.copy()
     copy.setflags(write=False)
     return copy

@@ -1,4 +1,4 @@
-"""The parameters of a 3-RPS: validated, immutable, in SI units, read from and written to YAML."""
+"""Parameters of a 3-RPS: validated, immutable, in SI units, read from and written to YAML."""
 
 from __future__ import annotations
 
@@ -57,26 +57,26 @@ Angle = Annotated[float, Field(ge=-math.pi, le=math.pi, allow_inf_nan=False)]
 
 
 class RPSParameters(BaseModel):
-    """Everything that makes one 3-RPS robot: geometry, masses, limits, gravity. SI units.
+    """Parameters of a 3-RPS: geometry, masses, limits, friction, gravity. SI units.
 
-    Immutable; compare with ``==``, derive a changed copy with :meth:`replace`. Each symbol of the
-    paper has its field, and so has what the paper leaves out (the moving rods, the limits, the
-    direction of gravity, friction). Fields that the paper leaves out default to "none".
+    Immutable; compare with ``==``, make a changed copy with :meth:`replace`. There is a field for
+    each symbol of the paper, and for the rods, limits, direction of gravity and friction, which the
+    paper does not have and which default to "none".
 
     Friction resists a joint's speed v with d v + f tanh(v / v_s): viscous, and dry friction made
-    smooth near zero speed, where it creeps instead of sticking (v_s is ``friction_speed``).
+    smooth near zero speed (v_s is ``friction_speed``): a joint creeps instead of sticking.
 
     The middle of a spherical joint's cone is its *rest axis*, fixed in the platform: in the plane
     of the platform's normal n and the joint's radial direction e_i, it is
     cos(r) n - sin(r) e_i with r = ``spherical_rest_angle``. At r = 0 it is the normal. A positive r
-    suits legs that lean inwards (phi < pi/2): a leg that stands at phi_0 under the level platform
+    suits legs that lean inwards (phi < pi/2): a leg at the angle phi_0 under the level platform
     is at rest in its joint for r = pi/2 - phi_0 (less a full turn if that exceeds pi). Legs that
     lean outwards have a negative r.
 
     Raises
     ------
     ParameterError
-        If a value breaks a rule; the error names the field, the value and the rule.
+        If a value is not possible; the error has the field, the value and the rule.
     """
 
     model_config = ConfigDict(
@@ -165,7 +165,7 @@ class RPSParameters(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _numbers_are_numbers(cls, value: object, info: ValidationInfo) -> object:
-        """Refuse what pydantic would turn into a number: truth values, and numbers in quotes."""
+        """Refuse truth values and text, which pydantic would convert to numbers."""
         if cls.model_fields[str(info.field_name)].annotation in (float, tuple[float, float]):
             for part in value if isinstance(value, (list, tuple)) else [value]:
                 if isinstance(part, (bool, str, bytes)):
@@ -234,7 +234,7 @@ class RPSParameters(BaseModel):
         return RPSParameters(**(self._values() | changes))
 
     def without_limits(self) -> RPSParameters:
-        """Return a copy without limits of lengths, angles and balls, to look beyond them."""
+        """Return a copy without limits of lengths, angles and spherical joints."""
         return self.replace(
             leg_length_limits=(0.0, math.inf),
             leg_angle_limits=(-math.pi, math.pi),
@@ -282,7 +282,7 @@ class RPSParameters(BaseModel):
         Raises
         ------
         InputError
-            If there is no such preset; the message lists those there are.
+            If there is no such preset; the message lists the presets.
         """
         if name not in cls.presets():
             raise InputError(f"no preset {name!r}; there are: {', '.join(cls.presets())}")
@@ -295,9 +295,9 @@ class RPSParameters(BaseModel):
         Raises
         ------
         InputError
-            If the file cannot be read or is not such a mapping (with the line where it fails).
+            If the file cannot be read or is not such a mapping; with the line.
         ParameterError
-            If a value breaks a rule, a field is missing, or one is unknown.
+            If a value is not possible, a field is missing, or one is unknown.
         """
         return cls._from_file(read_yaml(path, "parameter file"))
 
@@ -310,7 +310,7 @@ class RPSParameters(BaseModel):
             raise ParameterError(error.field, error.value, error.rule, place) from None
 
     def to_yaml(self, path: str | os.PathLike[str]) -> None:
-        """Write the parameters to a YAML file, each with its meaning and unit beside it."""
+        """Write the parameters to a YAML file, each with its meaning and unit as a comment."""
         document = CommentedMap(self.model_dump())
         for field, info in type(self).model_fields.items():
             document.yaml_set_comment_before_after_key(field, before=info.description)

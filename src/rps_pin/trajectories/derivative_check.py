@@ -88,8 +88,8 @@ def disagreement(times: Array, values: Array, derivative: Array) -> Disagreement
         row = int(np.argmax(wrong))
         middle = (slope[:-1] + slope[1:]) / 2
         ratio = float(inner @ middle / (middle @ middle))
-    beside = tuple(float(one) for one in slope[max(row - 1, 0) : row + 1])
-    return Disagreement(row, float(derivative[row]), beside, _looks_like(ratio))
+    slopes = tuple(float(one) for one in slope[max(row - 1, 0) : row + 1])
+    return Disagreement(row, float(derivative[row]), slopes, _looks_like(ratio))
 
 
 def _outside(value: Array, one: Array, other: Array) -> Array:

@@ -179,7 +179,7 @@ def helix(
     Parameters
     ----------
     robot
-        The 3-RPS whose platform's centre shall follow the helix.
+        The 3-RPS; its platform's centre follows the helix.
     radius
         r_h of Table 1, m; at most the platform's radius.
     pitch

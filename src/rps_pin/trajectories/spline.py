@@ -3,7 +3,7 @@
 With times, x(t) is the quintic spline of `sampled_path`.
 
 Without times, x(u) is the natural cubic spline over the chord length u, two continuous derivatives,
-and a law of time runs along it. Heights and tilts have different units: a chord's length is
+and u(t) is a law of time. Heights and tilts have different units: a chord's length is
 
     sqrt(dz^2 + L^2 (dtilt_x^2 + dtilt_y^2)),    L = `tilt_scale`, m/rad.
 """

@@ -55,7 +55,7 @@ class Scenario:
     machine : RPSRobot
         The plant's robot.
     trajectory : Trajectory
-        The targets.
+        The setpoints.
     gains : Gains
         Of the controller, in its law's units.
     faults : tuple of Fault
