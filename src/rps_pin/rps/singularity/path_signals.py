@@ -13,8 +13,9 @@ import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.rps.kinematics.legs import RADIAL
-from rps_pin.rps.kinematics.pose import platform_motion
+from rps_pin.rps.kernels import legs, tips
+from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE
+from rps_pin.rps.kinematics.pose import components, tilt_of
 from rps_pin.rps.kinematics.rates import masked_leg_jacobians
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measure_rates import measure_rates
@@ -22,8 +23,6 @@ from rps_pin.rps.singularity.measures import checked_tilt
 from rps_pin.trajectories.path import Trajectory
 from rps_pin.validation import positive_number
 
-#: Limits are kept to rounding error, m or rad (as in `rps_pin.rps.kinematics.legs`).
-_ROUNDING = 1e-12
 #: Times that are worked on at once.
 _CHUNK = 50_000
 
@@ -121,45 +120,45 @@ def _rooms(
     rooms, rates = np.empty((len(pose), len(limits))), np.empty((len(pose), len(limits)))
     if not limits:
         return rooms, rates
-    legs, vanishing = masked_leg_jacobians(parameters, pose)
-    speed = np.einsum("...ij,...j->...i", legs.length_jacobian, rate)
-    turning = np.einsum("...ij,...j->...i", legs.angle_jacobian, rate)
+    jacobians, vanishing = masked_leg_jacobians(parameters, pose)
+    speed = np.einsum("...ij,...j->...i", jacobians.length_jacobian, rate)
+    turning = np.einsum("...ij,...j->...i", jacobians.angle_jacobian, rate)
     quantities = {
-        "length": (legs.length, np.where(vanishing, 0.0, speed)),
-        "angle": (legs.angle, turning),
+        "length": (jacobians.length, np.where(vanishing, 0.0, speed)),
+        "angle": (jacobians.angle, turning),
     }
     if any(signal.name == "spherical joint" for signal in limits):
-        quantities["spherical joint"] = _cone_cosines(parameters, pose, rate, legs.angle, turning)
+        quantities["spherical joint"] = _cone_cosines(
+            parameters, pose, rate, jacobians.angle, turning
+        )
     for column, signal in enumerate(limits):
         value, change = (array[:, signal.leg - 1] for array in quantities[signal.name])
         if signal.name == "spherical joint":
-            least = math.cos(min(signal.limit + _ROUNDING, math.pi))
+            least = math.cos(min(signal.limit + LIMIT_TOLERANCE, math.pi))
             rooms[:, column], rates[:, column] = value - least, change
         elif signal.side == "lower":
-            rooms[:, column], rates[:, column] = value - signal.limit + _ROUNDING, change
+            rooms[:, column], rates[:, column] = value - signal.limit + LIMIT_TOLERANCE, change
         else:
-            rooms[:, column], rates[:, column] = signal.limit + _ROUNDING - value, -change
+            rooms[:, column], rates[:, column] = signal.limit + LIMIT_TOLERANCE - value, -change
     return rooms, rates
 
 
 def _cone_cosines(
     parameters: RPSParameters, pose: Array, rate: Array, angle: Array, angle_rate: Array
 ) -> tuple[Array, Array]:
-    """Return the cosines of the angles between legs and rest axes, and their rates, (n, 3 legs).
-
-    The leg is l = -cos(phi) e + sin(phi) z, its joint's rest axis R (cos(r) z - sin(r) e).
-    """
-    r = parameters.spherical_rest_angle
-    rest = math.cos(r) * np.array([0.0, 0.0, 1.0]) - math.sin(r) * RADIAL
-    platform = platform_motion(pose, rate, np.zeros_like(pose), parameters.platform_radius)
-    to_base = np.swapaxes(platform.rotation, -1, -2)  # of row vectors
-    axis = rest @ to_base
-    axis_rate = np.cross(platform.angular_velocity[:, None, :], rest) @ to_base
-    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
-    upright = np.array([0.0, 0.0, 1.0])
-    leg = -cosine * RADIAL + sine * upright
-    leg_rate = angle_rate[..., None] * (sine * RADIAL + cosine * upright)
-    return (leg * axis).sum(axis=-1), (leg_rate * axis + leg * axis_rate).sum(axis=-1)
+    """Return the cosines of the angles between legs and rest axes, and their rates, (n, 3 legs)."""
+    rest = math.cos(parameters.spherical_rest_angle), math.sin(parameters.spherical_rest_angle)
+    x, y, tilt = tilt_of(pose)
+    _, dx, dy = components(rate)
+    e, t, de, dt = (tips.at_legs((0.0, *pair)) for pair in ((x, y), (y, -x), (dx, dy), (dy, -dx)))
+    out, _, up = legs.rest_axis(e, t, tilt, *rest)
+    cosine, sine = np.cos(angle.T), np.sin(angle.T)
+    turning = angle_rate.T * legs.across_leg(cosine, sine, out, up)
+    axis_rate = legs.rest_axis_rate(e, t, de, dt, tilt, *rest)
+    return (
+        legs.cone_cosine(cosine, sine, out, up).T,
+        (turning + legs.cone_cosine(cosine, sine, *axis_rate)).T,
+    )
 
 
 def _checked_samples(value: Array, times: Array, name: str) -> Array:
