@@ -1,18 +1,17 @@
-"""Latency of the control loop's stages: median, p99, p99.9 and maximum; and whether memory grows.
+"""Latency of the control loop's stages, median, p99, p99.9 and maximum, and growth of memory.
 
     OPENBLAS_NUM_THREADS=1 .venv/bin/python -m benchmarks.latency [--ticks 1000000] [--json FILE]
 
-One thread, one tick after the other, no waiting between them. Python's garbage collector is frozen
-and switched off during the loop, as a control program would do (`LoopClock` does). Each stage's
-time includes reading the clock.
+One thread, tick after tick without waiting. Python's garbage collector is frozen and off during the
+loop, as with `LoopClock`. Each stage's time includes reading the clock.
 
-What the machine itself adds (interrupts, other programs, the host) shows in a sum that is always
-the same and takes about as long as a tick: read the other tails beside that one, and p99.9 of the
-quietest tenth of the run.
+The machine's own delays (interrupts, other programs, the host) are measured by a sum that is always
+the same and takes about as long as a tick. Compare the other tails with that one, and with p99.9 of
+the quietest tenth of the run.
 
-Peers do a tenth of the ticks, in the same run: the same law written with Pinocchio and NumPy, with
-a quadratic program built at each tick, and with MuJoCo, all of which must give our forces to 1e-8 N
-before anything is measured. Linux only (it reads /proc/self/statm).
+Peers run a tenth of the ticks, in the same run: the same law written with Pinocchio and NumPy, with
+a quadratic program built in each tick, and with MuJoCo. Their forces must agree to 1e-8 N before
+anything is measured. Linux only (it reads /proc/self/statm).
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Where the time of a tick goes: each part of a computed-torque tick on its own, in order.
+"""Times of the parts of a computed-torque tick, each measured on its own.
 
     OPENBLAS_NUM_THREADS=1 .venv/bin/python -m benchmarks.tick_profile [--json FILE]
 
-A profiler would more than double the time of Python code as short as this, and not evenly; so each
-part is called alone, in a loop, with what a tick would give it, and the best of many medians
-counts. What the parts leave of a whole tick is the calls between them.
+A profiler would more than double the time of code as short as this, unevenly. So each part is
+called alone in a loop, with the arguments of a tick, and the smallest of many medians is reported.
+The rest of a whole tick is the calls between the parts.
 """
 
 from __future__ import annotations

@@ -23,10 +23,10 @@ from rps_pin.control import (
 from rps_pin.control.estimator import leg_geometry, leg_jacobian, robot_state, state_estimate
 from rps_pin.control.loop import limits
 from rps_pin.numerics.compiled import COMPILES
-from rps_pin.rps.kinematics import tracking as scalar_tracking
+from rps_pin.rps.kinematics import tracking
 
 pytestmark = pytest.mark.skipif(not COMPILES, reason="Numba is not installed, or switched off")
-MODULES = [leg_geometry, leg_jacobian, robot_state, state_estimate, limits, scalar_tracking]
+MODULES = [leg_geometry, leg_jacobian, robot_state, state_estimate, limits, tracking]
 RNG = np.random.default_rng(11)
 ROBOT = RPSRobot.from_preset("micro")
 G, H = ROBOT.parameters.base_radius, ROBOT.parameters.platform_radius
@@ -75,12 +75,12 @@ def answers(f: dict[str, Any], numbers: list[Any]) -> list[float]:
     jacobian = f["leg_jacobian"](at, H)
     return flat(
         (
-            *(at, followed, f["pose_of"](goal, followed.way, G, H), jacobian),
+            *(at, followed, f["pose_of"](goal, followed.directions, G, H), jacobian),
             *(f["closure_determinant"](at, G, H), f["robot_state"](at, rate, acceleration, H)),
             *(f["pose_rate"](jacobian, rate), f["leg_speed"](jacobian, rate)),
             *(f["force_of_wrench"](jacobian, rate), f["wrench_of_force"](jacobian, rate)),
             f["leg_motion"](at, rate, acceleration, H),
-            f["state_estimate"](goal, followed.way, rate, G, H),
+            f["state_estimate"](goal, followed.directions, rate, G, H),
         )
     )
 

@@ -1,11 +1,12 @@
-"""The 3-RPS in a control loop: no exceptions, no allocation that grows, a status every tick.
+"""Control of the 3-RPS: a status in each tick instead of exceptions, and no growing memory.
 
-- In the loop: `RealTimeRobot` for laws of one's own; `ComputedTorque`, `PDControl` with `Gains`;
-  `PacedTrajectory` for targets that wait; `LoopClock` for the rate; `loop_margins` for the tuning.
-- Beside it, for trying: `Plant` with `Encoders`, `wrong_parameters` and `Fault`; `run_loop`, which
-  gives a `LoopRun`, and `LoopSummary` of it; `load_scenario` for YAML files.
+- `loop`: the laws `ComputedTorque` and `PDControl` with `Gains`, `PacedTrajectory`, `LoopClock`
+- `estimator`: `RealTimeRobot`, state estimate and inverse dynamics for other laws
+- `loop_margins`: stability margins for the tuning
+- `simulation`: `Plant` with `Encoders`, `wrong_parameters` and `Fault`; `run_loop` gives a
+  `LoopRun`, `LoopSummary` its figures; `load_scenario` reads YAML files
 
-What the robot is stands in `rps_pin.rps`; `rps_pin.viewer.server.live_view` shows a running loop.
+The robot itself is in `rps_pin.rps`; `rps_pin.viewer.server.live_view` displays a running loop.
 """
 
 from rps_pin.control.estimator.effective_inertia import effective_inertia

@@ -12,7 +12,7 @@ from rps_pin.numerics.compiled import compiled
 from rps_pin.rps.kernels import leg_equations, legs
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions, tilt_functions
 from rps_pin.rps.kernels.tips import at_legs, tips
-from rps_pin.rps.kinematics.tracking import Triple, Way
+from rps_pin.rps.kinematics.tracking import LegDirections, Triple
 
 #: (tilt_x, tilt_y) are coordinates below a whole turn; see `rps_pin.rps.singularity.measures`.
 LARGEST_TILT_SQUARED = (2 * math.pi * (1 - 1e-6)) ** 2
@@ -27,7 +27,7 @@ class LegGeometry(NamedTuple):
     """d, m."""
     angle: Triple
     """phi, rad."""
-    direction: Way
+    direction: LegDirections
     """Cosines, then sines of phi."""
     tilt: TiltFunctions
     """Coefficients of the rotation and their derivatives."""

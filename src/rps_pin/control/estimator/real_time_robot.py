@@ -22,7 +22,7 @@ from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.rps.kinematics.forward_kinematics import CONDITION_LIMIT, start_of
-from rps_pin.rps.kinematics.tracking import Triple, Way, follow
+from rps_pin.rps.kinematics.tracking import LegDirections, Triple, follow
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number
 
@@ -123,13 +123,13 @@ class RealTimeRobot:
 
     def reset(self, near: ArrayLike) -> None:
         """Start again from a pose, at rest and without forces. Raises as the constructor does."""
-        _, d, way, _ = start_of(near, self._g, self._h, CONDITION_LIMIT)
+        _, d, directions, _ = start_of(near, self._g, self._h, CONDITION_LIMIT)
         self.age, self.elapsed, self._fraction = 0, 0.0, 1.0
         self._type_ii: float | None = None
         self.determinant = 0.0
         self._length: Triple | None = d
         self._geometry_flags = 0
-        self.status = self._accept(d, way, _ZERO)
+        self.status = self._accept(d, directions, _ZERO)
         self._filter.reset()
         self.force_status, self.force_age, self.force_determinant = Status.OK, 0, 0.0
         self._pose: Triple | None = None
@@ -171,12 +171,12 @@ class RealTimeRobot:
         speeds = self._filter.after(d, elapsed) if speed is None else three_floats(speed)
         if speeds is None:
             return self._keep(_BAD_INPUT)
-        way, _, self._fraction = follow(
+        directions, _, self._fraction = follow(
             last, self.state.geometry.direction, d, self._g, self._h, CONDITION_LIMIT, self._most
         )
         if self._fraction < 1.0:
             return self._keep(_NOT_CONVERGED)
-        return self._accept(d, way, speeds)
+        return self._accept(d, directions, speeds)
 
     def inverse_dynamics(self, pose: Numbers, rate: Numbers, acceleration: Numbers) -> Status:
         """Write the forces and reactions of a motion, in any pose, to `answers`.
@@ -296,9 +296,9 @@ class RealTimeRobot:
 
     # Inner workings -------------------------------------------------------------------------------
 
-    def _accept(self, d: Triple, way: Way, speed: Triple) -> Status:
+    def _accept(self, d: Triple, directions: LegDirections, speed: Triple) -> Status:
         """Set the state of a followed reading, unless its rates are not finite."""
-        found = state_estimate(d, way, speed, self._g, self._h)
+        found = state_estimate(d, directions, speed, self._g, self._h)
         if found is None:
             return self._keep(_NOT_CONVERGED | _NEAR_SINGULAR)
         state, twist = found

@@ -14,7 +14,7 @@ from rps_pin.numerics.compiled import compiled
 from rps_pin.rps.kernels.platform import angular_velocity
 from rps_pin.rps.kernels.tilt_functions import tilt_functions
 from rps_pin.rps.kernels.tips import tip_rates, tip_slopes
-from rps_pin.rps.kinematics.tracking import Triple, Way, pose_of
+from rps_pin.rps.kinematics.tracking import LegDirections, Triple, pose_of
 
 #: Velocity of the platform's centre and angular velocity, base axes.
 Twist = tuple[float, float, float, float, float, float]
@@ -33,7 +33,7 @@ class StateEstimate(NamedTuple):
 
 @compiled
 def state_estimate(
-    d: Triple, direction: Way, speed: Triple, g: float, h: float
+    d: Triple, direction: LegDirections, speed: Triple, g: float, h: float
 ) -> tuple[StateEstimate, Twist] | None:
     """Return the state and the platform's twist; None where speeds give no rate (type II)."""
     pose = pose_of(d, direction, g, h)

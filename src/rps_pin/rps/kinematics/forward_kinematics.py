@@ -29,7 +29,7 @@ from rps_pin.rps.kinematics.leg_equations import (
 from rps_pin.rps.kinematics.legs import geometry_of_pose, refuse_vanishing
 from rps_pin.rps.kinematics.pose import checked_pose
 from rps_pin.rps.kinematics.rates import check_errors_option
-from rps_pin.rps.kinematics.tracking import Lengths, Way, condition_of, follow, pose_of
+from rps_pin.rps.kinematics.tracking import LegDirections, Lengths, condition_of, follow, pose_of
 from rps_pin.validation import one_shape, positive_number, whole_number
 
 #: Largest condition number of Eq. 8's Jacobian through which a pose is followed.
@@ -122,7 +122,7 @@ def forward_kinematics(
 
 def start_of(
     near: ArrayLike, g: float, h: float, limit: float
-) -> tuple[Array, Lengths, Way, float]:
+) -> tuple[Array, Lengths, LegDirections, float]:
     """Return what following begins with: a pose (3,), lengths, directions, and the condition.
 
     Raises
@@ -138,15 +138,15 @@ def start_of(
     if pose.shape != (3,):
         raise InputError(f"near has shape {pose.shape}; it must be (3,)")
     (d1, d2, d3), (c1, c2, c3), (s1, s2, s3) = (array.tolist() for array in _legs_of(pose, g, h))
-    d, way = (d1, d2, d3), (c1, c2, c3, s1, s2, s3)
-    condition = condition_of(d, way, g, h)
+    d, directions = (d1, d2, d3), (c1, c2, c3, s1, s2, s3)
+    condition = condition_of(d, directions, g, h)
     if condition > limit:
         raise SingularityError(
             f"the pose to start from is singular: condition {condition:.3g}, limit {limit:.3g}",
             condition,
             limit,
         )
-    return pose, d, way, condition
+    return pose, d, directions, condition
 
 
 class EncoderTracker:
@@ -206,12 +206,12 @@ class EncoderTracker:
 
     def reset(self, near: ArrayLike) -> None:
         """Start anew from a pose. Raises what the constructor does."""
-        pose, d, way, self.condition = start_of(near, self._g, self._h, self._limit)
-        self._length, self._way = d, way
+        pose, d, directions, self.condition = start_of(near, self._g, self._h, self._limit)
+        self._length, self._directions = d, directions
         self._pose[:] = pose
         # Where functions are compiled, now and not in the loop.
-        follow(d, way, d, self._g, self._h, self._limit, self._most)
-        pose_of(d, way, self._g, self._h)
+        follow(d, directions, d, self._g, self._h, self._limit, self._most)
+        pose_of(d, directions, self._g, self._h)
 
     def update(self, length: ArrayLike, out: Array | None = None) -> Array:
         """Return the pose (3,) at a new reading of the leg lengths (3,), m.
@@ -232,8 +232,8 @@ class EncoderTracker:
             If the way to the reading meets a singularity, or is too long for `most_steps`.
         """
         goal = _reading(length)
-        way, condition, done = follow(
-            self._length, self._way, goal, self._g, self._h, self._limit, self._most
+        directions, condition, done = follow(
+            self._length, self._directions, goal, self._g, self._h, self._limit, self._most
         )
         if done < 1.0:
             condition = condition if done > 0.0 else self.condition
@@ -245,8 +245,8 @@ class EncoderTracker:
                 self._limit,
             )
         pose = self._pose
-        pose[0], pose[1], pose[2] = pose_of(goal, way, self._g, self._h)
-        self._length, self._way, self.condition = goal, way, condition
+        pose[0], pose[1], pose[2] = pose_of(goal, directions, self._g, self._h)
+        self._length, self._directions, self.condition = goal, directions, condition
         if out is None:
             return pose
         out[:] = pose

@@ -1,6 +1,6 @@
-"""Lengths followed one step after the other, in plain floats: for calls in a loop.
+"""Leg lengths followed one step at a time, on floats, for calls in a control loop.
 
-Ten times faster than arrays of three. The steps are those of `rps_pin.rps.kernels.continuation`.
+Ten times faster than on arrays of three. The steps are those of `rps_pin.rps.kernels.continuation`.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ Triple = tuple[float, float, float]
 #: Three leg lengths, m.
 Lengths = Triple
 #: Cosines, then sines, of the three leg angles.
-Way = tuple[float, float, float, float, float, float]
+LegDirections = tuple[float, float, float, float, float, float]
 
 
 class Followed(NamedTuple):
-    """How far lengths were followed."""
+    """Result of following leg lengths."""
 
-    way: Way
-    """Directions of the legs there."""
+    directions: LegDirections
+    """Of the legs at its end."""
     condition: float
     """Condition number of Eq. 8's Jacobian there (before the last Newton step, below 2e-9 rad)."""
     fraction: float
-    """How much of the line was gone: 1 where the lengths wanted were reached."""
+    """Part of the line that was followed, 1 where its end was reached."""
 
 
-def direction_of_legs(angle: Triple) -> Way:
+def direction_of_legs(angle: Triple) -> LegDirections:
     """Return the cosines, then the sines, of the leg angles, rad."""
     phi1, phi2, phi3 = angle
     return (
@@ -40,23 +40,29 @@ def direction_of_legs(angle: Triple) -> Way:
 
 
 @compiled
-def condition_of(d: Lengths, way: Way, g: float, h: float) -> float:
+def condition_of(d: Lengths, directions: LegDirections, g: float, h: float) -> float:
     """Return the condition number of Eq. 8's Jacobian by leg angles, in greatest row sums."""
-    condition: float = newton_step(d, way, g, h)[2]
+    condition: float = newton_step(d, directions, g, h)[2]
     return condition
 
 
 @compiled
 def follow(
-    begin: Lengths, way: Way, goal: Lengths, g: float, h: float, limit: float, most: int
+    begin: Lengths,
+    directions: LegDirections,
+    goal: Lengths,
+    g: float,
+    h: float,
+    limit: float,
+    most: int,
 ) -> Followed:
     """Follow leg lengths in at most so many steps; see `continuation.follow_legs`."""
     start = (0.0, 1.0, math.inf)
-    there, progress = follow_legs(begin, way, goal, (g, h), limit, start, most)
+    there, progress = follow_legs(begin, directions, goal, (g, h), limit, start, most)
     return Followed(there, progress[2], progress[0])
 
 
 @compiled
-def pose_of(d: Lengths, way: Way, g: float, h: float) -> Triple:
+def pose_of(d: Lengths, directions: LegDirections, g: float, h: float) -> Triple:
     """Return the pose (z, tilt_x, tilt_y) of lengths and directions that close the robot."""
-    return pose_of_legs(d, way, g, h)
+    return pose_of_legs(d, directions, g, h)

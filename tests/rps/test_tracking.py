@@ -13,8 +13,8 @@ from rps_pin.rps.kinematics.forward_kinematics import forward_kinematics
 from rps_pin.rps.kinematics.legs import leg_angles_and_lengths, tips
 from rps_pin.rps.kinematics.pose import position, rotation
 from rps_pin.rps.kinematics.tracking import (
+    LegDirections,
     Lengths,
-    Way,
     condition_of,
     direction_of_legs,
     follow,
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 G, H = 0.4, 0.3
 
 
-def start(pose: Array) -> tuple[Lengths, Way]:
+def start(pose: Array) -> tuple[Lengths, LegDirections]:
     length, angle = leg_angles_and_lengths(tips(position(pose, H), rotation(pose), H), G)
     (d1, d2, d3), (phi1, phi2, phi3) = length.tolist(), angle.tolist()
     return (d1, d2, d3), direction_of_legs((phi1, phi2, phi3))
@@ -51,9 +51,9 @@ def test_ways_of_every_length_end_as_those_followed_in_arrays() -> None:
         rounding = 1e-14 * max(condition, 100.0)
         phi1, phi2, phi3 = expected.angle[i].tolist()
         way = direction_of_legs((phi1, phi2, phi3))
-        np.testing.assert_allclose(found.way, way, rtol=0, atol=rounding)
+        np.testing.assert_allclose(found.directions, way, rtol=0, atol=rounding)
         assert found.condition == pytest.approx(condition, rel=1e-5)
-        pose = pose_of((d1, d2, d3), found.way, G, H)
+        pose = pose_of((d1, d2, d3), found.directions, G, H)
         np.testing.assert_allclose(pose, expected.pose[i], rtol=0, atol=rounding)
 
 
