@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+
+from rps_pin.viewer import write_html
 
 URDF = """
 <robot name="sample">
@@ -106,3 +110,11 @@ def configuration(model: pin.Model, time: float, scale: float) -> np.ndarray:
 
 def joint(model: pin.Model, name: str) -> int:
     return int(model.joints[model.getJointId(name)].idx_q)
+
+
+def motion_page(*motion, **options) -> str:
+    """Return the page that `write_html` writes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "page.html")
+        write_html(path, *motion, **options)
+        return path.read_text(encoding="utf-8")

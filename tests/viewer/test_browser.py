@@ -7,8 +7,8 @@ import pytest
 from playwright.sync_api import Page
 
 from rps_pin.viewer import LocalViewer, Scene
-from rps_pin.viewer.files.html import motion_page
 from tests.viewer.conftest import Watched, open_text, watching
+from tests.viewer.robots import motion_page
 
 # Mean over the picture of the absolute difference of two pixels, in 1 / 255.
 DIFFERENT = 1.0

@@ -15,8 +15,8 @@ import umsgpack
 import rps_pin.viewer.files.html as html_module
 from rps_pin.errors import InputError
 from rps_pin.viewer import write_html
-from rps_pin.viewer.files.html import motion_page
 from rps_pin.viewer.files.page import inline_script, licences
+from tests.viewer.robots import motion_page
 
 FLOAT32_ARRAY = 0x17
 

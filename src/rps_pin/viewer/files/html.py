@@ -64,27 +64,13 @@ def write_html(
         If the file cannot be written.
     """
     target = checked_target(path)
-    text = motion_page(model, visual, times, configurations, title=title, frame_rate=frame_rate)
-    with whole_file(target) as scratch:
-        scratch.write_text(text, encoding="utf-8")
-
-
-def motion_page(
-    model: pin.Model,
-    visual: pin.GeometryModel,
-    times: ArrayLike,
-    configurations: ArrayLike,
-    *,
-    title: str = "Robot motion",
-    frame_rate: float = FRAME_RATE,
-) -> str:
-    """Return the page that `write_html` writes, as one string."""
     motion = Motion(model, times, configurations)
     recorder = Recorder()
     scene = Scene(model, visual, recorder, motion.configurations)
     if motion.duration > 0.0:
         scene.animate(motion, frame_rate=frame_rate)
-    return recorded_page(recorder, scene, motion, title)
+    with whole_file(target) as scratch:
+        scratch.write_text(recorded_page(recorder, scene, motion, title), encoding="utf-8")
 
 
 def checked_target(path: str | os.PathLike[str]) -> Path:

@@ -29,6 +29,8 @@ from rps_pin.errors import InputError, RPSPinError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number, real_vector
 from rps_pin.viewer.motion import FRAME_RATE
+from rps_pin.viewer.scene.scene import Scene
+from rps_pin.viewer.server.local_viewer import LocalViewer
 
 #: Number of the write, and the pose; its CRC-32 follows.
 _RECORD = struct.Struct("4d")
@@ -202,9 +204,6 @@ def _serve(
     line: Connection,
 ) -> None:
     """Show the newest pose at the rate, until the connection or the loop's process ends."""
-    from rps_pin.viewer.scene.scene import Scene  # noqa: PLC0415
-    from rps_pin.viewer.server.local_viewer import LocalViewer  # noqa: PLC0415
-
     memory, parent = memoryview(slot).cast("B"), os.getppid()
     # The shapes depend on the limits: they are those of the robot as it is.
     free, still, seen = RPSRobot(robot.parameters.without_limits()), np.zeros(3), 0.0
