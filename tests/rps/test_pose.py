@@ -8,7 +8,7 @@ from hypothesis import given
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rps_pin import InputError
+from rps_pin import InputError, RPSRobot
 from rps_pin.rps.kinematics.conversions import pose_from_angles
 from rps_pin.rps.kinematics.pose import (
     checked_motion,
@@ -251,3 +251,11 @@ def test_the_strategies_cover_level_and_large_tilts() -> None:
 
     look()
     assert seen == {"level", "series", "closed form"}
+
+
+@pytest.mark.parametrize("pose", [(0.22, 1e200, 1e200), (1e308, 1e308, 1e308)])
+def test_a_tilt_whose_square_overflows_is_an_input_error(pose):
+    robot = RPSRobot.from_preset("micro")
+    for compute in (robot.inverse_kinematics, robot.platform_placement):
+        with pytest.raises(InputError, match="too large"):
+            compute(pose)

@@ -21,12 +21,14 @@ The 3-RPS can also be assembled in poses that are half turns about axes *outside
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.errors import InputError
 from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kernels import platform, tips
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions, tilt_functions
@@ -84,9 +86,15 @@ def stacked(*numbers: Number) -> Array:
 
 
 def tilt_of(pose: Array) -> tuple[Number, Number, TiltFunctions]:
-    """Return tilt_x, tilt_y and the functions of the tilt, of poses (..., 3)."""
+    """Return tilt_x, tilt_y and the functions of the tilt, of poses (..., 3).
+
+    Raises `InputError` for one pose with a tilt above 1e154 rad, whose square is not finite.
+    """
     _, x, y = components(pose)
-    return x, y, tilt_functions(x * x + y * y)
+    square = x * x + y * y
+    if type(square) is float and square == math.inf:
+        raise InputError(f"tilt = ({x:.3g}, {y:.3g}) rad: it is too large to compute with")
+    return x, y, tilt_functions(square)
 
 
 def rotation(pose: Array) -> Array:
