@@ -104,7 +104,7 @@ def motion_of(subject: DisplayedMechanism, given: Any = None) -> Motion:
     if robot is None:
         return Motion(model, [0.0], _one(subject.mechanism.home if given is None else given, model))
     if isinstance(given, MotionRun):
-        states = robot.state(given.pose, given.rate, given.acceleration)
+        states = given.configuration, given.generalised_velocity, given.generalised_acceleration
         reactions = given.reaction.reshape(len(given.time), -1)
         return Motion(model, given.time, *states, forces=given.force, constraint_forces=reactions)
     if hasattr(given, "sample") and hasattr(given, "duration"):

@@ -39,6 +39,10 @@ class MotionRun:
     """Of the platform's centre in base axes, shape (n, 3), m."""
     configuration: Array
     """Pinocchio configurations, shape (n, nq)."""
+    generalised_velocity: Array
+    """Pinocchio velocities, shape (n, nv)."""
+    generalised_acceleration: Array
+    """Their time derivatives, shape (n, nv)."""
     length: Array
     """Of the legs, shape (n, 3), m."""
     speed: Array
@@ -211,6 +215,8 @@ def run_motion(
         acceleration=acceleration,
         position=platform.position,
         configuration=q,
+        generalised_velocity=v,
+        generalised_acceleration=a,
         length=legs.length,
         speed=legs.speed,
         leg_acceleration=legs.acceleration,

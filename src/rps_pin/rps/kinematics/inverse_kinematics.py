@@ -47,7 +47,7 @@ def reachable_motion(
     legs = geometry_of_pose(pose, g, h)
     refuse_vanishing(legs.length, legs.vanishing)
     _reachable(parameters, pose, legs, refuse=True)
-    return leg_motion(pose, rate, acceleration, h, g)
+    return leg_motion(pose, rate, acceleration, h, g, legs)
 
 
 def spherical_angles(parameters: RPSParameters, pose: Array, legs: LegGeometry) -> Array:

@@ -131,7 +131,12 @@ def refuse_vanishing(length: Array, vanishing: Bools) -> None:
 
 
 def leg_motion(
-    pose: Array, rate: Array, acceleration: Array, platform_radius: float, base_radius: float
+    pose: Array,
+    rate: Array,
+    acceleration: Array,
+    platform_radius: float,
+    base_radius: float,
+    legs: LegGeometry | None = None,
 ) -> LegMotion:
     """Return how the legs move with the platform, in closed form.
 
@@ -141,13 +146,15 @@ def leg_motion(
         Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
     platform_radius, base_radius
         The paper's h and g, m.
+    legs
+        The legs of the poses, if they are known.
 
     Raises
     ------
     UnreachableError
         If a leg has no length.
     """
-    legs = geometry_of_pose(pose, base_radius, platform_radius)
+    legs = legs or geometry_of_pose(pose, base_radius, platform_radius)
     refuse_vanishing(legs.length, legs.vanishing)
     x, y, tilt = tilt_of(pose)
     (dz, dx, dy), (ddz, ddx, ddy) = components(rate), components(acceleration)
