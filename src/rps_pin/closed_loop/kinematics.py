@@ -16,6 +16,7 @@ from rps_pin.numerics.linear_algebra import (
     condition_number,
     least_norm,
     null_space,
+    refuse_condition,
     singular_values,
 )
 
@@ -48,13 +49,8 @@ def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
     scaled = of_chosen / system.column_scale[chosen][:, None]
     smallest = float(singular_values(scaled).min(initial=1.0))
     condition = 1 / smallest if smallest > 0 else np.inf
-    if not condition <= system.max_condition:
-        raise SingularityError(
-            "these joints do not determine the motion here: the condition number is "
-            f"{condition:.3g}, and at most {system.max_condition:.3g} is accepted",
-            condition,
-            system.max_condition,
-        )
+    reason = "these joints do not determine the motion here"
+    refuse_condition(condition, system.max_condition, reason)
     return np.asarray(np.linalg.solve(of_chosen.T, motions.T).T, dtype=np.float64)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.linalg.lapack import dgesdd
 
 from rps_pin.arrays import Array
+from rps_pin.errors import SingularityError
 
 #: A singular value below this, relative to the largest (or to 1 if that is less), counts as zero.
 RANK_TOLERANCE = 1e-10
@@ -96,3 +97,14 @@ def condition_number(matrix: Array) -> float:
     if rank(values) == 0 or not values[-1] > 0:
         return math.inf
     return float(values[0] / values[-1])
+
+
+def refuse_condition(condition: float, limit: float, reason: str) -> None:
+    """Raise `SingularityError`, for a reason, if a condition number exceeds its limit or is NaN."""
+    if not condition <= limit:
+        raise SingularityError(
+            f"{reason}: the condition number is {condition:.3g}, and at most {limit:.3g} is "
+            "accepted",
+            condition,
+            limit,
+        )

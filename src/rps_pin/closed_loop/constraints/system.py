@@ -25,7 +25,8 @@ from rps_pin.closed_loop.dynamics.passive_joint_forces import (
     refuse_springs,
 )
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
-from rps_pin.errors import ClosureError, InputError, MechanismError, SingularityError
+from rps_pin.errors import ClosureError, InputError, MechanismError
+from rps_pin.numerics.linear_algebra import refuse_condition
 from rps_pin.validation import real_vector
 
 #: Beyond this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
@@ -166,13 +167,8 @@ class ConstraintSystem:
 
     def refuse_singular(self, condition: float) -> None:
         """Raise `SingularityError` if a condition number of J_p is too large."""
-        if not condition <= self.max_condition:
-            raise SingularityError(
-                "the actuated joints do not determine the motion here: the condition number is "
-                f"{condition:.3g}, and at most {self.max_condition:.3g} is accepted",
-                condition,
-                self.max_condition,
-            )
+        reason = "the actuated joints do not determine the motion here"
+        refuse_condition(condition, self.max_condition, reason)
 
 
 class Mechanism(Protocol):

@@ -33,12 +33,13 @@ from rps_pin.closed_loop.dynamics.least_effort import (
     residual_force,
 )
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
-from rps_pin.errors import InputError, SingularityError
+from rps_pin.errors import InputError
 from rps_pin.numerics.linear_algebra import (
     RANK_TOLERANCE,
     condition_number,
     least_norm,
     null_space,
+    refuse_condition,
     singular_values,
 )
 
@@ -280,11 +281,6 @@ def _exact(of_actuators: Array, reduced: Array, max_condition: float) -> Array:
     """Return tau with (S N)' tau = N' f, S N square and of one unit, of size 1 at best."""
     smallest = float(singular_values(of_actuators).min(initial=1.0))
     condition = 1 / smallest if smallest > 0 else np.inf
-    if not condition <= max_condition:
-        raise SingularityError(
-            "the actuated joints do not move all of the mechanism here: condition "
-            f"{condition:.3g}, and at most {max_condition:.3g} is accepted",
-            condition,
-            max_condition,
-        )
+    reason = "the actuated joints do not move all of the mechanism here"
+    refuse_condition(condition, max_condition, reason)
     return np.asarray(np.linalg.solve(of_actuators.T, reduced), np.float64)

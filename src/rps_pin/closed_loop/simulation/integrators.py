@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -124,7 +125,9 @@ class AdaptiveStepper:
         def slope(time: float, y: Array) -> Array:
             u, v = y[:nv], y[nv:-1]
             a = acceleration(time, pin.integrate(model, start, u), v)
-            return np.concatenate([self._chart_rate(start, u, v), a, [_SCALE * power()]])
+            rate = np.empty(y.size)
+            rate[:nv], rate[nv:-1], rate[-1] = self._chart_rate(start, u, v), a, _SCALE * power()
+            return rate
 
         # The work is scaled so that its error counts for nothing; DOP853 takes the root mean square
         # of all errors, which one more entry does not change then.
@@ -145,6 +148,9 @@ class AdaptiveStepper:
             self._next = solver.h_abs  # one cut short by `until` does not tell about the next
         interpolant = solver.dense_output() if solver.t > t else None
 
+        @lru_cache(
+            maxsize=2
+        )  # at(time), work(time), and work(time) again where the next row begins
         def values(time: float) -> Array:
             if time == solver.t or interpolant is None:
                 return np.asarray(solver.y, np.float64)

@@ -25,7 +25,7 @@ from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.forward_dynamics import reduced_acceleration
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.errors import ClosureError, SingularityError
-from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, rank, singular_values
+from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, rank, refuse_condition, singular_values
 
 #: One Newton step leads from here to rounding error; below `CLOSED` with room to spare.
 _NEWTON_ENDS = 1e-14
@@ -150,7 +150,7 @@ class ClosedManifold:
         factors.compute(jacobian.take(self._dependent, axis=1))
         self._rcond = factors.rcond()
         if not self._rcond * self._system.max_condition > 1:
-            raise self._singular(self._rcond)
+            self._refuse_singular(self._rcond)
         right = np.empty((rank, m + 1), order="F")
         right[:, :m], right[:, m] = jacobian.take(self._independent, axis=1), bias
         solved = factors.solve(right).reshape(rank, m + 1)  # a single row comes flat
@@ -159,15 +159,10 @@ class ClosedManifold:
         a_0[self._dependent] = -scale * solved[:, m]
         return self._basis, a_0
 
-    def _singular(self, rcond: float) -> SingularityError:
+    def _refuse_singular(self, rcond: float) -> None:
         condition = 1 / rcond if rcond > 0 else np.inf
-        limit = self._system.max_condition
-        return SingularityError(
-            f"the closures do not determine the motion here: the condition number is "
-            f"{condition:.3g}, and at most {limit:.3g} is accepted",
-            condition,
-            limit,
-        )
+        reason = "the closures do not determine the motion here"
+        refuse_condition(condition, self._system.max_condition, reason)
 
     # Projection -----------------------------------------------------------------------------------
 
@@ -212,6 +207,6 @@ class ClosedManifold:
         """Return the x of least norm with A x = right."""
         _, multipliers, info = dposv(rows @ rows.T, right)
         if info:
-            raise self._singular(0.0)
+            self._refuse_singular(0.0)
         least: Array = rows.T @ multipliers
         return least

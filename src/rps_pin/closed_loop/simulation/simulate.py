@@ -11,7 +11,7 @@ size where as much is opened as decays.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -170,11 +170,9 @@ def simulate(
 # From one time to the next ------------------------------------------------------------------------
 
 
-class _Advance(Protocol):
-    def __call__(
-        self, time: float, state: State, following: float, a: Array
-    ) -> tuple[State, float, float]:
-        """Return the state at the following time, its gap, and the work done on the way."""
+#: Function of (time, state, following time, a) that returns the state at the following time, its
+#: gap, and the work done on the way.
+_Advance = Callable[[float, State, float, Array], tuple[State, float, float]]
 
 
 class _Fixed:
