@@ -118,6 +118,10 @@ def test_dependencies_point_one_way() -> None:
     assert not found, "\n".join(found)
 
 
+def test_no_imports_run_in_a_circle() -> None:
+    assert COUNT["circles"](IMPORTS) == []
+
+
 def test_folders_are_small() -> None:
     """The commands, and the checks of the paper, are as many as there are."""
     counts = Counter(path.parent.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py"))
