@@ -1,4 +1,9 @@
-"""URDF as text: links, joints, shapes and whole files, for tools/make_urdfs.py. SI units."""
+"""URDF as text: links, joints, shapes and whole files, for tools/make_urdfs.py. SI units.
+
+Not through yourdfpy, as the file of the 3-RPS: it keeps placements as matrices, so that angles are
+computed back (not to the last digit, and not uniquely at a pitch of 90 degrees), and it writes no
+whole numbers and no comment. These files are made to be read.
+"""
 
 from __future__ import annotations
 

@@ -184,37 +184,31 @@ class RPSParameters(BaseModel):
 
     @field_validator("leg_length_limits", "leg_angle_limits")
     @classmethod
-    def _limits_in_order(cls, limits: tuple[float, float]) -> tuple[float, float]:
+    def _limits_in_order(
+        cls, limits: tuple[float, float], info: ValidationInfo
+    ) -> tuple[float, float]:
         lower, upper = limits
         if math.isnan(lower) or math.isnan(upper):
             raise ValueError("must not be NaN")
         if not lower < upper:
             raise ValueError("the lower limit must be below the upper one")
-        return limits
-
-    @field_validator("leg_length_limits")
-    @classmethod
-    def _lengths_are_positive(cls, limits: tuple[float, float]) -> tuple[float, float]:
-        if limits[0] < 0:
+        if info.field_name == "leg_length_limits" and lower < 0:
             raise ValueError("a leg's length cannot be negative")
-        return limits
-
-    @field_validator("leg_angle_limits")
-    @classmethod
-    def _angles_within_a_turn(cls, limits: tuple[float, float]) -> tuple[float, float]:
-        if limits[0] < -math.pi or limits[1] > math.pi:
+        if info.field_name == "leg_angle_limits" and (lower < -math.pi or upper > math.pi):
             raise ValueError("angles lie between -pi and pi")
         return limits
 
     @model_validator(mode="after")
     def _bodies_exist(self) -> Self:
-        if self.leg_mass == 0 and self.leg_inertia > 0:
-            _refuse("leg_inertia", self.leg_inertia, "a leg without mass has no inertia")
-        if self.rod_mass == 0 and self.rod_inertia > 0:
-            _refuse("rod_inertia", self.rod_inertia, "a rod without mass has no inertia")
+        for part in ("leg", "rod"):
+            inertia = getattr(self, f"{part}_inertia")
+            if getattr(self, f"{part}_mass") == 0 and inertia > 0:
+                raise ParameterError(
+                    f"{part}_inertia", inertia, f"a {part} without mass has no inertia"
+                )
         offset = self.leg_mass * self.leg_com**2
         if self.leg_inertia_about == "joint" and self.leg_inertia < offset * (1 - 1e-9):
-            _refuse(
+            raise ParameterError(
                 "leg_inertia",
                 self.leg_inertia,
                 f"about the joint it must be at least leg_mass * leg_com^2 = {offset:.6g}; "
@@ -322,12 +316,8 @@ class RPSParameters(BaseModel):
 
 
 def _restored(values: dict[str, Any]) -> RPSParameters:
-    """Unpickle: through the constructor, so that the arrays are read-only again."""
+    """Unpickle through the constructor, which makes the arrays read-only."""
     return RPSParameters(**values)
-
-
-def _refuse(field: str, value: object, rule: str) -> None:
-    raise ParameterError(field, value, rule)
 
 
 def _parameter_error(error: ValidationError) -> ParameterError:

@@ -239,11 +239,6 @@ def checked_radii(base_radius: float, platform_radius: float) -> tuple[float, fl
     )
 
 
-def checked_positive(value: float, name: str) -> float:
-    """Return a positive, finite float."""
-    return positive_number(value, name)
-
-
 def _tips(length: ArrayLike, angle: ArrayLike) -> tuple[Array, Array, Array]:
     """Return w, z and d, shape (3 legs, ...), m."""
     angles = real_array(angle, "angle", (3,), "one a leg")
