@@ -109,7 +109,7 @@ def test_lengths_that_cannot_close_are_refused_with_the_gap() -> None:
 def test_way_across_a_singularity_is_refused_with_fraction_and_condition() -> None:
     """From one mode there is no way to lengths that only other modes have."""
     near = np.array([0.48, 0.0, 0.0])
-    with pytest.raises(SingularityError, match=r"after \d+\.\d+% of the way") as refusal:
+    with pytest.raises(SingularityError, match=r"after \d+\.\d+% of the line") as refusal:
         forward_kinematics([[0.5, 0.5, 0.5], [0.2, 0.3, 0.9]], near, G, H)
     assert "entry 1" in str(refusal.value)
     assert refusal.value.condition > 1e5
@@ -122,7 +122,7 @@ def test_start_in_a_singularity_goes_nowhere() -> None:
     assert not found.reached
     assert found.fraction == 0
     assert found.condition > 1e6
-    with pytest.raises(SingularityError, match=r"after 0\.0000% of the way"):
+    with pytest.raises(SingularityError, match=r"after 0\.0000% of the line"):
         forward_kinematics([0.2, 0.2, 0.2], level, G, H)
     with pytest.raises(SingularityError, match="the pose to start from is singular"):
         EncoderTracker(level, G, H)

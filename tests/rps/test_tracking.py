@@ -58,16 +58,16 @@ def test_ways_of_every_length_end_as_those_followed_in_arrays() -> None:
 
 
 def test_number_of_steps_is_kept() -> None:
-    d, way = start(np.array([0.4, 0.1, 0.0]))
+    d, direction = start(np.array([0.4, 0.1, 0.0]))
     goal = (d[0] * 1.5, d[1] * 0.8, d[2] * 1.3)
-    assert 0.0 <= follow(d, way, goal, G, H, 1e6, 2).fraction < 1.0
-    assert follow(d, way, goal, G, H, 1e6, 1000).fraction == 1.0
+    assert 0.0 <= follow(d, direction, goal, G, H, 1e6, 2).fraction < 1.0
+    assert follow(d, direction, goal, G, H, 1e6, 1000).fraction == 1.0
 
 
 def test_condition_is_that_of_the_jacobian_and_infinite_where_it_is_singular() -> None:
-    d, way = start(np.array([0.4, 0.1, -0.3]))
-    angle = np.arctan2(way[3:], way[:3])
+    d, direction = start(np.array([0.4, 0.1, -0.3]))
+    angle = np.arctan2(direction[3:], direction[:3])
     expected = np.linalg.cond(eq.jacobian(d, angle, G, H), np.inf)
-    assert condition_of(d, way, G, H) == pytest.approx(float(expected), rel=1e-12)
+    assert condition_of(d, direction, G, H) == pytest.approx(float(expected), rel=1e-12)
     level, flat = start(np.zeros(3))
     assert condition_of(level, flat, G, H) == math.inf

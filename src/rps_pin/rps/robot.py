@@ -213,7 +213,7 @@ class RPSRobot:
         InputError
             If an argument is not finite, a length not positive, or shapes do not go together.
         SingularityError
-            If a way meets a singularity; says how far along.
+            If a line of lengths meets a singularity; says how far along.
         ClosureError
             If no pose has the lengths; says by how much they miss.
         """

@@ -1,4 +1,4 @@
-"""What the joints of a 3-RPS bear along a motion: in closed form, all samples at once.
+"""Joint reactions of a 3-RPS along a motion, in closed form, all samples at once.
 
 **Leg axes** of leg i are those of its joints' frames in the URDF: x along the leg towards its tip,
 s_i; z across it in the leg's plane, t_i, to where phi grows; y = z x x = -a_i, against the axis a_i
@@ -24,10 +24,18 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.rps.dynamics.force_equations import platform_wrench
 from rps_pin.rps.dynamics.loads import checked_wrench
+from rps_pin.rps.kernels import platform
 from rps_pin.rps.kernels.forces import friction_force
 from rps_pin.rps.kinematics.legs import ACROSS, RADIAL, LegMotion
-from rps_pin.rps.kinematics.pose import PlatformMotion, checked_motion
+from rps_pin.rps.kinematics.pose import (
+    PlatformMotion,
+    checked_motion,
+    components,
+    stacked,
+    tilt_of,
+)
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 
@@ -112,7 +120,7 @@ def joint_reactions(
     """
     x, dx, ddx = checked_motion(pose, rate, acceleration)
     actuator = robot.actuator_forces(x, dx, ddx, wrench=wrench)
-    platform, legs = robot.motion(x, dx, ddx)
+    motion, legs = robot.motion(x, dx, ddx)
     axes = _leg_axes(legs.angle)
     p = robot.parameters
     weight = np.einsum("...ji,j->...i", axes, p.gravity)  # gravity in leg axes
@@ -134,8 +142,8 @@ def joint_reactions(
     tip[..., 0] = actuator - sliding - rod[..., 0]
     tip[..., 2] = -moment / legs.length
     load = None if wrench is None else checked_wrench(wrench, x.shape[:-1])
-    force, couple = _platform_wrench(robot, platform, load)
-    arms = p.platform_radius * RADIAL @ np.swapaxes(platform.rotation, -1, -2)
+    force, couple = _platform_wrench(robot, x, motion, load)
+    arms = p.platform_radius * RADIAL @ np.swapaxes(motion.rotation, -1, -2)
     known = np.einsum("...ij,...j->...i", axes, tip)
     across = _across_planes(arms, force - known.sum(-2), couple - np.cross(arms, known).sum(-2))
     tip[..., 1] = -across  # y is against the joint's axis
@@ -163,25 +171,20 @@ def _point_acceleration(legs: LegMotion, distance: Array, *, sliding: bool) -> A
 
 
 def _platform_wrench(
-    robot: RPSRobot, motion: PlatformMotion, wrench: Array | None
+    robot: RPSRobot, pose: Array, motion: PlatformMotion, wrench: Array | None
 ) -> tuple[Array, Array]:
     """Return what the legs must exert on platform and payload, about its centre, base axes."""
-    p, payload = robot.parameters, robot.payload
-    mass, moment, inertia = p.platform_mass, np.zeros(3), np.array(p.platform_inertia)
-    if payload is not None:
-        mass, moment = mass + payload.mass, payload.first_moment
-        inertia = inertia + payload.inertia_about_platform
-    R, omega, alpha = motion.rotation, motion.angular_velocity, motion.angular_acceleration
-    gamma = motion.acceleration - p.gravity
-    # m gamma + alpha x S + omega x (omega x S);  I alpha + omega x I omega + S x gamma
-    swing = np.cross(alpha, moment) + np.cross(omega, np.cross(omega, moment))
-    local = np.einsum("...ji,...j->...i", R, gamma)
-    turn = alpha @ inertia + np.cross(omega, omega @ inertia) + np.cross(moment, local)
-    force = mass * gamma + np.einsum("...ij,...j->...i", R, swing)
-    couple = np.einsum("...ij,...j->...i", R, turn)
-    if wrench is not None:
-        return force - wrench[..., :3], couple - wrench[..., 3:]
-    return force, couple
+    load = None if wrench is None else np.moveaxis(wrench, -1, 0)
+    x, y, tilt = tilt_of(pose)
+    vectors = motion.acceleration, motion.angular_velocity, motion.angular_acceleration
+    a, omega, alpha = (_vector(vector) for vector in vectors)
+    force, moment = platform_wrench(robot.force_terms, (x, y, tilt), (a, omega, alpha), load)
+    return stacked(*force), stacked(*platform.to_base(x, y, tilt, moment))
+
+
+def _vector(vectors: Array) -> platform.Vector:
+    x, y, z = components(vectors)
+    return x, y, z
 
 
 def _across_planes(arms: Array, force: Array, couple: Array) -> Array:

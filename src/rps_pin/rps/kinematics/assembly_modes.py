@@ -1,4 +1,4 @@
-"""Every way to assemble the 3-RPS for given leg lengths: all real solutions of Eq. 8.
+"""Assembly modes of the 3-RPS for given leg lengths: all real solutions of Eq. 8.
 
 With the tips written as in `rps_pin.rps.kinematics.leg_equations`, leg 1's angle makes f_12 = 0 and
 f_31 = 0 straight lines in the planes of legs 2 and 3, both with the normal (m_1, 2 z_1),
@@ -106,7 +106,7 @@ class AssemblyModes(NamedTuple):
 
 
 def assembly_modes(length: ArrayLike, base_radius: float, platform_radius: float) -> AssemblyModes:
-    """Return every way to assemble the robot with given leg lengths: all real solutions of Eq. 8.
+    """Return the assembly modes of given leg lengths: all real solutions of Eq. 8.
 
     Parameters
     ----------
@@ -353,8 +353,8 @@ def _twins(length: Array, owner: Indices, w: Array, z: Array, g: float, h: float
         np.einsum("nij,nj->ni", jacobian(d.T, angle.T + side * step * right, g, h), right)
         for side in (1, -1)
     )
-    bend = np.einsum("ni,ni->n", left, ahead - behind) / (2 * step)
-    s = -2 * small / np.where(np.abs(bend) < 1e-12 * (g + h), np.inf, bend)
+    curvature = np.einsum("ni,ni->n", left, ahead - behind) / (2 * step)
+    s = -2 * small / np.where(np.abs(curvature) < 1e-12 * (g + h), np.inf, curvature)
     worth = np.abs(s) < 1.0
     twin = (angle.T + s[:, None] * right)[worth].T
     d = d[:, worth]
@@ -403,22 +403,22 @@ def _distinct(
 
 
 def _repeated(
-    owner: Indices, place: Indices, way: Array, det: Array, shape: tuple[int, int]
+    owner: Indices, place: Indices, direction: Array, det: Array, shape: tuple[int, int]
 ) -> tuple[Indices, Indices]:
     """Return triple and place of the solutions that another one, at an earlier place, repeats.
 
-    `way` holds the legs' directions, shape (6, m). Only those are compared that look alike in a
-    projection, which few do.
+    `direction` holds the legs' directions, shape (6, m). Only solutions that are close in a
+    projection, which few are, are compared.
     """
     item = np.full(shape, -1)
     item[owner, place] = np.arange(len(owner))
     shadow = np.full(shape, np.nan)
-    shadow[owner, place] = _PROJECTION @ way
+    shadow[owner, place] = _PROJECTION @ direction
     earlier, later = np.triu_indices(shape[1], 1)
     alike = np.abs(shadow[:, later] - shadow[:, earlier]) < np.abs(_PROJECTION).sum() * _SAME_DOUBLE
     which, pair = np.nonzero(alike)
     first, second = item[which, earlier[pair]], item[which, later[pair]]
-    apart = np.abs(way[:, first] - way[:, second]).max(axis=0)
+    apart = np.abs(direction[:, first] - direction[:, second]).max(axis=0)
     singular = (det[first] < DOUBLE_BELOW) & (det[second] < DOUBLE_BELOW)
     same = apart < np.where(singular, _SAME_DOUBLE, _SAME)
     return which[same], later[pair[same]]

@@ -34,8 +34,8 @@ from rps_pin.validation import one_shape, positive_number, whole_number
 
 #: Largest condition number of Eq. 8's Jacobian through which a pose is followed.
 CONDITION_LIMIT = 1e6
-#: Steps tried before the way counts as ending in a singularity: towards one that ends it, each
-#: covers about a tenth of what is left.
+#: Steps tried before a line counts as ending in a singularity: towards one, each step covers about
+#: a tenth of what is left.
 _MOST_STEPS = 1000
 _SQRT3 = math.sqrt(3.0)
 
@@ -45,13 +45,13 @@ class ForwardKinematics(NamedTuple):
 
     pose: Array
     """``(z, tilt_x, tilt_y)``, shape (..., 3), m and rad, the tilt at most pi; where not `reached`,
-    the last one on the way."""
+    the last one reached."""
     angle: Array
     """Leg angles phi, shape (..., 3), rad, of the pose."""
     reached: Bools
     """Whether the pose has the lengths asked for, shape (...)."""
     fraction: Array
-    """How much of the way was gone, shape (...): 1 where reached."""
+    """Part of the line of lengths that was followed, shape (...): 1 where reached."""
     condition: Array
     """Condition number of Eq. 8's Jacobian at the pose, shape (...)."""
 
@@ -77,19 +77,20 @@ def forward_kinematics(
     base_radius, platform_radius
         The paper's g and h, m.
     errors
-        ``"raise"`` refuses where a way cannot be followed to its end; ``"mask"`` says so in
-        `ForwardKinematics.reached`.
+        ``"raise"`` refuses lengths that cannot be followed to their end; with ``"mask"``
+        `ForwardKinematics.reached` is false there.
     condition_limit
-        Largest condition number of Eq. 8's Jacobian (by leg angles, greatest row sums) on the way.
+        Largest condition number of Eq. 8's Jacobian (by leg angles, greatest row sums) that is
+        followed through.
 
     Raises
     ------
     InputError
         If an argument is not finite, a length not positive, or shapes do not go together.
     SingularityError
-        If a way meets a parallel singularity; says how far along, and how near it came.
+        If a line of lengths meets a parallel singularity; says how far along.
     ClosureError
-        If no pose whatever has the lengths; its `gap` is by how much a tip distance misses, m.
+        If no pose has the lengths; its `gap` is the error of a tip distance, m.
     UnreachableError
         If a leg has no length in a pose of `near`.
     """
@@ -108,8 +109,8 @@ def forward_kinematics(
         first = int(np.argmin(reached))
         where = tuple(int(i) for i in np.unravel_index(first, shape[:-1]))
         _refuse(goal[first], angle[first], fraction[first], condition[first], limit, g, h, where)
-    on_the_way = np.where(reached[:, None], goal, begin + fraction[:, None] * (goal - begin))
-    found = placement_from_angles(on_the_way, angle, g, h).pose
+    there = np.where(reached[:, None], goal, begin + fraction[:, None] * (goal - begin))
+    found = placement_from_angles(there, angle, g, h).pose
     batch = shape[:-1]
     return ForwardKinematics(
         found.reshape(shape),
@@ -229,7 +230,7 @@ class EncoderTracker:
         InputError
             If the reading is not three finite, positive numbers.
         SingularityError
-            If the way to the reading meets a singularity, or is too long for `most_steps`.
+            If the line to the reading meets a singularity, or needs more than `most_steps`.
         """
         goal = _reading(length)
         directions, condition, done = follow(
@@ -239,8 +240,8 @@ class EncoderTracker:
             condition = condition if done > 0.0 else self.condition
             raise SingularityError(
                 f"leg lengths ({goal[0]:.6g}, {goal[1]:.6g}, {goal[2]:.6g}) m cannot be followed "
-                f"in {self._most} steps: {done:.4%} of the way was gone, where the condition is "
-                f"{condition:.3g} (limit {self._limit:.3g}). The last pose is kept",
+                f"in {self._most} steps: {done:.4%} of the line was followed; the condition "
+                f"there is {condition:.3g} (limit {self._limit:.3g}). The last pose is kept",
                 condition,
                 self._limit,
             )
@@ -330,7 +331,7 @@ def _refuse(
             gap,
         )
     raise SingularityError(
-        f"{asked} cannot be reached from the pose given: after {fraction:.4%} of the way a "
+        f"{asked} cannot be reached from the pose given: after {fraction:.4%} of the line a "
         f"parallel singularity is met (condition {condition:.3g}, limit {limit:.3g}). "
         "assembly_modes lists the poses that have such lengths",
         float(condition),

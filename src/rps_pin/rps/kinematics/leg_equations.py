@@ -1,4 +1,4 @@
-"""The leg equations of the 3-RPS (Eq. 8): which leg angles close the robot for given lengths.
+"""Leg equations of the 3-RPS (Eq. 8): the leg angles that close the robot for given lengths.
 
 The equations are in `rps_pin.rps.kernels.leg_equations`: a leg of length d_i at angle phi_i carries
 its tip w_i = d_i cos(phi_i) inwards and z_i = d_i sin(phi_i) up, and the platform keeps its tips

@@ -1,4 +1,4 @@
-"""The legs of the 3-RPS in closed form: lengths, angles and their derivatives (Eq. 6 and 7).
+"""Legs of the 3-RPS: lengths, angles, their derivatives and their limits (Eq. 6 and 7).
 
 Leg i moves in the vertical plane through its radial direction e_i. With the tip at B_i,
 
@@ -200,7 +200,7 @@ def cone_angles(angle: Array, rotation: Array, rest_angle: float = 0.0) -> Array
         ``RPSParameters.spherical_rest_angle``, rad; at 0 the rest axis is the platform's normal.
     """
     axis = _turned(rotation, rest_axes(rest_angle))
-    out, across = ((axis * way).sum(axis=-1) for way in (RADIAL, ACROSS))
+    out, across = ((axis * direction).sum(axis=-1) for direction in (RADIAL, ACROSS))
     cosine, sine = np.cos(angle), np.sin(angle)
     sharp = kernels.cone_sine(cosine, sine, out, across, axis[..., 2])
     angles: Array = np.arctan2(sharp, kernels.cone_cosine(cosine, sine, out, axis[..., 2]))
