@@ -1,7 +1,8 @@
 """Settings of every test, and what several test files share.
 
-Hypothesis draws the same examples each time, and takes its time. The quick reproduction of the
-paper is computed once for all test processes.
+Hypothesis draws the same examples each time, without a deadline. In `assert_allclose` NaN differs
+from NaN, unless a test passes ``equal_nan=True``: results that are NaN on both sides are no
+agreement. The quick reproduction of the paper is computed once for all test processes.
 """
 
 from __future__ import annotations
@@ -9,8 +10,10 @@ from __future__ import annotations
 import fcntl
 import os
 import pickle
+from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, settings
 
@@ -27,6 +30,8 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("rps_pin")
+
+np.testing.assert_allclose = partial(np.testing.assert_allclose, equal_nan=False)
 
 
 @pytest.fixture(scope="session")

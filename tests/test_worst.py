@@ -64,3 +64,9 @@ def test_no_error_is_folded_by_the_built_in_max() -> None:
     files = [path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))]
     found = {str(path.relative_to(ROOT)): blind_folds(path.read_text("utf-8")) for path in files}
     assert {path: lines for path, lines in found.items() if lines} == {}
+
+
+def test_nan_on_both_sides_is_no_agreement() -> None:
+    with pytest.raises(AssertionError):
+        np.testing.assert_allclose([1.0, math.nan], [1.0, math.nan])
+    np.testing.assert_allclose([1.0, math.nan], [1.0, math.nan], equal_nan=True)

@@ -173,7 +173,7 @@ def test_targets_are_off_by_the_sum_of_offsets_or_no_numbers(
         expected = true[0] + np.sum([np.zeros(3), *off], axis=0)
         if any(first <= k < after for first, after in none):
             expected = np.full(3, math.nan)
-        np.testing.assert_allclose(pose, expected, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(pose, expected, rtol=0, atol=1e-14, equal_nan=True)
         np.testing.assert_array_equal(rate, true[1])
         np.testing.assert_array_equal(acceleration, true[2])
         reading = spoilt.reading(k * PERIOD, READINGS[k])

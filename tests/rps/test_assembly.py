@@ -272,7 +272,7 @@ def test_batch_is_the_single_ones() -> None:
         alone = assembly_modes(length[where], 0.5, 0.45)
         k = int(modes.exists[where].sum())
         for whole, single in zip(modes, alone, strict=True):
-            np.testing.assert_allclose(whole[where][:k], single, rtol=0, atol=1e-11)
+            np.testing.assert_allclose(whole[where][:k], single, rtol=0, atol=1e-11, equal_nan=True)
     assert assembly_modes(np.empty((0, 3)), 0.5, 0.45).angle.shape == (0, 16, 3)
 
 
