@@ -103,7 +103,7 @@ def test_sliders_in_the_page(served: BrowserPanel) -> None:
     said = []
     with playwright.sync_playwright() as engine:
         browser = engine.chromium.launch(executable_path=_path(), args=list(ARGUMENTS))
-        page = browser.new_page(viewport={"width": 900, "height": 600})
+        page = browser.new_page(viewport={"width": 900, "height": 400})
         page.on("console", lambda one: said.append(one.text) if one.type == "error" else None)
         page.goto(served.url)
         page.get_by_text("within all limits").wait_for(timeout=60_000)

@@ -24,6 +24,7 @@ def test_the_helix_page_loads_shows_the_robot_and_moves(robot, run, watched, tmp
     page = tmp_path / "viewer.html"
     save_html(page, robot, run, layers=fitting_layers(robot.mechanism), title="a helix")
     watched.page.context.set_offline(True)
+    watched.page.set_viewport_size({"width": 400, "height": 300})
     watched.page.goto(page.as_uri())
     watched.wait("typeof viewer !== 'undefined' && !viewer.needs_render")
     assert watched.page.evaluate("viewer.animator.duration") == pytest.approx(5.2388, abs=1e-3)
