@@ -15,7 +15,7 @@ import umsgpack
 
 from rps_pin import ClosedLoopModel, JointCoupling, RPSRobot, helix
 from rps_pin.closed_loop.visuals import skeleton
-from rps_pin.errors import InputError
+from rps_pin.errors import ClosureError, InputError
 from rps_pin.rps import joint_reactions
 from rps_pin.rps.dynamics.motion_run import run_motion
 from rps_pin.viewer import (
@@ -186,6 +186,38 @@ def test_reactions_of_a_simulation_are_its_own_with_its_wrench():
     np.testing.assert_allclose(
         arrow(placed(recorder)["reactions/knee"]), wrench[:3] / 8.0, rtol=1e-9, atol=1e-12
     )
+
+
+def test_arrows_between_coarse_samples_are_those_of_the_closed_state():
+    """Interpolation opens the loops by more than inverse dynamics accepts."""
+    four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    cranks = four_bar.home[0] + np.array([0.0, 0.15])
+    ends = [four_bar.complete({"crank_joint": crank}, four_bar.home) for crank in cranks]
+    motion = Motion(four_bar.model, [0.0, 1.0], ends)
+    middle = motion.at(0.5)
+    assert four_bar.loop_gap(middle) > 1e-4
+    with pytest.raises(ClosureError):
+        four_bar.inverse_dynamics(middle, np.zeros(3), np.zeros(3))
+    layers = [Forces(newton_metres_per_metre=2.0), Reactions(8.0)]
+    view, recorder = shown(four_bar, motion, layers=layers)
+    view.show_moment(0.5)
+    found, closed = placed(recorder), four_bar.close(middle)
+    expected = four_bar.inverse_dynamics(closed, np.zeros(3), np.zeros(3))
+    length = np.linalg.norm(arrow(found["forces/crank_joint"]))
+    assert length == pytest.approx(abs(expected.tau[0]) / 2.0, rel=1e-9)
+    wrench = four_bar.closure_wrenches(closed, expected.constraint_forces)["knee"]
+    reaction = np.linalg.norm(arrow(found["reactions/knee"]))
+    assert reaction == pytest.approx(np.linalg.norm(wrench[:3]) / 8.0, rel=1e-2)
+
+
+def test_a_visibly_open_mechanism_has_no_arrows():
+    four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    view, recorder = shown(four_bar, layers=["forces", "reactions"])
+    assert np.linalg.norm(arrow(placed(recorder)["forces/crank_joint"])) > 0.01
+    view.display(four_bar.home + np.array([0.3, 0.0, 0.0]))
+    found = placed(recorder)
+    for node in ("forces/crank_joint", "reactions/knee"):
+        assert np.linalg.norm(arrow(found[node])) < 1e-5
 
 
 def test_torques_have_two_heads_and_lie_along_the_axis():

@@ -13,10 +13,10 @@ from rps_pin.arrays import Array
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.panel.panel import Slider, quantity, slider_values
 from rps_pin.rps.kinematics.legs import cone_angles, violations
-from rps_pin.rps.kinematics.pose import checked_pose
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.measures import singularity_measures
+from rps_pin.validation import real_vector
 
 _MM, _DEGREE = 1e3, 180.0 / math.pi
 _STILL = np.zeros(3)
@@ -49,9 +49,7 @@ class RPSPanel:
     def __init__(self, robot: RPSRobot, pose: ArrayLike | None = None) -> None:
         self.robot, self.mechanism = robot, robot.mechanism
         self._free = RPSRobot(robot.parameters.without_limits()).with_payload(robot.payload)
-        start = _middle(robot.parameters) if pose is None else checked_pose(pose)
-        if start.shape != (3,):
-            raise InputError(f"pose has shape {start.shape}; it must be (3,)")
+        start = _middle(robot.parameters) if pose is None else real_vector(pose, 3, "pose")
         self.groups = _groups(robot.parameters, float(start[0]))
         self.trouble: list[str] = []
         self._take(start)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError
+from rps_pin.errors import ClosureError, InfeasibleError, InputError, SingularityError
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState
 from rps_pin.viewer.layers.colours import css
 from rps_pin.viewer.layers.parts import SMALLEST, pointing
@@ -19,6 +19,10 @@ from rps_pin.viewer.scene.stage import length_text, round_number
 
 Vectors = Mapping[str, tuple[Array, Array]]
 """Origin of each arrow, m, and the force or moment that it shows, by node."""
+NO_FORCES = (ClosureError, InfeasibleError, SingularityError)
+"""Errors of states without determined forces: their arrows are not drawn."""
+_UNSEEN_GAP = 1e-2
+"""Gap of the closures between samples of a motion that is closed here, in radii of the picture."""
 
 _LONGEST = 0.7
 """Length of the longest arrow, at most, in radii of the picture."""
@@ -91,6 +95,17 @@ def draw_arrows(
     most = ", ".join(f"at most {greatest[unit]:.3g} {unit}" for unit in per_metre)
     entry = LegendEntry(name, f"{title}{at_rest}: {lengths}; {most}", css(colour))
     return DrawnLayer(entry, parts, update)
+
+
+def closed_state(context: LayerContext, state: MotionState) -> MotionState:
+    """Return a state with closed loops: interpolation between samples opens them a little.
+
+    A state with a gap that can be seen is returned as it is.
+    """
+    mechanism = context.subject.mechanism
+    if mechanism.loop_gap(state.q) > _UNSEEN_GAP * context.radius:
+        return state
+    return state._replace(q=mechanism.close(state.q))
 
 
 def _scale(layer: str, given: float | None, greatest: float, radius: float) -> float:

@@ -14,8 +14,7 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.errors import SingularityError
-from rps_pin.viewer.layers.arrows import ArrowKind, Vectors, draw_arrows
+from rps_pin.viewer.layers.arrows import NO_FORCES, ArrowKind, Vectors, closed_state, draw_arrows
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, RobotSizedLayer
 from rps_pin.viewer.layers.colours import ORANGE
 from rps_pin.viewer.layers.parts import arrow, double_arrow
@@ -48,8 +47,9 @@ class Forces(RobotSizedLayer):
             try:
                 tau = state.tau
                 if tau is None:
-                    tau = mechanism.inverse_dynamics(*state[:3], wrenches=outside).tau
-            except SingularityError:
+                    q, v, a = closed_state(context, state)[:3]
+                    tau = mechanism.inverse_dynamics(q, v, a, wrenches=outside).tau
+            except NO_FORCES:
                 return {}
             pin.computeJointJacobians(model, data, state.q)
             return {

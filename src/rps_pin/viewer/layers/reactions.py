@@ -5,17 +5,15 @@ Where constraint rows are redundant the reactions are not unique; those of least
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
-from rps_pin.errors import InputError, SingularityError
-from rps_pin.viewer.layers.arrows import ArrowKind, Vectors, draw_arrows
+from rps_pin.closed_loop import LoopClosure
+from rps_pin.errors import InputError
+from rps_pin.viewer.layers.arrows import NO_FORCES, ArrowKind, Vectors, closed_state, draw_arrows
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, RobotSizedLayer
 from rps_pin.viewer.layers.colours import SKY
 from rps_pin.viewer.layers.parts import arrow
@@ -38,7 +36,7 @@ class Reactions(RobotSizedLayer):
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the arrows; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
-        data, outside = model.createData(), context.motion.wrenches
+        data = model.createData()
         frames = {
             closure.name: closure.frame_ids(model)[0]
             for closure in mechanism.closures
@@ -49,8 +47,8 @@ class Reactions(RobotSizedLayer):
 
         def vectors(state: MotionState) -> Vectors:
             try:
-                forces = _constraint_forces(mechanism, state, outside)
-            except SingularityError:
+                forces = _constraint_forces(context, state)
+            except NO_FORCES:
                 return {}
             wrenches = mechanism.closure_wrenches(state.q, forces)
             pin.framesForwardKinematics(model, data, state.q)
@@ -66,12 +64,11 @@ class Reactions(RobotSizedLayer):
         )
 
 
-def _constraint_forces(
-    mechanism: ClosedLoopModel, state: MotionState, wrenches: Mapping[str, ArrayLike]
-) -> Array:
-    q, v, a, tau, known = state
-    if known is not None:
-        return known
+def _constraint_forces(context: LayerContext, state: MotionState) -> Array:
+    if state.constraint_forces is not None:
+        return state.constraint_forces
+    mechanism, wrenches = context.subject.mechanism, context.motion.wrenches
+    q, v, a, tau, _ = closed_state(context, state)
     if tau is not None:
         return mechanism.constraint_forces(q, v, a, tau, wrenches=wrenches)
     return mechanism.inverse_dynamics(q, v, a, wrenches=wrenches).constraint_forces
