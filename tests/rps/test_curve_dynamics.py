@@ -37,15 +37,15 @@ def test_terms_make_up_the_forces_of_the_constraint_models(
     u = rng.uniform(0, along.curve.length, 20)
     square, acceleration = rng.uniform(0, 0.1, 20), rng.normal(size=20)
     terms, (friction, _) = along.terms(u), along.friction(u, square)
-    force = terms.mass * acceleration[:, None] + terms.swing * square[:, None]
-    force += terms.weight + friction
+    force = terms.inertia * acceleration[:, None] + terms.velocity_product * square[:, None]
+    force += terms.holding + friction
     motion = along.sample(u, square, acceleration)
     q, v, a = along.robot.state(*motion)
     for i in range(20):
         expected = along.robot.inverse_dynamics(q[i], v[i], a[i], wrench=WRENCH).tau
         np.testing.assert_allclose(force[i], expected, atol=1e-9)
     speed = along.robot.motion(*motion)[1].speed
-    np.testing.assert_allclose(terms.lengths * np.sqrt(square)[:, None], speed, atol=1e-12)
+    np.testing.assert_allclose(terms.length_slope * np.sqrt(square)[:, None], speed, atol=1e-12)
     use = along.use(motion)
     np.testing.assert_allclose(use.force * 30.0, force, atol=1e-9)
     np.testing.assert_allclose(use.speed * 0.5, speed, atol=1e-12)

@@ -424,7 +424,7 @@ def test_a_search_that_does_not_end_returns_nothing(monkeypatch: pytest.MonkeyPa
     rough = RPSRobot(MICRO.parameters.replace(prismatic_friction=2.0))
     line = LineCurve([0.215, 0.05, 0.0], [0.235, -0.05, 0.1])
     few = range(2)
-    with pytest.raises(RPSPinError, match="friction does not settle"):
+    with pytest.raises(RPSPinError, match="friction does not converge"):
         time_optimal(rough, line, progress=lambda _: few[:1])
     with pytest.raises(RPSPinError, match=r"keeps the limits to 1e-06.*exceeds one by"):
         time_optimal(MICRO, line, limits=ActuatorLimits(20.0), progress=lambda _: few[:1])

@@ -1,11 +1,11 @@
-"""What running along a curve asks of the actuators, as functions of place, rate and acceleration.
+"""Actuator forces and speeds of a motion along a curve, by the curve's parameter u and its rates.
 
 Along a curve x(u), the actuator forces and the legs' speeds are
 
     F = m(u) u'' + c(u) u'^2 + g(u) + friction(u, u'),    d' = d_u(u) u'.
 
-All come from `RPSRobot.actuator_forces`. Without friction, forces do not change when the motion is
-run through backwards; friction changes its sign. That tells the two apart.
+All come from `RPSRobot.actuator_forces`. Reversing the motion changes the sign of friction, and
+leaves the other forces as they are: this separates the two.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _STEP = 1e-5
 
 
 class LimitUse(NamedTuple):
-    """How much of the actuators' limits a motion uses: 1 is at the limit."""
+    """Forces and speeds over their limits: 1 is at the limit."""
 
     force: Array
     """Force over its limit, shape (..., 3); positive pushes the leg out."""
@@ -35,42 +35,42 @@ class LimitUse(NamedTuple):
 
     @property
     def sides(self) -> Array:
-        """Use of each limit: 3 pushes, 3 pulls, 3 speeds either way, shape (..., 9)."""
+        """Use of each limit: 3 pushes, 3 pulls, 3 speeds in either direction, shape (..., 9)."""
         return np.concatenate([self.force, -self.force, np.abs(self.speed)], axis=-1)
 
     @property
     def most(self) -> Array:
-        """Use of the limit that is used most, shape (...)."""
+        """The largest of them, shape (...)."""
         most: Array = self.sides.max(axis=-1)
         return most
 
 
 class CurveTerms(NamedTuple):
-    """Terms of the forces at places of a curve, shape (..., 3) each; N, m and the curve's unit."""
+    """Terms of the forces at points of a curve, shape (..., 3) each; N, m and the curve's unit."""
 
-    mass: Array
+    inertia: Array
     """m: force by u''."""
-    swing: Array
+    velocity_product: Array
     """c: force by u'^2."""
-    weight: Array
-    """g: what holding still takes, against gravity and the wrench."""
-    lengths: Array
-    """d_u: derivative of the leg lengths."""
+    holding: Array
+    """g: force at rest, against gravity and the wrench."""
+    length_slope: Array
+    """d_u: derivative of the leg lengths by u."""
 
 
 class CurveDynamics:
-    """A robot that runs along a curve.
+    """The actuator forces and speeds of a robot that moves along a curve.
 
     Parameters
     ----------
     robot
         The 3-RPS, with its payload and friction.
     curve
-        Where it runs.
+        The curve.
     limits
         Of its actuators.
     wrench
-        On the platform, all along, shape (6,), or none.
+        Constant wrench on the platform, shape (6,), or None.
     """
 
     def __init__(
@@ -85,17 +85,17 @@ class CurveDynamics:
         """Return the terms at parameters of shape (...)."""
         x, first, second = self.curve.at(u)
         still = np.zeros_like(x)
-        weight = self._forces(x, still, still)
+        holding = self._forces(x, still, still)
         there, back = self._forces(x, first, second), self._forces(x, -first, second)
         return CurveTerms(
-            self._forces(x, still, first) - weight,
-            (there + back) / 2 - weight,
-            weight,
+            self._forces(x, still, first) - holding,
+            (there + back) / 2 - holding,
+            holding,
             np.einsum("...ij,...j->...i", self._length_jacobian(x), first),
         )
 
     def friction(self, u: Array, square: Array) -> tuple[Array, Array]:
-        """Return what friction takes at u'^2 of shape (...), and its slope by u'^2, (..., 3)."""
+        """Return the force of friction at u'^2 of shape (...), and its slope by u'^2, (..., 3)."""
         x, first, _ = self.curve.at(u)
         rate = np.sqrt(square)[..., None]
         more = self._friction(x, first * rate * (1 + _STEP))
@@ -106,7 +106,7 @@ class CurveDynamics:
         return self._friction(x, first * rate), slope
 
     def use(self, motion: PathSample) -> LimitUse:
-        """Return how much of the limits a sampled motion uses."""
+        """Return forces and speeds of a sampled motion over their limits."""
         force = self._forces(*motion)
         speed = self.robot.motion(*motion)[1].speed
         return LimitUse(force / self.limits.force, speed / self.limits.speed)
@@ -115,8 +115,8 @@ class CurveDynamics:
         """Return the motion at parameters, u'^2 and u'' of shape (...)."""
         x, first, second = self.curve.at(u)
         rate = first * np.sqrt(square)[..., None]
-        bend = second * square[..., None]
-        return PathSample(x, rate, first * acceleration[..., None] + bend)
+        change = first * acceleration[..., None] + second * square[..., None]
+        return PathSample(x, rate, change)
 
     def _forces(self, x: Array, rate: Array, acceleration: Array) -> Array:
         return self.robot.actuator_forces(x, rate, acceleration, wrench=self.wrench)

@@ -17,10 +17,10 @@ from rps_pin.rps.singularity.path_refusal import PathWords, require_clear
 from rps_pin.trajectories.curve import Curve
 from rps_pin.trajectories.path import PathSample
 
-#: At how many places a curve is looked at for standing still, and for what holding it takes.
-_LOOKS = 4001
-#: A tangent of this part of the longest is none, with a bend of this part of it per length.
-_NO_TANGENT, _NO_BEND = 1e-6, 1e-2
+#: Points of a curve at which its derivatives and its holding forces are checked.
+_POINTS = 4001
+#: First and second derivatives are zero below these parts of the largest first derivative.
+_NO_TANGENT, _NO_CURVATURE = 1e-6, 1e-2
 #: Width of the brackets of `check_path`, over the curve's length.
 _BRACKET = 1e-9
 
@@ -40,26 +40,26 @@ class _AsTrajectory:
 
 
 def ends_at_rest(robot: RPSRobot, curve: Curve) -> tuple[bool, bool]:
-    """Return at which ends the rate u' must vanish: not where the curve's tangent does.
+    """Return at which ends the rate u' must be zero: where the curve has a tangent.
 
-    There, the robot rests whatever the rate is, as long as the curve bends.
+    Without a tangent the robot is at rest at any rate, if the second derivative is not zero.
 
     Raises
     ------
     InputError
-        If a curve stands still: it has neither a tangent nor a bend at some place. No finite rate
-        runs through it in the shortest time.
+        If first and second derivatives of the curve are zero at some point: the rate of the
+        shortest time is infinite there.
     """
-    u = np.linspace(0.0, curve.length, _LOOKS)
+    u = np.linspace(0.0, curve.length, _POINTS)
     _, first, second = curve.at(u)
     size = np.array([1 / robot.parameters.platform_radius, 1.0, 1.0])
     tangent = np.linalg.norm(first * size, axis=-1)
-    bend = np.linalg.norm(second * size, axis=-1) * curve.length
+    curvature = np.linalg.norm(second * size, axis=-1) * curve.length
     longest = tangent.max()
     if not longest > 0:
         raise InputError(f"the pose is the same all along {curve!r}: nothing moves")
     without = tangent <= _NO_TANGENT * longest
-    still = without & (bend <= _NO_BEND * longest)
+    still = without & (curvature <= _NO_CURVATURE * longest)
     if still.any():
         raise InputError(
             f"the curve stands still at u = {u[np.argmax(still)]:.6g} of {curve.length:.6g}: its "
@@ -109,15 +109,15 @@ def _with_lengths(p: RPSParameters, length: tuple[float, float]) -> RPSParameter
 
 
 def infeasible(dynamics: CurveDynamics) -> InfeasibleError:
-    """Return the error of a curve without any law of time: what holding still asks too much.
+    """Return the error of a curve without a time law: the forces at rest exceed their limit.
 
-    Where holding still is possible all along, so is moving slowly enough, also against friction.
+    If holding is possible at every point, so is a motion that is slow enough, also with friction.
     """
     limit = dynamics.limits.force
-    u = np.linspace(0.0, dynamics.curve.length, _LOOKS)
-    weight = dynamics.terms(u).weight
-    place, leg = np.unravel_index(int(np.abs(weight).argmax()), weight.shape)
-    force, actuator = float(weight[place, leg]), f"actuator {leg + 1}"
+    u = np.linspace(0.0, dynamics.curve.length, _POINTS)
+    holding = dynamics.terms(u).holding
+    place, leg = np.unravel_index(int(np.abs(holding).argmax()), holding.shape)
+    force, actuator = float(holding[place, leg]), f"actuator {leg + 1}"
     z, tilt_x, tilt_y = dynamics.curve.at(u[place]).pose
     where = (
         f"at u = {u[place]:.6g} of {dynamics.curve.length:.6g} (z = {z:.6g} m, tilt = "
@@ -125,11 +125,11 @@ def infeasible(dynamics: CurveDynamics) -> InfeasibleError:
     )
     if abs(force) <= limit:
         return InfeasibleError(
-            f"no law of time was found that keeps forces of {limit:.6g} N, though holding still "
+            f"no time law was found that keeps forces of {limit:.6g} N, although holding "
             f"takes at most {abs(force):.6g} N, of {actuator} {where}"
         )
     return InfeasibleError(
-        f"no law of time keeps the actuators' limits from rest to rest: {where}, {actuator} needs "
+        f"no time law keeps the actuators' limits from rest to rest: {where}, {actuator} needs "
         f"{force:.6g} N to hold still, and its limit is {limit:.6g} N",
         [LimitExcess(actuator, force, math.copysign(limit, force), "N")],
     )

@@ -7,15 +7,15 @@ With b = u'^2 and a = u'', what limits forces and speeds along a curve reads, at
 and the time, the integral of du / sqrt(b), is convex in b (Verscheure et al. 2009,
 "Time-Optimal Path Tracking for Robots: A Convex Optimization Approach"). The unknowns are those of
 a `SpeedProfile`: b at the knots, and its bump in each piece. On each piece, a is a straight line,
-so that a motion at a limit is met to second order between few places where it is kept.
+so that few points where limits are imposed follow a motion at a limit to second order.
 
-The integral is replaced by a sum, of weights w_j > 0: Simpson's rule, and for a piece from or to
-rest, where 1 / sqrt(b) is infinite, Gauss's for the weight 1 / sqrt(s). Each 1 / sqrt(b_j) is made
-by two second-order cones:
+The integral is replaced by a sum with weights w_j > 0: Simpson's rule, and for a piece from or to
+rest, where 1 / sqrt(b) is infinite, Gauss's rule for the weight 1 / sqrt(s). Each 1 / sqrt(b_j) is
+modelled by two second-order cones:
 
     d_j >= 1 / c_j,   c_j^2 <= b_j.
 
-Clarabel solves this to a duality gap: the least sum there is, not a local one.
+Clarabel solves this to a duality gap: the minimum is global.
 """
 
 from __future__ import annotations
@@ -75,24 +75,24 @@ def fastest_profile(
     knots
         Of the profile, shape (n + 1,), n of 2 or more.
     limits
-        What it must keep.
+        The limits.
     rest
         Whether it starts, and whether it ends, with the rate zero. Otherwise that rate is free.
     guess
-        Of what size b is at the knots, shape (n + 1,), positive but where it rests: the solver's
-        units. A wrong size is corrected.
+        Magnitude of b at the knots, shape (n + 1,), positive except at rest: the solver's units. A
+        wrong magnitude is corrected.
 
     Raises
     ------
     RPSPinError
-        If the solver comes to no result.
+        If the solver does not converge.
     """
     size = 1.0
     for _ in range(_MOST_SIZES):
         program = _Program(knots, limits, rest, size * guess)
         found = program.solved()
         if found.status in _INFEASIBLE:
-            # So it may seem where b is far too large.
+            # The solver may report this if b is far too large.
             if size * _SMALLER < _SMALLEST:
                 return None
             size *= _SMALLER

@@ -1,8 +1,6 @@
-"""A motion at the limits of its actuators: which limit it reaches when."""
+"""Motions at the limits of their actuators, as `time_optimal` returns them."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,13 +26,13 @@ class LimitedMotion(TimedCurve):
     Attributes
     ----------
     curve : Curve
-        Where the robot goes.
+        The curve of poses.
     law : SpeedProfile
-        When; its pieces, and the squared rate at their ends.
+        Its time law: pieces, and the squared rate at their ends.
     robot : RPSRobot
-        Who goes.
+        The robot.
     limits : ActuatorLimits
-        What is kept.
+        The limits of its actuators.
     """
 
     law: SpeedProfile
@@ -45,19 +43,19 @@ class LimitedMotion(TimedCurve):
 
     @property
     def robot(self) -> RPSRobot:
-        """Who goes."""
+        """The robot."""
         return self._dynamics.robot
 
     @property
     def limits(self) -> ActuatorLimits:
-        """What is kept."""
+        """The limits of its actuators."""
         return self._dynamics.limits
 
     def __repr__(self) -> str:
         return f"LimitedMotion({self.curve!r}, {self.law!r})"
 
     def use(self, t: ArrayLike) -> LimitUse:
-        """Return how much of the limits is used at times of shape (...), s.
+        """Return forces and speeds over their limits at times of shape (...), s.
 
         Raises
         ------
@@ -80,17 +78,15 @@ class LimitedMotion(TimedCurve):
         return reached
 
     def shares(self, within: float = ACTIVE, samples: int = 10_001) -> dict[str, float]:
-        """Return for what share of the time each limit is reached, and none (``"none"``)."""
+        """Return the share of the time at each limit, and at none (``"none"``)."""
         reached = self.active(np.linspace(0.0, self.duration, samples), within)
         found = dict(zip(SIDES, reached.mean(axis=0).tolist(), strict=True))
         return found | {"none": float((~reached.any(axis=-1)).mean())}
 
     def report(self) -> str:
-        """Return a few lines to read: the time, and how long each limit is reached."""
-        return "\n".join(self._lines())
-
-    def _lines(self) -> Iterator[str]:
-        yield f"{self.duration:.6g} s, {len(self.law.bump)} pieces; at a limit to {ACTIVE:.1%}:"
-        for name, share in self.shares().items():
-            if share > 0:
-                yield f"  {name:<17} {share:7.2%} of the time"
+        """Return the duration, and the share of the time at each limit, as text."""
+        shares = self.shares().items()
+        return "\n".join(
+            [f"{self.duration:.6g} s, {len(self.law.bump)} pieces; at a limit to {ACTIVE:.1%}:"]
+            + [f"  {name:<17} {share:7.2%} of the time" for name, share in shares if share > 0]
+        )

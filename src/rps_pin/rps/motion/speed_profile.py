@@ -1,4 +1,4 @@
-"""The speed at which a curve is run through, as a function of the place: and when one is where.
+"""Speed profiles: time laws u(t) given by the squared rate as a function of the parameter u.
 
 On pieces of the parameter u, the squared rate b = u'^2 is a parabola, so that the acceleration
 u'' = b'/2 is a straight line in u, u'' = alpha + kappa s, with s from the piece's beginning. That
@@ -26,28 +26,28 @@ from rps_pin.validation import real_array
 
 
 class SpeedProfile:
-    """A law of time whose squared rate is continuous, and a parabola on each piece of u.
+    """A time law whose squared rate is continuous, and a parabola on each piece of u.
 
     Parameters
     ----------
     knots
-        Where the pieces begin, and the end; increasing from 0, shape (n + 1,), in the unit of u.
+        Ends of the pieces; increasing from 0, shape (n + 1,), in the unit of u.
     squared
         b = u'^2 at the knots, shape (n + 1,); zero at most at the two ends.
     bump
-        How far b is above its chord in the middle of each piece, shape (n,).
+        Height of b above its chord in the middle of each piece, shape (n,).
 
     Attributes
     ----------
     knots, squared, bump : arrays
         As given, read-only.
     times : (n + 1,) array
-        When the knots are met, s; read-only.
+        Times of the knots, s; read-only.
 
     Raises
     ------
     InputError
-        If shapes do not fit, knots do not increase from 0, or the motion would stop on its way.
+        If shapes do not fit, knots do not increase from 0, or the rate is zero between the ends.
     """
 
     def __init__(self, knots: ArrayLike, squared: ArrayLike, bump: ArrayLike) -> None:
@@ -75,7 +75,7 @@ class SpeedProfile:
 
     @property
     def length(self) -> float:
-        """Where u ends."""
+        """Largest u."""
         return float(self.knots[-1])
 
     @property
@@ -144,7 +144,7 @@ class SpeedProfile:
         end = self._start[-1] + self._slope[-1] * self._width[-1]
         stuck = (self.squared[0] == 0 and self._start[0] <= 0) or (self.squared[-1] == 0 <= end)
         if (inner <= 0).any() or (self.squared < 0).any() or stuck or (least[turns] <= 0).any():
-            raise InputError("the squared rate of a speed profile must be positive on its way")
+            raise InputError("the squared rate of a speed profile must be positive inside")
 
 
 def _vector(values: ArrayLike, name: str) -> Array:

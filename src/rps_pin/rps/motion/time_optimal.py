@@ -2,10 +2,10 @@
 
 With forces F = m u'' + c u'^2 + g + friction, and speeds d_u u' (see `curve_dynamics`), limits of
 forces and speeds are linear in u'' and u'^2, and the shortest time is a convex program (see
-`fastest_profile`). Around it goes a loop, until the motion is as wanted (see `time_search`).
+`fastest_profile`), which is solved repeatedly (see `time_search`).
 
 A motion is returned only if `RPSRobot.actuator_forces` and the legs' speeds keep the limits to
-`KEPT`, within the pieces of its law of time and at some 20,000 times.
+`KEPT`, within the pieces of its time law and at some 20,000 times.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Protocol
 
 from numpy.typing import ArrayLike
@@ -28,6 +27,7 @@ from rps_pin.rps.motion.time_search import KEPT, MOST_ROUNDS, TimeSearch
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.curve import Curve, CurveSample
 from rps_pin.trajectories.path import Trajectory
+from rps_pin.validation import whole_number
 
 __all__ = ["INTERVALS", "KEPT", "time_optimal"]
 
@@ -72,40 +72,39 @@ def time_optimal(
     robot
         The 3-RPS, with its payload and friction.
     path
-        A curve; or what has one (`TimedCurve`, `HelixPath`: their laws of time are not used); or a
+        A curve; or what has one (`TimedCurve`, `HelixPath`: their time laws are not used); or a
         trajectory, which is taken as a curve in its own time. A curve whose second derivative jumps
         should have the parameters where it does in an attribute ``knots``: otherwise the time found
         can be a per cent too long.
     limits
         Of the actuators' forces and speeds, and of the legs' lengths; the robot's if left out.
     wrench
-        What something outside exerts on the platform all along: force (N) in base axes and moment
-        (N m) about the platform's centre, shape (6,).
+        Constant external wrench on the platform: force (N) in base axes and moment (N m) about the
+        platform's centre, shape (6,).
     intervals
         Pieces of the speed profile at first, 8 or more. Those where it matters are divided.
     progress
-        Wraps the loop over the rounds, for a progress bar; few of the rounds are needed.
+        Wraps the loop over the rounds, for a progress bar; few of the rounds are used.
 
     Returns
     -------
     LimitedMotion
-        A `TimedCurve`, which knows how much of the limits it uses when. They are kept to `KEPT`.
+        A `TimedCurve` with its use of the limits, which are kept to `KEPT`.
 
     Raises
     ------
     InputError
-        If there is no shortest time (no limit of force), a limit of power is given, the path is no
-        path, or it stands still somewhere.
+        If there is no shortest time (no limit of force), a limit of power is given, the path is not
+        a path, or its first and second derivatives are zero at some point.
     UnreachableError, SingularityError
         If the curve leaves the workspace, or meets a singularity; says at which u.
     InfeasibleError
-        If no law of time keeps the limits; says where, which actuator, and by how much.
+        If no time law keeps the limits; says where, which actuator, and by how much.
     RPSPinError
-        If no motion is found that keeps the limits to `KEPT`, or friction does not settle.
+        If no motion is found that keeps the limits to `KEPT`, or friction does not converge.
     """
     bounds = _checked_limits(ActuatorLimits.of(robot.parameters) if limits is None else limits)
-    if not isinstance(intervals, Integral) or isinstance(intervals, bool) or intervals < 8:
-        raise InputError(f"intervals = {shown(intervals)}: it must be a whole number of 8 or more")
+    whole_number(intervals, "intervals", least=8)
     curve = _curve_of(path)
     load = None if wrench is None else checked_wrench(wrench, ())
     rest = ends_at_rest(robot, curve)

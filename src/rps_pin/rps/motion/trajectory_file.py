@@ -94,7 +94,7 @@ def described_trajectory(file: YamlFile, folder: Path, robot: RPSRobot) -> Traje
 
 
 def _made(file: YamlFile, described: Described, folder: Path, robot: RPSRobot) -> Trajectory:
-    """Return the trajectory with its own law of time."""
+    """Return the trajectory with its own time law."""
     keys = described.model_dump(exclude={"kind", "fastest"}, exclude_none=True)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
