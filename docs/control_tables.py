@@ -81,7 +81,9 @@ def controllers(start: Any, robot: RPSRobot) -> dict[str, Make]:
     pose = effective_inertia(robot, start, space="task")
     return {
         "PD, gravity compensated (actuator)": lambda r: PDControl(r, start, pd.times(legs)),
-        "the same in task space": lambda r: PDControl(r, start, pd.times(pose), space="task"),
+        "PD, gravity compensated (task)": lambda r: PDControl(
+            r, start, pd.times(pose), space="task"
+        ),
         "PID, gravity compensated (actuator)": lambda r: PDControl(r, start, placed.times(legs)),
         "PID, feed-forward (actuator)": lambda r: PDControl(
             r, start, placed.times(legs), compensation="feed_forward"
@@ -100,12 +102,12 @@ def plants(p: RPSParameters) -> dict[str, tuple[RPSRobot, RPSRobot, dict[str, An
     heavy = RPSRobot(wrong_parameters(p, masses=1.2))
     all_wrong = RPSRobot(wrong_parameters(p, masses=1.2, **more))
     return {
-        "as believed": (robot, robot, {}),
-        "a tick of delay": (robot, robot, {"delay": 1}),
+        "correct model": (robot, robot, {}),
+        "delay of one tick": (robot, robot, {"delay": 1}),
         "encoders": (robot, robot, {"encoders": ENCODERS}),
         "masses +20 %": (robot, heavy, {}),
         "unknown friction": (robot, RPSRobot(with_friction), {}),
-        "all, friction known but for 20 %": (
+        "all, friction known to 20 %": (
             RPSRobot(with_friction),
             all_wrong,
             {"delay": 1, "encoders": ENCODERS},
@@ -148,8 +150,8 @@ def micro() -> str:
 def margins() -> str:
     """Return the margins of these and other gains."""
     lines = [
-        "| bandwidth | integral | cut-off | delay | gain may change by | phase | delay more | "
-        "modulus |",
+        "| bandwidth | integral | cut-off | delay | gain margins | phase margin | delay margin | "
+        "modulus margin |",
         "|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
     for bandwidth, cut_off in ((10.0, 50.0), (15.0, 100.0), (20.0, 200.0), (30.0, None)):
@@ -174,7 +176,7 @@ def robustness() -> str:
     placed = Gains.placed(BANDWIDTH, integral=INTEGRAL)
     (kp, *_), (kd, *_), (ki, *_) = placed.rows
     m = loop_margins(kp, kd, ki, delay=1, cut_off=100.0)
-    lines = ["| loop gain over the design's | centre (um) / orientation (urad) at the end |"]
+    lines = ["| loop gain relative to the design | final error: centre (um) / orientation (urad) |"]
     lines.append("|---:|---:|")
     for factor in (1.05 * m.gain_down, 1.0, 0.95 * m.gain_up, 1.05 * m.gain_up):
         believed = RPSRobot(wrong_parameters(robot.parameters, masses=factor))
@@ -193,7 +195,7 @@ def faults() -> str:
     run = scenario.run()
     errors = TrackingErrors.of(run)
     centre = 1e6 * np.linalg.norm(errors.centre, axis=1)
-    lines = ["| fault | status | in words | centre's error after it |", "|---|---|---|---:|"]
+    lines = ["| fault | status | message | error of the centre |", "|---|---|---|---:|"]
     for fault in scenario.faults:
         here = (run.time >= fault.start - 1e-9) & (run.time < fault.start + 0.3)
         names = list(dict.fromkeys(status_name(int(one)) for one in run.status[here] if one))
@@ -205,7 +207,7 @@ def faults() -> str:
             f"{centre[here].max():.3g} um |"
         )
     worst = np.abs(run.command).max()
-    lines += ["", f"Largest force sent in the whole run: {worst:.4g} N; all were finite: "]
+    lines += ["", f"Largest force of the run: {worst:.4g} N; all finite: "]
     lines[-1] += f"{bool(np.isfinite(run.command).all())}."
     save_figure_named(run, "control_faults")
     return "\n".join(lines)
@@ -217,10 +219,10 @@ def saturation() -> str:
     path = scenario.trajectory
     dense = path.sample(np.linspace(0.0, path.duration, 20_001)).pose
     lines = [
-        "| targets | largest distance from the path | arrives at | ticks at a limit |",
+        "| setpoint | largest distance from the path | arrival | saturated ticks |",
         "|---|---:|---:|---:|",
     ]
-    for name, paced in (("by the clock", False), ("at the controller's pace", True)):
+    for name, paced in (("at constant pace", False), ("at the controller's pace", True)):
         entry = scenario.entry
         changed = entry.model_copy(
             update={"controller": entry.controller.model_copy(update={"paced": paced})}
@@ -235,9 +237,9 @@ def saturation() -> str:
 
 
 def distance_from(run: LoopRun, path: Any, h: float) -> float:
-    """Return how far the balls are from the path as a curve, at most, root mean square of three, m.
+    """Return the largest distance of the tips from the curve of the path, RMS of three, m.
 
-    Tilts count by the balls' motion: h / sqrt(2) for each.
+    Tilts are weighted by the motion of the tips: h / sqrt(2).
     """
     scale = np.array([1.0, h / np.sqrt(2), h / np.sqrt(2)])
     apart = [np.linalg.norm((pose - path) * scale, axis=1).min() for pose in run.pose[::2]]
@@ -264,10 +266,10 @@ def latency() -> str:
         [
             *lines,
             "",
-            f"us a tick; {measured['machine']}. A tick's p99.9 is {tails[0]} times its median, in "
-            f"the quietest tenth of the run {tails[1]} times. A sum that is always the same, and "
-            f"takes as long, has {tails[2]} and {tails[3]}: that is the machine, a virtual one "
-            "that shares its cores.",
+            f"us per tick; {measured['machine']}. p99.9 of a tick is {tails[0]} times its median, "
+            f"and {tails[1]} times in the quietest tenth of the run. For a constant sum of equal "
+            f"duration the ratios are {tails[2]} and {tails[3]}: they are due to the machine, a "
+            "virtual one with shared cores.",
         ]
     )
 
