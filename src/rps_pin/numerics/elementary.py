@@ -97,9 +97,9 @@ def less(a: Number, b: Number) -> Number:
 @kernel_for_floats(lambda condition, yes, no: yes if condition else no)
 def select(condition: Number, yes: Number, no: Number) -> Number:
     """Return one of two numbers; both are evaluated."""
-    if isinstance(condition, (bool, np.bool_)):
+    if condition is True or condition is False:  # of floats: the fast path
         return yes if condition else no
-    if isinstance(condition, np.ndarray):
+    if isinstance(condition, (np.ndarray, np.bool_)):
         return np.where(condition, yes, no)
     return _casadi().if_else(condition, yes, no)
 
@@ -129,7 +129,7 @@ def clamp(x: Number, lower: Number, upper: Number) -> Number:
 @kernel_for_floats(lambda condition, yes, no: yes if condition else no)
 def select_all(condition: Number, yes: tuple[Number, ...], no: tuple[Number, ...]) -> Any:
     """Return one of two tuples of numbers: `select` of each."""
-    if isinstance(condition, (bool, np.bool_)):
+    if condition is True or condition is False:
         return yes if condition else no
     return tuple(select(condition, one, other) for one, other in zip(yes, no, strict=True))
 
@@ -137,13 +137,13 @@ def select_all(condition: Number, yes: tuple[Number, ...], no: tuple[Number, ...
 @kernel_for_floats(lambda condition: condition)
 def always(condition: Number) -> bool:
     """Return whether a condition holds, of arrays everywhere."""
-    return bool(condition) if isinstance(condition, (bool, np.bool_)) else bool(condition.all())
+    return condition if condition is True or condition is False else bool(condition.all())
 
 
 @kernel_for_floats(lambda condition: not condition)
 def never(condition: Number) -> bool:
     """Return whether a condition does not hold, of arrays nowhere."""
-    return not (condition if isinstance(condition, (bool, np.bool_)) else condition.any())
+    return not (condition if condition is True or condition is False else condition.any())
 
 
 def is_real_array(x: Number) -> bool:

@@ -1,16 +1,7 @@
 """Rates of the 3-RPS in closed form: legs from poses, poses from legs, and the platform's twist.
 
-Leg i sees only two numbers of the tilt w: its components along and across the leg's plane,
-
-    e = w . e_i,    t = w . t_i    (e_i the radial direction, t_i = z x e_i the joint's axis).
-
-With A and B of `rps_pin.rps.kinematics.pose` (functions of s = e^2 + t^2), Eq. 1 and 4 put its tip
-at
-
-    radial coordinate  rho_i = h (1 + B (e^2 - 3 t^2) / 2),    height  z_i = z - h A t,
-
-always in the leg's own plane (Eq. 3). Everything here is a derivative of these two. With Eq. 7,
-g - rho = d cos(phi) and z_i = d sin(phi), so that
+With the tip of a leg at (rho, z_i) in the leg's plane (`rps_pin.rps.kernels.tips`), Eq. 7 says g -
+rho = d cos(phi) and z_i = d sin(phi), so that
 
     d'   = K pose',    K = -cos(phi) d(rho)/d(pose) + sin(phi) d(z_i)/d(pose),
     phi' = N pose',    N = (sin(phi) d(rho)/d(pose) + cos(phi) d(z_i)/d(pose)) / d.
@@ -47,7 +38,7 @@ Errors = Literal["raise", "mask"]
 
 
 class TipJacobians(NamedTuple):
-    """Where the tips are in the planes of their legs, and how they move with the pose."""
+    """Tips in the planes of their legs, and their derivatives by the pose."""
 
     radial: Array
     """rho, along e_i from the base's centre, shape (..., 3 legs), m."""
@@ -94,8 +85,8 @@ class PlatformTwist(NamedTuple):
     """The platform's twist, in two parts, and its time derivative, in base axes.
 
     A twist is the velocity of the centre (m/s) above the angular velocity (rad/s), shape (..., 6).
-    The robot has three freedoms: it climbs and tilts about the horizontal axes. The rest of its
-    motion is *parasitic*: what the legs' planes force upon it.
+    The robot has three freedoms: the height, and tilts about the horizontal axes. The rest of its
+    motion is *parasitic*: it follows from the planes of the legs.
     """
 
     commanded: Array
@@ -216,7 +207,7 @@ def leg_jacobian_rates(
 def masked_leg_jacobians(parameters: RPSParameters, pose: ArrayLike) -> tuple[LegJacobians, Bools]:
     """Return `leg_jacobians`, and which legs have no length, shape (..., 3 legs).
 
-    Their angle and their rows of the Jacobians say nothing; they are finite.
+    Their angle and their rows of the Jacobians have no meaning; they are finite.
     """
     tip = tip_jacobians(parameters, pose)
     legs = leg_geometry(tip.radial, tip.height, parameters.base_radius)
@@ -255,7 +246,7 @@ def pose_rate(
     errors: Errors = "raise",
     max_gain: float = MAX_CONDITION,
 ) -> PoseDerivative:
-    """Return how the pose changes when the legs move with given speeds: K pose' = d'.
+    """Return the pose's rate for given speeds of the legs: K pose' = d'.
 
     Parameters
     ----------
@@ -264,8 +255,8 @@ def pose_rate(
     leg_speed
         d' of legs 1, 2, 3, shape (..., 3), m/s; positive is out.
     errors
-        ``"raise"`` refuses a pose where the legs do not determine the rate; ``"mask"`` answers zero
-        there and says so in `PoseDerivative.determined`.
+        ``"raise"`` refuses a pose where the legs do not determine the rate; with ``"mask"`` the
+        rate is zero there and `PoseDerivative.determined` is false.
     max_gain
         Largest accepted speed of the platform for a unit of leg speed, tilt rates made speeds by h:
         1 over K's smallest singular value. (K's condition number would not do: in a flat robot, all
@@ -333,7 +324,7 @@ def platform_twist(
     rate: ArrayLike,
     acceleration: ArrayLike = (0.0, 0.0, 0.0),
 ) -> PlatformTwist:
-    """Return the platform's twist and its derivative in base axes, the parasitic part told apart.
+    """Return the platform's twist and its derivative, base axes, with the parasitic part apart.
 
     Parameters
     ----------
