@@ -1,4 +1,4 @@
-"""The commands, and how their errors end: one clear line and a non-zero exit status."""
+"""The list of commands. Their errors are one line and a non-zero exit status."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ app = typer.Typer(
 
 _ROBOT, _MOTION, _ANY, _MORE = "The 3-RPS", "Its motion", "Any mechanism", "More"
 for _panel, _name, _line in (
-    (_ROBOT, "view", "Show it in the browser: a pose, or a motion."),
-    (_ROBOT, "ik", "Leg lengths of a pose, against the robot's limits."),
-    (_ROBOT, "fk", "Poses of leg lengths: every assembly mode, or one."),
-    (_ROBOT, "workspace", "Where it can go, and the paper's figures."),
-    (_ROBOT, "urdf", "Its URDF: a preset's, or a parameter file's."),
+    (_ROBOT, "view", "Show a pose or a motion in the browser."),
+    (_ROBOT, "ik", "Leg lengths of a pose, and the robot's limits."),
+    (_ROBOT, "fk", "Poses of leg lengths: all assembly modes, or one."),
+    (_ROBOT, "workspace", "Its workspace, with the paper's figures."),
+    (_ROBOT, "urdf", "Its URDF."),
     (_MOTION, "helix", "Actuator forces along the paper's helix."),
-    (_MOTION, "dynamics", "The same for any trajectory; actuator sizing."),
-    (_MOTION, "check", "Where a helix meets a singularity or a limit."),
-    (_MOTION, "control", "A control loop against a robot unlike its model."),
+    (_MOTION, "dynamics", "Forces of any trajectory; actuator sizing."),
+    (_MOTION, "check", "Singularities and limits along a helix."),
+    (_MOTION, "control", "A control loop on a simulated robot."),
     (_ANY, "describe", "Joints, closures, rank, mobility, actuation."),
-    (_ANY, "simulate", "Its motion, loops closed at every step."),
+    (_ANY, "simulate", "Simulation, loops closed at every step."),
     (_MORE, "reproduce", "The paper's equations, figures and tables."),
 ):
     app.command(_name, rich_help_panel=_panel, short_help=_line)(LazyGroup.stub(_name))
@@ -46,9 +46,9 @@ for _panel, _name, _line in (
 def doctor_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
 ) -> None:
-    """Say what is installed and what is missing.
+    """List what is installed and what is missing.
 
-    Exit status: 0 all that is needed is here; 1 something is missing or broken.
+    Exit status: 0 all required packages work; 1 something is missing or broken.
     """
     raise typer.Exit(doctor(as_json))
 
@@ -78,7 +78,7 @@ def run() -> None:
     except RPSPinError as error:
         _complain(str(error))
         sys.exit(1)
-    except BrokenPipeError:  # the reader of our output left: not worth a word
+    except BrokenPipeError:  # the reader of the output ended: no message
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What the shell may complete: names that come with the package, and files."""
+"""Shell completion: names of presets and mechanisms, and files."""
 
 from __future__ import annotations
 

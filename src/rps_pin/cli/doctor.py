@@ -1,7 +1,7 @@
-"""``rps-pin doctor``: what is installed, what is missing, what it is for, and how to get it.
+"""``rps-pin doctor``: installed and missing packages, their purpose, and how to install them.
 
-It needs nothing but Python, so that it can speak where everything else fails; the command line
-falls back on it (see `rps_pin.cli.main`).
+It needs only Python, so that it works where imports fail; the command line calls it then (see
+`rps_pin.cli.main`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-sta
 
 
 class Part(NamedTuple):
-    """Something that is installed, or not."""
+    """A package or program."""
 
     name: str
     """Of the distribution on PyPI, or of the program."""
@@ -68,7 +68,7 @@ PARTS = (
 
 
 class Finding(NamedTuple):
-    """What was found of a part."""
+    """The state of a part."""
 
     name: str
     found: str
@@ -81,7 +81,7 @@ class Finding(NamedTuple):
 
 
 def diagnose() -> list[Finding]:
-    """Return what is there and what is not, by looking."""
+    """Return the state of every part."""
     arrays = _package(PARTS[0], importing=True)
     others = [_package(part, importing=not arrays.trouble) for part in PARTS[1:]]
     findings = [_itself(), _python(), arrays, *others]
@@ -91,7 +91,7 @@ def diagnose() -> list[Finding]:
 
 
 def doctor(as_json: bool = False) -> int:
-    """Print what was found; return 1 if something is missing that rps_pin cannot do without."""
+    """Print the findings; return 1 if something required is missing."""
     findings = diagnose()
     failed = any(one.needed and one.trouble for one in findings)
     if as_json:
@@ -147,14 +147,11 @@ def _pinocchio_parts() -> Finding:
     name, purpose = "pin's options", "reading URDF, shapes of links"
     import pinocchio
 
-    lacking = [
-        option
-        for option in ("WITH_URDFDOM", "WITH_COLLISION")
-        if not getattr(pinocchio, option, False)
-    ]
+    options = ("WITH_URDFDOM", "WITH_COLLISION")
+    missing = [option for option in options if not getattr(pinocchio, option, False)]
     get = "pip install --force-reinstall pin"
-    trouble = f"it was built without {', '.join(lacking)}: {get}" if lacking else ""
-    return Finding(name, "" if lacking else "URDF, coal", purpose, True, trouble)
+    trouble = f"it was built without {', '.join(missing)}: {get}" if missing else ""
+    return Finding(name, "" if missing else "URDF, coal", purpose, True, trouble)
 
 
 def _backend() -> Finding:

@@ -1,4 +1,4 @@
-"""The options that say what is shown besides the robot, and how large a picture is."""
+"""Options of the viewer's layers and of the size of pictures."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ LayersOption = Annotated[
     str | None,
     typer.Option(
         metavar="NAME,...",
-        help="Layers to show at first: trail, forces, reactions, limits, singularity, frames, "
-        "closures, ghosts (all assembly modes), workspace; or none. The page has a tick for each.",
+        help="Layers shown at first: trail, forces, reactions, limits, singularity, frames, "
+        "closures, ghosts (all assembly modes), workspace; or none. The page can switch each.",
     ),
 ]
 SizeOption = Annotated[
@@ -22,14 +22,14 @@ SizeOption = Annotated[
 
 
 def chosen_layers(text: str | None, fitting: list[str]) -> tuple[list[str], list[str]]:
-    """Return the layers that are shown at first, and those that are at hand.
+    """Return the layers that are shown at first, and the other ones of the page.
 
     Parameters
     ----------
     text
-        What the option says; None for the trail and the forces.
+        The option's value; None for the trail and the forces.
     fitting
-        Those that fit what is shown, and cost little.
+        Layers that fit the subject.
     """
     from rps_pin.viewer.layers import layers_of
 

@@ -1,4 +1,4 @@
-"""A group of commands that are imported when one of them is called, not when they are listed.
+"""A group of commands whose modules are imported when a command is called, not when it is listed.
 
 Help, completion of a command's name and the version then take no more than Typer does: a command
 imports Pinocchio and much else.

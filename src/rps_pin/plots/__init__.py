@@ -1,4 +1,4 @@
-"""Figures, by Matplotlib: axes with units, colours told apart by all, nothing that opens a window.
+"""Figures by Matplotlib, with units, in colours that all readers can tell apart. No windows.
 
 Each function draws on axes (or a figure) of your own, or makes a figure, and returns it. Figures
 that compare with the paper stand in ``rps_pin.paper``; the 3D viewer is `rps_pin.viewer`.

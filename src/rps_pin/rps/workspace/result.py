@@ -1,4 +1,4 @@
-"""The workspace of a 3-RPS on a grid: one result, however it was computed."""
+"""The result of a workspace computation on a grid."""
 
 from __future__ import annotations
 
