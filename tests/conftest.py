@@ -33,6 +33,27 @@ settings.load_profile("rps_pin")
 
 np.testing.assert_allclose = partial(np.testing.assert_allclose, equal_nan=False)
 
+#: The files that take ten seconds and more run first, so that parallel processes end together.
+LONG = (
+    "test_notebooks.py",
+    "test_cli.py",
+    "test_time_optimal.py",
+    "test_live_view.py",
+    "test_browser.py",
+    "test_pictures.py",
+    "test_examples.py",
+    "test_clock.py",
+    "test_doctor.py",
+    "test_storage.py",
+    "test_robustness.py",
+    "test_lagrange.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests of the long files first."""
+    items.sort(key=lambda item: LONG.index(item.path.name) if item.path.name in LONG else len(LONG))
+
 
 @pytest.fixture(scope="session")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Reproduction:

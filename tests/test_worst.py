@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,8 @@ def test_nan_and_nothing_are_no_small_error(errors: tuple[ArrayLike, ...]) -> No
 
 def blind_folds(source: str) -> list[int]:
     """Return the lines of ``x = max(x, ...)`` and ``assert max(...) < bound``, which drop NaN."""
+    if not re.search(r"(=|assert) max\(", source):
+        return []
     lines = []
     for node in ast.walk(ast.parse(source)):
         match node:
