@@ -18,6 +18,7 @@ from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, thre
 from rps_pin.control.estimator.output_arrays import Answers
 from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.estimator.state_estimate import state_estimate
+from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.status import STATUSES, Status
@@ -26,9 +27,6 @@ from rps_pin.rps.kinematics.tracking import LegDirections, Triple, follow
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number
 
-# Flags as integers: operations on enumerations take microseconds.
-_BAD_INPUT, _JUMP, _NOT_CONVERGED = 1, 2, 4
-_NEAR_SINGULAR, _BEYOND_LIMIT = 8, 16
 _ZERO = (0.0, 0.0, 0.0)
 #: Largest length in radii: powers of longer ones leave the range of floats.
 _LARGEST_LENGTH = 1e6
@@ -155,11 +153,11 @@ class RealTimeRobot:
         """
         elapsed = self.elapsed + (self._period if dt is None else elapsed_time(dt))
         if not self.elapsed < elapsed < math.inf:
-            return self._keep(_BAD_INPUT)
+            return self._keep(flags.BAD_INPUT)
         self.elapsed = elapsed
         self._length = d = three_floats(length)
         if d is None or not (min(d) > 0.0 and max(d) < self._largest):
-            return self._keep(_BAD_INPUT)
+            return self._keep(flags.BAD_INPUT)
         last, (v1, v2, v3) = self.state.geometry.length, self.state.speed
         jump = max(
             abs(d[0] - last[0] - v1 * elapsed),
@@ -167,15 +165,15 @@ class RealTimeRobot:
             abs(d[2] - last[2] - v3 * elapsed),
         )
         if jump > self._jump * (self.age + 1):
-            return self._keep(_JUMP)
+            return self._keep(flags.JUMP)
         speeds = self._filter.after(d, elapsed) if speed is None else three_floats(speed)
         if speeds is None:
-            return self._keep(_BAD_INPUT)
+            return self._keep(flags.BAD_INPUT)
         directions, _, self._fraction = follow(
             last, self.state.geometry.direction, d, self._g, self._h, CONDITION_LIMIT, self._most
         )
         if self._fraction < 1.0:
-            return self._keep(_NOT_CONVERGED)
+            return self._keep(flags.NOT_CONVERGED)
         return self._accept(d, directions, speeds)
 
     def inverse_dynamics(self, pose: Numbers, rate: Numbers, acceleration: Numbers) -> Status:
@@ -192,13 +190,13 @@ class RealTimeRobot:
         x, dx, ddx = three_floats(pose), three_floats(rate), three_floats(acceleration)
         self._pose = x
         if x is None or dx is None or ddx is None:
-            return self._keep_forces(_BAD_INPUT)
+            return self._keep_forces(flags.BAD_INPUT)
         if not (x[1] * x[1] + x[2] * x[2] < LARGEST_TILT_SQUARED and abs(x[0]) < self._largest):
-            return self._keep_forces(_BAD_INPUT)
+            return self._keep_forces(flags.BAD_INPUT)
         geometry = leg_geometry(x, self._g, self._h)
         if geometry is None:
-            return self._keep_forces(_NOT_CONVERGED | _BEYOND_LIMIT)
-        number = _BEYOND_LIMIT if self._limits.violated(geometry) else 0
+            return self._keep_forces(flags.NOT_CONVERGED | flags.BEYOND_LIMIT)
+        number = flags.BEYOND_LIMIT if self._limits.violated(geometry) else 0
         return self._solve(geometry, dx, ddx, number)
 
     def forces_for(self, acceleration: Numbers) -> Status:
@@ -216,7 +214,7 @@ class RealTimeRobot:
         self._pose = geometry.pose
         ddx = three_floats(acceleration)
         if ddx is None:
-            return self._keep_forces(_BAD_INPUT)
+            return self._keep_forces(flags.BAD_INPUT)
         return self._solve(geometry, rate, ddx, self._geometry_flags)
 
     # On demand ------------------------------------------------------------------------------------
@@ -300,19 +298,19 @@ class RealTimeRobot:
         """Set the state of a followed reading, unless its rates are not finite."""
         found = state_estimate(d, directions, speed, self._g, self._h)
         if found is None:
-            return self._keep(_NOT_CONVERGED | _NEAR_SINGULAR)
+            return self._keep(flags.NOT_CONVERGED | flags.NEAR_SINGULAR)
         state, twist = found
         if not math.isfinite(sum(twist)):  # the rate is in it
-            return self._keep(_BAD_INPUT)
+            return self._keep(flags.BAD_INPUT)
         self.state = state
         geometry, rate, _, jacobian = state
         self._type_ii, self.determinant = None, jacobian.determinant
-        number = self._geometry_flags = _BEYOND_LIMIT if self._limits.violated(geometry) else 0
+        number = self._geometry_flags = flags.BEYOND_LIMIT if self._limits.violated(geometry) else 0
         if self._limits.too_fast(speed):
-            number = _BEYOND_LIMIT
+            number = flags.BEYOND_LIMIT
         # No singular value of M is above 1, so none is below the determinant's absolute value.
         if not abs(jacobian.determinant) >= self._near and self.type_ii < self._near:
-            number |= _NEAR_SINGULAR
+            number |= flags.NEAR_SINGULAR
         self._filter.update(d, speed)
         # Entry by entry: faster than by slices.
         to_pose, to_rate, to_twist, to_angle, to_speed = self.answers[:5]
@@ -331,15 +329,15 @@ class RealTimeRobot:
         """Write the forces of a motion to the results, if they are determined."""
         determinant = closure_determinant(geometry, self._g, self._h)
         if not abs(determinant) >= self._near:
-            number |= _NEAR_SINGULAR
+            number |= flags.NEAR_SINGULAR
             if not abs(determinant) >= _NO_FORCES:
-                return self._keep_forces(number & ~_BEYOND_LIMIT | _NOT_CONVERGED)
+                return self._keep_forces(number & ~flags.BEYOND_LIMIT | flags.NOT_CONVERGED)
         solved = self.dynamics.solve(robot_state(geometry, rate, acceleration, self._h))
         if solved is None:  # rates so large that forces overflow
-            return self._keep_forces(_BAD_INPUT)
+            return self._keep_forces(flags.BAD_INPUT)
         forces = solved[9:]
         if self._limits.too_strong(forces):
-            number |= _BEYOND_LIMIT
+            number |= flags.BEYOND_LIMIT
         out = self.answers.forces
         out[0], out[1], out[2] = forces
         self.answers.reactions[:] = solved[:9]
@@ -351,7 +349,7 @@ class RealTimeRobot:
         """Keep the last good estimate, with a status."""
         self.age += 1
         if self.type_ii < self._near:
-            number |= _NEAR_SINGULAR
+            number |= flags.NEAR_SINGULAR
         self.status = status = STATUSES[number]
         return status
 

@@ -38,6 +38,7 @@ from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time
 from rps_pin.control.estimator.real_time_robot import RealTimeRobot
 from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.estimator.state_estimate import StateEstimate
+from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SetpointRateFilter
 from rps_pin.control.loop.force_limits import ForceLimits
 from rps_pin.control.loop.gains import Gains
@@ -50,9 +51,7 @@ from rps_pin.validation import choice, real_array, whole_number
 
 Space = Literal["actuator", "task"]
 
-# Flags as integers: operations on enumerations take microseconds.
-_NOT_CONVERGED, _NEAR_SINGULAR, _BEYOND_LIMIT = 4, 8, 16
-_SATURATED, _TARGET_HELD, _STOPPED, _KEPT = 32, 64, 128, 1 | 2 | 4
+_KEPT = flags.BAD_INPUT | flags.JUMP | flags.NOT_CONVERGED
 _ZERO = (0.0, 0.0, 0.0)
 #: Least pace, and the time constant of its return to 1, s.
 _LEAST_PACE, _RECOVERY = 0.05, 0.2
@@ -227,7 +226,7 @@ class Controller(ABC):
         number = int(estimate.estimate(length, speed, dt=dt))
         time = self.period if dt is None else elapsed_time(dt)
         if not self._setpoints.update(target, time):
-            number |= _TARGET_HELD
+            number |= flags.TARGET_HELD
         valid = not number & _KEPT
         elapsed = time if valid else 0.0  # nothing is integrated over a refused reading
         if self._stop_reason:
@@ -241,13 +240,13 @@ class Controller(ABC):
             state = self._extrapolated(estimate.state, estimate.elapsed)
         if state is None or self._near_singular(state):
             reason = f"near a type II singularity: type_ii less than {self._stop:.3g}"
-            return self._stopped(number | _NEAR_SINGULAR, elapsed, reason)
+            return self._stopped(number | flags.NEAR_SINGULAR, elapsed, reason)
         force = self._law(state, self._setpoints.current, elapsed)
         if force is None or not math.isfinite(force[0] + force[1] + force[2]):
             reason = "the law gave no finite forces"
-            return self._stopped(number | _NOT_CONVERGED, elapsed, reason)
+            return self._stopped(number | flags.NOT_CONVERGED, elapsed, reason)
         if not self._limits.within(force):
-            number |= _SATURATED
+            number |= flags.SATURATED
             force = self._limited(force, state, elapsed)
         elif self.pace < 1.0:
             self.pace += (1.0 - self.pace) * min(1.0, elapsed / _RECOVERY)
@@ -352,13 +351,13 @@ class Controller(ABC):
         if force is None or not math.isfinite(force[0] + force[1] + force[2]):
             self._rest, force = None, self._weight()
         if not self._limits.within(force):
-            number |= _SATURATED
+            number |= flags.SATURATED
             if self._rest is None:
                 self._wanted, force = force, self._limits.clipped(force)
             else:
                 force = self._limited(force, state, elapsed)
         self._send(force)
-        self.status = status = STATUSES[number | _STOPPED]
+        self.status = status = STATUSES[number | flags.STOPPED]
         return status
 
     def _send(self, force: Triple) -> None:

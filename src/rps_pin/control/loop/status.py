@@ -41,5 +41,10 @@ class Status(IntFlag):
 #: The flags of calls without a new result.
 KEPT = Status.BAD_INPUT | Status.JUMP | Status.NOT_CONVERGED
 
+#: The flags as integers: operations on enumerations take microseconds.
+BAD_INPUT, JUMP, NOT_CONVERGED, NEAR_SINGULAR, BEYOND_LIMIT, SATURATED, TARGET_HELD, STOPPED = (
+    int(flag) for flag in Status if flag
+)
+
 #: All combinations, by number: creating one takes microseconds.
 STATUSES = tuple(Status(number) for number in range(256))
