@@ -16,7 +16,6 @@ from rps_pin.rps.kinematics.tracking import (
     LegDirections,
     Lengths,
     condition_of,
-    direction_of_legs,
     follow,
     pose_of,
 )
@@ -27,8 +26,9 @@ G, H = 0.4, 0.3
 
 def start(pose: Array) -> tuple[Lengths, LegDirections]:
     length, angle = leg_angles_and_lengths(tips(position(pose, H), rotation(pose), H), G)
-    (d1, d2, d3), (phi1, phi2, phi3) = length.tolist(), angle.tolist()
-    return (d1, d2, d3), direction_of_legs((phi1, phi2, phi3))
+    d1, d2, d3 = length.tolist()
+    c1, c2, c3, s1, s2, s3 = [*np.cos(angle).tolist(), *np.sin(angle).tolist()]
+    return (d1, d2, d3), (c1, c2, c3, s1, s2, s3)
 
 
 def test_ways_of_every_length_end_as_those_followed_in_arrays() -> None:
@@ -49,9 +49,8 @@ def test_ways_of_every_length_end_as_those_followed_in_arrays() -> None:
             continue
         condition = float(expected.condition[i])
         rounding = 1e-14 * max(condition, 100.0)
-        phi1, phi2, phi3 = expected.angle[i].tolist()
-        way = direction_of_legs((phi1, phi2, phi3))
-        np.testing.assert_allclose(found.directions, way, rtol=0, atol=rounding)
+        directions = [*np.cos(expected.angle[i]), *np.sin(expected.angle[i])]
+        np.testing.assert_allclose(found.directions, directions, rtol=0, atol=rounding)
         assert found.condition == pytest.approx(condition, rel=1e-5)
         pose = pose_of((d1, d2, d3), found.directions, G, H)
         np.testing.assert_allclose(pose, expected.pose[i], rtol=0, atol=rounding)

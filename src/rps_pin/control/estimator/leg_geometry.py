@@ -8,14 +8,16 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rps_pin.numerics.compiled import compiled
+from rps_pin.numerics.compiled import compiled, kernel
 from rps_pin.rps.kernels import leg_equations, legs
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions, tilt_functions
 from rps_pin.rps.kernels.tips import at_legs, tips
 from rps_pin.rps.kinematics.tracking import LegDirections, Triple
 
+#: Largest height and leg length, in radii: powers of larger ones leave the range of floats.
+LARGEST_LENGTH = 1e6
 #: (tilt_x, tilt_y) are coordinates below a whole turn; see `rps_pin.rps.singularity.measures`.
-LARGEST_TILT_SQUARED = (2 * math.pi * (1 - 1e-6)) ** 2
+_LARGEST_TILT_SQUARED = (2 * math.pi * (1 - 1e-6)) ** 2
 
 
 class LegGeometry(NamedTuple):
@@ -33,14 +35,20 @@ class LegGeometry(NamedTuple):
     """Coefficients of the rotation and their derivatives."""
 
 
+@kernel
+def in_range(pose: Triple, g: float, h: float) -> bool:
+    """Return whether a pose's height is below `LARGEST_LENGTH` and its tilt below a whole turn."""
+    z, x, y = pose
+    return abs(z) < LARGEST_LENGTH * (g + h) and x * x + y * y < _LARGEST_TILT_SQUARED
+
+
 @compiled
 def leg_geometry(pose: Triple, g: float, h: float) -> LegGeometry | None:
-    """Return the leg geometry; None if a leg has no length, or the tilt is a whole turn or more."""
-    z, x, y = pose
-    square = x * x + y * y
-    if not square < LARGEST_TILT_SQUARED:
+    """Return the leg geometry; None if the pose is out of range, or a leg has no length."""
+    if not in_range(pose, g, h):
         return None
-    tilt = tilt_functions(square)
+    z, x, y = pose
+    tilt = tilt_functions(x * x + y * y)
     radial, height = tips(z, x, y, tilt, h)
     (r1, r2, r3), (z1, z2, z3) = at_legs(radial), at_legs(height)
     in1, in2, in3, least = g - r1, g - r2, g - r3, 1e-18 * g * g

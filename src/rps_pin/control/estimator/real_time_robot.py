@@ -8,9 +8,10 @@ from numpy.typing import ArrayLike
 
 from rps_pin.control.estimator.constrained_forces import ConstrainedForces
 from rps_pin.control.estimator.leg_geometry import (
-    LARGEST_TILT_SQUARED,
+    LARGEST_LENGTH,
     LegGeometry,
     closure_determinant,
+    in_range,
     leg_geometry,
 )
 from rps_pin.control.estimator.leg_jacobian import LeastSingularValue
@@ -28,8 +29,6 @@ from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number
 
 _ZERO = (0.0, 0.0, 0.0)
-#: Largest length in radii: powers of longer ones leave the range of floats.
-_LARGEST_LENGTH = 1e6
 #: Below this determinant of Eq. 8 half of the forces' digits are lost.
 _NO_FORCES = 1e-8
 
@@ -104,7 +103,7 @@ class RealTimeRobot:
     ) -> None:
         p = robot.parameters
         self._g, self._h = float(p.base_radius), float(p.platform_radius)
-        self._largest = _LARGEST_LENGTH * (self._g + self._h)
+        self._largest = LARGEST_LENGTH * (self._g + self._h)
         self._limits = RobotLimits(p)
         self.dynamics, self._singular_value = ConstrainedForces(robot), LeastSingularValue()
         self._period = positive_number(period, "period", "s")
@@ -191,11 +190,11 @@ class RealTimeRobot:
         self._pose = x
         if x is None or dx is None or ddx is None:
             return self._keep_forces(flags.BAD_INPUT)
-        if not (x[1] * x[1] + x[2] * x[2] < LARGEST_TILT_SQUARED and abs(x[0]) < self._largest):
-            return self._keep_forces(flags.BAD_INPUT)
         geometry = leg_geometry(x, self._g, self._h)
         if geometry is None:
-            return self._keep_forces(flags.NOT_CONVERGED | flags.BEYOND_LIMIT)
+            no_length = in_range(x, self._g, self._h)
+            reason = flags.NOT_CONVERGED | flags.BEYOND_LIMIT if no_length else flags.BAD_INPUT
+            return self._keep_forces(reason)
         number = flags.BEYOND_LIMIT if self._limits.violated(geometry) else 0
         return self._solve(geometry, dx, ddx, number)
 

@@ -13,9 +13,10 @@ import math
 from typing import Any, NamedTuple
 
 from rps_pin.control.estimator.leg_geometry import (
-    LARGEST_TILT_SQUARED,
+    LARGEST_LENGTH,
     LegGeometry,
     closure_determinant,
+    in_range,
     leg_geometry,
 )
 from rps_pin.control.estimator.loop_arguments import three_floats
@@ -25,8 +26,6 @@ from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.parameters import RPSParameters
 
 _ZERO = (0.0, 0.0, 0.0)
-#: In radii.
-_LARGEST_LENGTH = 1e6
 
 
 class Setpoint(NamedTuple):
@@ -52,8 +51,8 @@ class Setpoints:
         self._limits, self._near = RobotLimits(parameters), near_singular
         self._g, self._h = float(parameters.base_radius), float(parameters.platform_radius)
         self._speed_limit = parameters.actuator_speed_limit
-        # Of the height and of entries of rate and acceleration, in SI units.
-        self._largest = _LARGEST_LENGTH * (self._g + self._h)
+        # Entry of rate and acceleration, in SI units.
+        self._largest = LARGEST_LENGTH * (self._g + self._h)
 
     def reset(self, geometry: LegGeometry) -> None:
         """Start at rest in a pose, the setpoint until there is a target."""
@@ -130,16 +129,10 @@ class Setpoints:
 
     def _allowed(self, pose: Triple) -> LegGeometry | None:
         """Return the leg geometry of a pose, None if the pose is not allowed."""
-        if not self._in_range(pose):
-            return None
         geometry = leg_geometry(pose, self._g, self._h)
         if geometry is None or self._limits.violated(geometry):
             return None
         return geometry if self._determinant(geometry) >= self._near else None
-
-    def _in_range(self, pose: Triple) -> bool:
-        z, wx, wy = pose
-        return wx * wx + wy * wy < LARGEST_TILT_SQUARED and abs(z) < self._largest
 
     def _determinant(self, geometry: LegGeometry) -> float:
         """Return Eq. 8's determinant, positive on the side of the start."""
@@ -155,7 +148,7 @@ class Setpoints:
         if x is None:
             return ["the target is not three finite triples: pose, rate and acceleration"]
         target = "the target (" + ", ".join(f"{value:.6g}" for value in x) + ") m, rad, rad"
-        if not self._in_range(x):
+        if not in_range(x, self._g, self._h):
             return [f"{target} is out of range"]
         geometry = leg_geometry(x, self._g, self._h)
         if geometry is None:

@@ -30,15 +30,6 @@ class Followed(NamedTuple):
     """Part of the line that was followed, 1 where its end was reached."""
 
 
-def direction_of_legs(angle: Triple) -> LegDirections:
-    """Return the cosines, then the sines, of the leg angles, rad."""
-    phi1, phi2, phi3 = angle
-    return (
-        *(math.cos(phi1), math.cos(phi2), math.cos(phi3)),
-        *(math.sin(phi1), math.sin(phi2), math.sin(phi3)),
-    )
-
-
 @compiled
 def condition_of(d: Lengths, directions: LegDirections, g: float, h: float) -> float:
     """Return the condition number of Eq. 8's Jacobian by leg angles, in greatest row sums."""
