@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, ClosureError, InputError, LoopClosure
+from rps_pin.closed_loop import ForceDistribution
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import FOUR_BAR, closed_guess, joint, link, robot
 from tests.closed_loop.random_mechanisms import ALL_KINDS, Case, case
@@ -103,6 +104,19 @@ def test_without_a_home_the_neutral_configuration_is_closed_when_asked_for() -> 
     assert mechanism.loop_gap(mechanism.home) < 1e-12
 
 
+def test_a_copy_starts_where_the_original_does() -> None:
+    """Whether its home was asked for before or not."""
+    mechanism = ClosedLoopModel.from_urdf(
+        bars(), [LoopClosure("top_tip", "right_tip")], ["left_joint"]
+    )
+    before = mechanism.complete([0.3])
+    home = mechanism.home
+    again = pickle.loads(pickle.dumps(mechanism))
+    np.testing.assert_array_equal(mechanism.complete([0.3]), before)
+    np.testing.assert_array_equal(again.complete([0.3]), before)
+    np.testing.assert_array_equal(again.home, home)
+
+
 # Open configurations ------------------------------------------------------------------------------
 
 
@@ -118,6 +132,7 @@ def calls(c: Case, q: Array) -> dict[str, Callable[[], object]]:
         "gravity": lambda: m.gravity_forces(q),
         "inverse derivatives": lambda: m.inverse_dynamics_derivatives(q, c.v, c.a),
         "forward derivatives": lambda: m.forward_dynamics_derivatives(q, c.v, tau),
+        "distribution": lambda: ForceDistribution(m).solve(q, c.v, c.a),
         "linearize": lambda: m.linearize(q, c.v, tau),
     }
 

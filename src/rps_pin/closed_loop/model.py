@@ -248,7 +248,7 @@ class ClosedLoopModel:
             type(self),
             (self.model, self.closures, self.actuated),
             {
-                "home": self._home,
+                "home": self._home if self._home is self._start else None,  # as given
                 "effects": self.effects,
                 "name": self.name,
                 "characteristic_length": self.characteristic_length,

@@ -163,6 +163,8 @@ class ForceDistribution:
         ------
         InputError
             If an argument has the wrong shape or is not finite.
+        ClosureError
+            If q is open by more than 1e-4 characteristic lengths.
         InfeasibleError
             If the limits leave no such forces (says which would have to be wider, and by how
             much), or the actuators cannot produce them at all.
@@ -171,6 +173,7 @@ class ForceDistribution:
         """
         force = self.mechanism.generalised_force(q, v, a, wrenches=wrenches)
         jacobian = self.mechanism.jacobian(q)
+        self.mechanism.system.refuse_open(np.asarray(q, dtype=np.float64))
         aim = np.zeros(self.weights.size)
         if preferred is not None:
             aim = real_vector(preferred, aim.size, "preferred")
