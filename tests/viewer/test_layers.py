@@ -210,6 +210,18 @@ def test_arrows_between_coarse_samples_are_those_of_the_closed_state():
     assert reaction == pytest.approx(np.linalg.norm(wrench[:3]) / 8.0, rel=1e-2)
 
 
+def test_arrows_beyond_the_joint_limits_are_those_of_the_state_itself():
+    micro = RPSRobot.from_preset("micro")
+    free = RPSRobot(micro.parameters.without_limits())
+    view, recorder = shown(micro, [0.225, 0.0, 0.0], layers=[Forces(newtons_per_metre=4.0)])
+    still, beyond = np.zeros(3), [0.225, np.radians(40.0), 0.0]
+    view.display(free.state(beyond, still, still)[0])
+    force = free.actuator_forces(beyond, still, still)
+    for leg in LEGS:
+        length = np.linalg.norm(arrow(placed(recorder)[f"forces/leg_{leg}_prismatic"]))
+        assert length == pytest.approx(abs(force[leg - 1]) / 4.0, rel=1e-9)
+
+
 def test_a_visibly_open_mechanism_has_no_arrows():
     four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
     view, recorder = shown(four_bar, layers=["forces", "reactions"])

@@ -105,7 +105,7 @@ def closed_state(context: LayerContext, state: MotionState) -> MotionState:
     mechanism = context.subject.mechanism
     if mechanism.loop_gap(state.q) > _UNSEEN_GAP * context.radius:
         return state
-    return state._replace(q=mechanism.close(state.q))
+    return state._replace(q=mechanism.close(state.q, within_limits=False, restarts=0))
 
 
 def _scale(layer: str, given: float | None, greatest: float, radius: float) -> float:
