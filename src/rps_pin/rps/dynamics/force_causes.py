@@ -74,7 +74,6 @@ def force_causes(
         As `RPSRobot.actuator_forces`.
     """
     x, dx, ddx = checked_motion(pose, rate, acceleration)
-    robot.actuator_forces(x, dx, ddx, wrench=wrench)  # refuses what has no forces
     load = None if wrench is None else checked_wrench(wrench, x.shape[:-1])
     still = np.zeros_like(x)
     bodies = _without_friction(ForceTerms.of(robot.parameters))
@@ -92,7 +91,10 @@ def force_causes(
         )
     if load is not None:
         shares["external"] = ForceShare(_massless(weightless), still, still, load)
-    parts = dict(zip(shares, forces_of(list(shares.values()), x)[0], strict=True))
+    found, suspect = forces_of(list(shares.values()), x, robot.parameters)
+    if suspect.any() or not np.isfinite(found).all():
+        robot.actuator_forces(x, dx, ddx, wrench=wrench)  # raises where there are no forces
+    parts = dict(zip(shares, found, strict=True))
     return ForceCauses(
         **{field.name: parts.get(field.name, still) for field in fields(ForceCauses)}
     )
