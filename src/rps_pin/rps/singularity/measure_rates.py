@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.kinematics.rates import (
     LegJacobians,
@@ -52,11 +52,16 @@ def measure_rates(parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike) -
     InputError
         As `singularity_measures`.
     """
-    x, dx, _ = checked_motion(pose, rate, np.zeros(3))
-    checked_tilt(x)
+    x, dx, _ = checked_motion(pose, rate)
+    return rates_of_legs(parameters, checked_tilt(x), dx, *masked_leg_jacobians(parameters, x))
+
+
+def rates_of_legs(
+    parameters: RPSParameters, x: Array, dx: Array, legs: LegJacobians, vanishing: Bools
+) -> MeasureRates:
+    """Return `measure_rates` of poses and rates (..., 3) whose legs are known."""
     h = parameters.platform_radius
     tip = tip_jacobians(parameters, x)
-    legs, vanishing = masked_leg_jacobians(parameters, x)
     change = jacobian_rates_of_legs(parameters, x, dx, legs)
     sigma, dsigma = _least_gain(tip, legs, change.length_jacobian, parameters, x, dx)
     regular = ~vanishing.any(axis=-1)

@@ -18,7 +18,7 @@ from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE
 from rps_pin.rps.kinematics.pose import components, tilt_of
 from rps_pin.rps.kinematics.rates import masked_leg_jacobians
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.singularity.measure_rates import measure_rates
+from rps_pin.rps.singularity.measure_rates import rates_of_legs
 from rps_pin.rps.singularity.measures import checked_tilt
 from rps_pin.trajectories.path import Trajectory
 from rps_pin.validation import positive_number
@@ -79,10 +79,17 @@ class PathSignals:
 
     def _signals(self, times: Array) -> tuple[Array, Array]:
         pose, rate = self.sample(times)
-        value, change = measure_rates(self.parameters, pose, rate)
+        jacobians, vanishing = masked_leg_jacobians(self.parameters, pose)
+        value, change = rates_of_legs(self.parameters, pose, rate, jacobians, vanishing)
         # A leg without length is a type I singularity; type II is not determined there.
         value[(value[:, TYPE_I] == 0).any(axis=-1), 0] = 1.0
-        room, room_rate = _rooms(self.parameters, self.limits, pose, rate)
+        speed = np.einsum("...ij,...j->...i", jacobians.length_jacobian, rate)
+        turning = np.einsum("...ij,...j->...i", jacobians.angle_jacobian, rate)
+        legs = {
+            "length": (jacobians.length, np.where(vanishing, 0.0, speed)),
+            "angle": (jacobians.angle, turning),
+        }
+        room, room_rate = _rooms(self.parameters, self.limits, pose, rate, legs)
         return np.concatenate([value, room], axis=-1), np.concatenate([change, room_rate], axis=-1)
 
 
@@ -111,26 +118,21 @@ def _limits_of(parameters: RPSParameters) -> tuple[Signal, ...]:
 
 
 def _rooms(
-    parameters: RPSParameters, limits: tuple[Signal, ...], pose: Array, rate: Array
+    parameters: RPSParameters,
+    limits: tuple[Signal, ...],
+    pose: Array,
+    rate: Array,
+    quantities: dict[str, tuple[Array, Array]],
 ) -> tuple[Array, Array]:
-    """Return how much room each limit leaves, and its rate, shape (n, limits); negative: beyond.
+    """Return the room to each limit and its rate, shape (n, limits); negative beyond the limit.
 
-    For the spherical joints it is the room of the angle's cosine, which is smooth.
+    For the spherical joints it is that of the angle's cosine, which is smooth. `quantities` are the
+    legs' lengths and angles with their rates, (n, 3 legs) each.
     """
     rooms, rates = np.empty((len(pose), len(limits))), np.empty((len(pose), len(limits)))
-    if not limits:
-        return rooms, rates
-    jacobians, vanishing = masked_leg_jacobians(parameters, pose)
-    speed = np.einsum("...ij,...j->...i", jacobians.length_jacobian, rate)
-    turning = np.einsum("...ij,...j->...i", jacobians.angle_jacobian, rate)
-    quantities = {
-        "length": (jacobians.length, np.where(vanishing, 0.0, speed)),
-        "angle": (jacobians.angle, turning),
-    }
     if any(signal.name == "spherical joint" for signal in limits):
-        quantities["spherical joint"] = _cone_cosines(
-            parameters, pose, rate, jacobians.angle, turning
-        )
+        angles = _cone_cosines(parameters, pose, rate, *quantities["angle"])
+        quantities = quantities | {"spherical joint": angles}
     for column, signal in enumerate(limits):
         value, change = (array[:, signal.leg - 1] for array in quantities[signal.name])
         if signal.name == "spherical joint":

@@ -10,7 +10,8 @@ import numpy as np
 from rps_pin.arrays import Array, Bools
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips as ring
-from rps_pin.rps.kinematics.legs import leg_geometry
+from rps_pin.rps.kinematics.inverse_kinematics import spherical_angles
+from rps_pin.rps.kinematics.legs import LegGeometry, leg_geometry
 from rps_pin.rps.kinematics.pose import components, stacked, tilt_of
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.measures import measures
@@ -74,6 +75,10 @@ def _legs(parameters: RPSParameters, pose: Array) -> _Legs:
     radial, height = ring.tips(z, x, y, tilt, h)
     tips = np.asarray(ring.at_legs(radial)), np.asarray(ring.at_legs(height))
     d, cosine, sine, vanishing = leg_geometry(*tips, g)
+    cone = None
+    if parameters.spherical_cone_limit < math.pi:
+        geometry = LegGeometry(d.T, cosine.T, sine.T, vanishing.T)
+        cone = spherical_angles(parameters, pose, geometry).T
     if vanishing.any():  # the leg has no direction
         cosine, sine = np.where(vanishing, 0.0, cosine), np.where(vanishing, 0.0, sine)
     by_x, by_y, *heights = ring.tip_slopes(x, y, tilt)
@@ -81,16 +86,6 @@ def _legs(parameters: RPSParameters, pose: Array) -> _Legs:
         kernels.along_leg(cosine, sine, ring.at_legs(out), ring.at_legs(up))
         for out, up in zip((by_x, by_y), heights, strict=True)
     ]
-    cone = None
-    if parameters.spherical_cone_limit < math.pi:
-        r = parameters.spherical_rest_angle
-        along, across = ring.at_legs((0.0, x, y)), ring.at_legs((0.0, y, -x))
-        axis = kernels.rest_axis(along, across, tilt, math.cos(r), math.sin(r))
-        angles = (
-            kernels.cone_sine(cosine, sine, *axis),
-            kernels.cone_cosine(cosine, sine, *axis[::2]),
-        )
-        cone = np.arctan2(*angles)
     return _Legs(
         d,
         np.arctan2(sine, cosine),
