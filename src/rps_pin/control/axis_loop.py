@@ -3,7 +3,7 @@
 With exact inverse dynamics an axis is a double integrator whose acceleration is held between ticks.
 With T the period, z = exp(j t) where t = 2 pi f T, and d ticks from reading to force,
 
-    L(z) = (believed / true inertia) z^-d [P_x (Kp + Ki T z / (z - 1)) + Kd D],
+    L(z) = (modelled / true inertia) z^-d [P_x (Kp + Ki T z / (z - 1)) + Kd D],
     P_x = T^2 (z + 1) / (2 (z - 1)^2),    P_v = T / (z - 1),
     D = P_v with measured speed,
     D = P_x (s / T) (z - 1) / (z - (1 - s)),  s = 1 - exp(-2 pi cut_off T),  with `SpeedFilter`,

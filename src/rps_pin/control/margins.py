@@ -78,7 +78,7 @@ def loop_margins(
     cut_off
         Of the `SpeedFilter`, Hz (``inf``: bare differences); None for measured speed.
     inertia
-        Believed over true inertia: a factor of the loop gain.
+        Modelled over true inertia: a factor of the loop gain.
 
     Returns
     -------

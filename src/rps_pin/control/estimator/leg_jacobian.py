@@ -1,4 +1,4 @@
-"""Jacobian of the leg lengths by the pose, and what it transforms: speeds, forces, wrenches.
+"""Jacobian of the leg lengths by the pose, and its products with speeds, forces and wrenches.
 
 Compositions of `rps_pin.rps.kernels` on floats, compiled as a whole. The names are those of
 `rps_pin.rps.kinematics.rates` (K) and `rps_pin.rps.singularity.measures` (M).
@@ -27,7 +27,7 @@ _NINE = struct.Struct("9d")
 
 
 class LegJacobian(NamedTuple):
-    """K = d(length)/d(pose), and what measures its distance to a singularity."""
+    """K = d(length)/d(pose), and numbers of its distance to a singularity."""
 
     K: Rows
     """d' = K pose', by legs: 1, m/rad, m/rad."""

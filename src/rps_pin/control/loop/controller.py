@@ -1,4 +1,4 @@
-"""The tick that all controllers share, whatever their law.
+"""Base class of controllers: the tick that all laws share.
 
     reading -> state estimate -> setpoint -> law -> force limits -> forces
 
@@ -51,7 +51,7 @@ from rps_pin.validation import choice, real_array, whole_number
 
 Space = Literal["actuator", "task"]
 
-_KEPT = flags.BAD_INPUT | flags.JUMP | flags.NOT_CONVERGED
+_NO_RESULT = flags.BAD_INPUT | flags.JUMP | flags.NOT_CONVERGED
 _ZERO = (0.0, 0.0, 0.0)
 #: Least pace, and the time constant of its return to 1, s.
 _LEAST_PACE, _RECOVERY = 0.05, 0.2
@@ -227,7 +227,7 @@ class Controller(ABC):
         time = self.period if dt is None else elapsed_time(dt)
         if not self._setpoints.update(target, time):
             number |= flags.TARGET_HELD
-        valid = not number & _KEPT
+        valid = not number & _NO_RESULT
         elapsed = time if valid else 0.0  # nothing is integrated over a refused reading
         if self._stop_reason:
             return self._stopped(number, elapsed)
@@ -343,7 +343,7 @@ class Controller(ABC):
         """Stop, or stay stopped: hold the first pose estimated since, else the weight."""
         self._stop_reason = self._stop_reason or reason
         state, force = self.estimate.state, None
-        if number & _KEPT or self._near_singular(state):
+        if number & _NO_RESULT or self._near_singular(state):
             self._rest = None
         else:
             self._rest = self._rest or Setpoint(state.geometry, _ZERO, _ZERO)

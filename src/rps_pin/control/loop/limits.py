@@ -41,7 +41,7 @@ class RobotLimits:
 
     def violated(self, geometry: LegGeometry) -> bool:
         """Return whether a leg's length, angle or ball joint is beyond its limits."""
-        return not _kept(geometry, self._bounds)
+        return not _within_limits(geometry, self._bounds)
 
     def too_fast(self, speed: Triple) -> bool:
         """Return whether an actuator is beyond its speed limit."""
@@ -68,7 +68,7 @@ class RobotLimits:
 
 
 @compiled
-def _kept(geometry: LegGeometry, bounds: _Bounds) -> bool:
+def _within_limits(geometry: LegGeometry, bounds: _Bounds) -> bool:
     """Return whether every leg keeps its limits, to rounding."""
     shortest, longest, least, greatest, least_cosine, cos_r, sin_r = bounds
     _, x, y = geometry.pose

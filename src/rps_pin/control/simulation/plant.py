@@ -1,4 +1,4 @@
-"""The simulated machine that a controller commands and whose encoders it reads.
+"""Simulated machine with actuators, delay and encoders, for a controller.
 
 It is integrated by the closed-loop model in full coordinates, with the loops closed at each step,
 and shares only Pinocchio with the controllers. A command passes a delay of whole ticks and the
