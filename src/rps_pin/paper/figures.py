@@ -9,15 +9,9 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from rps_pin.files import whole_file
+from rps_pin.paper import table_2_figures as table_2
 from rps_pin.paper.compute import Reproduction
 from rps_pin.paper.figure_1 import plot_mechanism
-from rps_pin.paper.table_2_figures import (
-    plot_approach,
-    plot_fit,
-    plot_interpretations,
-    plot_probes,
-    plot_table_2,
-)
 from rps_pin.plots import STYLE, plot_forces, plot_lengths, plot_path
 from rps_pin.plots.workspace import (
     plot_assembly_modes,
@@ -44,11 +38,11 @@ def pictures(found: Reproduction) -> dict[str, Callable[[], Figure]]:
         "figure_7": lambda: plot_path(found.runs["+"]),
         "figure_8": lambda: plot_branches(found, plot_lengths),
         "figure_9": lambda: plot_branches(found, plot_forces),
-        "approach": lambda: plot_approach(found.approach),
-        "probes": lambda: plot_probes(found.probes),
-        "interpretations": lambda: plot_interpretations(found),
-        "table_2": lambda: plot_table_2(found),
-        "fit": lambda: plot_fit(found),
+        "approach": lambda: table_2.plot_approach(found.approach),
+        "probes": lambda: table_2.plot_probes(found.probes),
+        "interpretations": lambda: table_2.plot_interpretations(found),
+        "table_2": lambda: table_2.plot_table_2(found),
+        "fit": lambda: table_2.plot_fit(found),
     }
 
 
