@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text("utf-8")
@@ -36,6 +37,15 @@ def test_the_python_blocks_run_in_order_and_print_what_is_shown(
 
 def test_the_first_block_is_ten_lines() -> None:
     assert len(BLOCKS[0].strip().splitlines()) == 10
+
+
+def test_it_opens_with_a_film_of_at_most_two_megabytes() -> None:
+    first = re.search(r"!\[[^\]]*\]\(([^)]+)\)", README)
+    assert first is not None and first.start() < README.index("```python")
+    film = ROOT / first[1]
+    assert film.stat().st_size <= 2_000_000
+    with Image.open(film) as opened:
+        assert opened.n_frames > 20
 
 
 def test_the_files_it_names_exist() -> None:
