@@ -147,7 +147,7 @@ class RPSRobot:
             Shape (..., 3).
         errors
             ``"raise"`` refuses a pose beyond a limit of leg length, leg angle or spherical joint;
-            ``"mask"`` computes it all the same and says so in `Legs.reachable`.
+            with ``"mask"`` it is computed, and `Legs.reachable` is false.
 
         Returns
         -------
@@ -305,8 +305,8 @@ class RPSRobot:
         q, v, a
             One state as `state` gives it: (13,), (12,), (12,).
         wrench
-            What something outside exerts on the platform: force (N) in base axes and moment (N m)
-            about the platform's centre, shape (6,).
+            External wrench on the platform: force (N) in base axes and moment (N m) about the
+            platform's centre, shape (6,).
 
         Returns
         -------
@@ -348,8 +348,8 @@ class RPSRobot:
         pose, rate, acceleration
             Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
         wrench
-            What something outside exerts on the platform: force (N) in base axes and moment (N m)
-            about the platform's centre, shape (6,) or one for each sample (..., 6).
+            External wrench on the platform: force (N) in base axes and moment (N m) about the
+            platform's centre, shape (6,) or one for each sample (..., 6).
         errors
             ``"raise"`` refuses the first sample that is out of reach or singular; ``"mask"``
             returns a masked array (`numpy.ma`), such samples masked.

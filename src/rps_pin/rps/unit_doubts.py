@@ -1,4 +1,4 @@
-"""Parameters that are legal and look like millimetres, grams or the like. A doubt, no refusal."""
+"""Warnings for legal parameters that look like millimetres, grams or other units than SI."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def forces_of(
     Returns
     -------
     forces
-        Shape (..., 3) each, N; of no meaning at a singularity.
+        Shape (..., 3) each, N; meaningless at a singularity.
     suspect
         Which samples may be singular or beyond a limit, shape (...).
     """

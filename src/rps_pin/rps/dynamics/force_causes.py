@@ -1,4 +1,4 @@
-"""The actuator forces of a motion by cause: what gravity, inertia, speed, friction and loads ask.
+"""Actuator forces of a motion by cause: gravity, inertia, Coriolis, friction, payload, wrench.
 
 The actuator forces are linear in what the bodies' motion takes (see `force_equations`), so that
 each cause has its own part, and the parts add up to the whole. Gravity, inertia and Coriolis are

@@ -37,7 +37,7 @@ CLOSE = 1e4
 
 @dataclass(frozen=True)
 class ForceTerms:
-    """What an actuator force is made of; any of it may be zero. SI units."""
+    """Parameters of the actuator forces; any of them may be zero. SI units."""
 
     base_radius: float
     platform_radius: float
@@ -144,12 +144,12 @@ def leg_block(base_radius: float, platform_radius: float, pose: Array) -> LegBlo
 def block_forces(
     terms: ForceTerms, block: LegBlock, rate: Array, acceleration: Array, wrench: Array | None
 ) -> Array:
-    """Return the actuator forces of a block, shape (3 legs, n), N; of no meaning at a singularity.
+    """Return the actuator forces of a block, shape (3 legs, n), N; meaningless at a singularity.
 
     Parameters
     ----------
     terms
-        What takes part.
+        Masses, friction and gravity that are included.
     block
         The legs.
     rate, acceleration

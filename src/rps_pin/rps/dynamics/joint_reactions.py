@@ -104,7 +104,7 @@ def joint_reactions(
     *,
     wrench: ArrayLike | None = None,
 ) -> JointReactions:
-    """Return what all joints bear: the tip's forces, the wrenches in the legs.
+    """Return the reactions in all joints: forces at the tips, wrenches in the legs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the platform carries: a payload fixed to it, and wrenches from outside.
+"""Loads of the platform: a payload fixed to it, and external wrenches.
 
 A payload is a rigid body that moves with the platform: `RPSRobot.with_payload` returns the robot
 that carries it, and everything which that robot computes includes it. A wrench is what something

@@ -1,4 +1,4 @@
-"""A motion as a table that any program reads: one line a sample, units in the column names."""
+"""CSV table of a motion: one line a sample, units in the column names."""
 
 from __future__ import annotations
 

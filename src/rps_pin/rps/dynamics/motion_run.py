@@ -1,4 +1,4 @@
-"""A whole motion of a 3-RPS: its inverse dynamics sample by sample, and what comes of it."""
+"""Motion of a 3-RPS: inverse dynamics sample by sample, and its summary."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class MotionRun:
 
 @dataclass(frozen=True)
 class ActuatorSummary:
-    """What one actuator has to do in a motion."""
+    """Demands of a motion on one actuator."""
 
     actuator: int
     """1 to 3."""
@@ -162,7 +162,7 @@ def run_motion(
     sample_rate
         Samples a second, Hz; the end of the trajectory is always the last sample.
     wrench
-        What something outside exerts on the platform all along: force (N) in base axes and moment
+        External wrench on the platform during the whole motion: force (N) in base axes and moment
         (N m) about the platform's centre, shape (6,).
     progress
         Wraps the loop over the samples, for a progress bar.

@@ -1,4 +1,4 @@
-"""Actuator sizing: what a motion asks of the actuators, from a trajectory or from samples.
+"""Actuator sizing: demands of a motion on the actuators, from a trajectory or from samples.
 
 Between samples, force and power are taken as linear in time; averages, energies and shares of time
 are exact for that. Peaks are those of the samples. The sheet itself is in `sizing_sheet`.
@@ -31,7 +31,7 @@ def size_trajectory(
     wrench: ArrayLike | None = None,
     threshold: float = 0.5,
 ) -> SizingSheet:
-    """Return what a trajectory asks of a robot's actuators.
+    """Return the demands of a trajectory on a robot's actuators.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def size_trajectory(
     sample_rate
         Hz.
     limits
-        What the actuators can do; what the robot's parameters say if left out.
+        Limits of the actuators; those of the robot's parameters if left out.
     wrench
         On the platform, (6,) or (n, 6); see `RPSRobot.actuator_forces`.
     threshold
@@ -72,7 +72,7 @@ def size_motion(
     wrench: ArrayLike | None = None,
     threshold: float = 0.5,
 ) -> SizingSheet:
-    """Return what a sampled motion asks of a robot's actuators.
+    """Return the demands of a sampled motion on a robot's actuators.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The sizing sheet: what a motion asks of the actuators beside what they can do, as data and text.
+"""Sizing sheet: demands of a motion on the actuators and their limits, as data and as text.
 
 Work is counted from the actuator's side: force times speed is positive where the actuator drives
 its leg, negative where the leg drives the actuator (regenerated).
@@ -21,7 +21,7 @@ from rps_pin.rps.parameters import RPSParameters
 
 @dataclass(frozen=True)
 class ActuatorLimits:
-    """What one actuator can do; infinity where there is no limit."""
+    """Limits of one actuator; infinity where there is no limit."""
 
     force: float = math.inf
     """Push or pull, N."""
@@ -57,7 +57,7 @@ class Margin(NamedTuple):
 
     quantity: str
     value: float
-    """What the motion asks, in `unit`."""
+    """Demand of the motion, in `unit`."""
     limit: float
     """In `unit`; infinite if there is none."""
     margin: float
@@ -72,7 +72,7 @@ class Margin(NamedTuple):
 
 @dataclass(frozen=True)
 class ActuatorSizing:
-    """What one actuator has to do. Peaks are magnitudes."""
+    """Demands on one actuator. Peaks are magnitudes."""
 
     actuator: int
     """1 to 3."""
@@ -95,7 +95,7 @@ class ActuatorSizing:
     energy_driven: float
     """Positive work: what the actuator puts in, J."""
     energy_regenerated: float
-    """What flows back into it, J; positive."""
+    """Work that the leg does on the actuator, J; positive."""
     duty: float
     """Share of the time that the force is above `SizingSheet.threshold` times its peak."""
     length_min: float

@@ -113,7 +113,7 @@ def solve_step(
         for _ in range(_MOST_NEWTON):
             t, det_there, there, _, _, _ = newton_step(d, at, g, h)
             at = turned_legs(at, t)
-            # What is left is the step's square: lost in rounding.
+            # The remaining error is the step's square: below rounding.
             converged = less(eq.largest(t), _LAST_STEP)
             solved = trusted & converged & (there <= limit) & less(0.0, det * det_there)
             if always(select(trusted, converged, True)):

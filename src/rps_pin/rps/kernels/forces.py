@@ -1,4 +1,4 @@
-"""Forces: what turning a leg takes, and the actuator forces that do a given virtual work.
+"""Forces that move the legs, and actuator forces that do a given virtual work.
 
 The virtual work of the legs' axial forces F in the motions x = (z, h tilt_x, h tilt_y) is K' F,
 with K = d(length)/dx. F of K' F = needed is found by cofactors; so is x' of K x' = d'.

@@ -1,4 +1,4 @@
-"""The tolerance of limits: one, for lengths, angles and cones."""
+"""Tolerance of the limits of lengths, angles and cones."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ def eliminant(length: Array, cosine: Array, base_radius: float, platform_radius:
 
 
 class _Lines(NamedTuple):
-    """What leg 1's angle makes of the other two legs' equations; see the head of this module."""
+    """Equations of legs 2 and 3 for an angle of leg 1; see the module's docstring."""
 
     m1: Array
     z1: Array

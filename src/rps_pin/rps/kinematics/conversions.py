@@ -1,4 +1,4 @@
-"""Ways into a pose and out: the paper's angles, and the centre with its parasitic motion.
+"""Conversions of poses: the paper's angles, and the centre with its parasitic motion.
 
 Section 2.1 of the paper describes the platform by p_z, p_x, p_y and the Z-Y-Z angles alpha, beta,
 gamma. With w the rotation vector of the pose, h the platform's radius, and u and v the first two
@@ -51,7 +51,7 @@ class Centre(NamedTuple):
 
 
 class ParasiticMotion(NamedTuple):
-    """What the platform's centre does sideways because the platform tilts, shape (..., 2) each."""
+    """Horizontal motion of the platform's centre that a tilt causes, shape (..., 2) each."""
 
     position: Array
     """(p_x, p_y) in base axes, m."""
@@ -169,7 +169,7 @@ def parasitic_motion(
     rate: ArrayLike = (0.0, 0.0, 0.0),
     acceleration: ArrayLike = (0.0, 0.0, 0.0),
 ) -> ParasiticMotion:
-    """Return the sideways motion of the platform's centre that its tilt brings with it: Eq. 4.
+    """Return the horizontal motion of the platform's centre that its tilt causes: Eq. 4.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class AngleSolution(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """Where leg angles put the platform; base axes."""
+    """Placement of the platform for given leg angles; base axes."""
 
     position: Array
     """Of the centre, shape (..., 3), m."""
@@ -183,7 +183,7 @@ def determinant(
 def placement_from_angles(
     length: ArrayLike, angle: ArrayLike, base_radius: float, platform_radius: float
 ) -> Placement:
-    """Return where leg lengths and angles that close the robot put its platform.
+    """Return the platform's placement for leg lengths and angles that close the robot.
 
     The centre is the tips' mean; the platform's axes follow from u = (B_1 - P)/h and
     v = (B_2 - B_3)/(sqrt(3) h). Always u_y = v_x (the legs' planes); u_x + v_y is 1 + cos(beta)

@@ -17,7 +17,7 @@ _ORTHONORMAL = 1e-6
 
 
 def constraint_residuals(position: ArrayLike, rotation: ArrayLike, platform_radius: float) -> Array:
-    """Return by how much a placement breaks the constraints of Eq. 4, shape (..., 3), m.
+    """Return the residuals of a placement in the constraints of Eq. 4, shape (..., 3), m.
 
     They are h (u_y - v_x), p_y + h u_y and p_x - h/2 (u_x - v_y). All vanish exactly if each
     spherical joint lies in its leg's plane, Eq. 3: then legs of some length and angle reach it.
@@ -34,7 +34,7 @@ def constraint_residuals(position: ArrayLike, rotation: ArrayLike, platform_radi
     Raises
     ------
     InputError
-        If an argument has the wrong shape or is not finite, or the rotation is none.
+        If an argument has the wrong shape or is not finite, or a matrix is not a rotation.
     """
     return _residuals(
         *_checked_placement(position, rotation),
@@ -69,8 +69,9 @@ def pose_from_placement(
     Raises
     ------
     InputError
-        If an argument has the wrong shape or is not finite, the rotation is none, or the placement
-        belongs to the robot's other operation mode: half turns about axes outside the base plane.
+        If an argument has the wrong shape or is not finite, a matrix is not a rotation, or the
+        placement belongs to the robot's other operation mode: half turns about axes outside the
+        base plane.
     ClosureError
         If the placement breaks the constraints of Eq. 4.
     """

@@ -138,7 +138,7 @@ class _Branches(NamedTuple):
 
     z: Array
     tilt: Array  # (..., k, 2)
-    #: What decides: a name with its unit, its value, and what that may be.
+    #: The quantity that decides: name, unit, value, and its range.
     name: str
     unit: str
     value: Array
