@@ -59,10 +59,8 @@ def plot_tilt_conditioning(
     with matplotlib.rc_context(STYLE):
         axes = new_axes(axes, (5.6, 4.6))
         _map(axes, parameters, pose, (np.degrees(x), np.degrees(y)), measure)
-        axes.set_xlabel("tilt about x (degrees)")
-        axes.set_ylabel("tilt about y (degrees)")
+        axes.set(xlabel="tilt about x (degrees)", ylabel="tilt about y (degrees)", aspect="equal")
         axes.set_title(f"At $p_z$ = {1e3 * height:.6g} mm", loc="left")
-        axes.set_aspect("equal")
     return figure_of(axes)
 
 
@@ -109,11 +107,7 @@ def plot_height_conditioning(
 
 
 def _map(
-    axes: Axes,
-    parameters: RPSParameters,
-    pose: Array,
-    at: tuple[Array, Array],
-    measure: str,
+    axes: Axes, parameters: RPSParameters, pose: Array, at: tuple[Array, Array], measure: str
 ) -> None:
     choice(measure, "measure", tuple(_LABELS))
     found = singularity_measures(parameters, pose, errors="mask")

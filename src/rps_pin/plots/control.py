@@ -17,7 +17,7 @@ from rps_pin.arrays import Array
 from rps_pin.control.loop.status import Status
 from rps_pin.control.simulation.loop_run import LoopRun
 from rps_pin.control.simulation.loop_summary import TrackingErrors, status_name
-from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, three_axes
+from rps_pin.plots.style import STYLE, figure_of, plot_legs, three_axes
 
 #: Above the axes, where it hides nothing.
 _LEGEND: Any = {
@@ -52,12 +52,8 @@ def plot_tracking(
     time = run.time[here]
     with matplotlib.rc_context(STYLE):
         centre, turn, legs = three_axes(axes, "Errors: actual minus target")
-        for part, (name, colour) in enumerate(zip("xyz", LEG_COLOURS, strict=True)):
-            style = LEG_STYLES[part]
-            shown = 1e6 * errors.centre[here, part]
-            centre.plot(time, shown, style, color=colour, label=f"$p_{name}$")
-            shown = 1e6 * errors.length[here, part]
-            legs.plot(time, shown, style, color=colour, label=f"$d_{part + 1}$")
+        plot_legs(centre, time, 1e6 * errors.centre[here], ("$p_x$", "$p_y$", "$p_z$"))
+        plot_legs(legs, time, 1e6 * errors.length[here], ("$d_1$", "$d_2$", "$d_3$"))
         turn.plot(time, 1e6 * errors.turn[here], color="black")
         centre.set_ylabel("centre (µm)")
         turn.set_ylabel("orientation (µrad)")
@@ -92,23 +88,16 @@ def plot_loop_forces(
     with matplotlib.rc_context(STYLE):
         forces, distance, statuses = three_axes(axes, "Forces and statuses of the controller")
         limit = run.parameters.actuator_force_limit
-        for leg, colour in enumerate(LEG_COLOURS):
-            forces.plot(
-                time,
-                run.applied[here, leg],
-                LEG_STYLES[leg],
-                color=colour,
-                label=f"$F_{leg + 1}$",
-                drawstyle="steps-post",
-            )
+        labels = ("$F_1$", "$F_2$", "$F_3$")
+        plot_legs(forces, time, run.applied[here], labels, drawstyle="steps-post")
         if np.abs(run.applied).max() > 0.5 * limit:
             for side in (-limit, limit):
                 forces.axhline(side, color="black", linewidth=0.8, linestyle=":")
         forces.set_ylabel("force (N)")
         forces.legend(**_LEGEND)
         distance.plot(time, run.type_ii[here], color="black")
-        distance.set_ylim(0.0, 1.1 * float(run.type_ii[here].max(initial=0.1)))
-        distance.set_ylabel("distance to\ntype II (1)")
+        top = 1.1 * float(run.type_ii[here].max(initial=0.1))
+        distance.set(ylim=(0.0, top), ylabel="distance to\ntype II (1)")
         _draw_statuses(statuses, run)
         _finish((forces, distance, statuses), time)
     return figure_of(forces)
@@ -122,10 +111,9 @@ def _draw_statuses(axes: Axes, run: LoopRun) -> None:
         axes.plot(when, np.full(when.size, row), "|", color="black", markersize=9)
     names = [status_name(int(flag)) for flag in flags]
     axes.set_yticks(range(len(names)), names)
-    axes.set_ylim(-0.6, max(len(names), 1) - 0.4)
     if not flags:
         axes.text(0.5, 0.5, "ok throughout", transform=axes.transAxes, ha="center", va="center")
-    axes.set_ylabel("status")
+    axes.set(ylim=(-0.6, max(len(names), 1) - 0.4), ylabel="status")
 
 
 def _finish(axes: Sequence[Axes], time: Array) -> None:

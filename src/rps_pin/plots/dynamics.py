@@ -16,7 +16,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
-from rps_pin.plots.style import LEG_COLOURS, LEG_STYLES, STYLE, figure_of, legend_above, three_axes
+from rps_pin.plots.style import STYLE, figure_of, legend_above, new_axes, plot_legs, three_axes
 from rps_pin.rps.dynamics.force_causes import ForceCauses
 from rps_pin.rps.dynamics.sizing_sheet import SizingSheet
 from rps_pin.validation import real_array
@@ -85,16 +85,13 @@ def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
     """
     with matplotlib.rc_context(STYLE):
         if axes is None:
-            figure = Figure(figsize=(6.4, 4.6), layout="constrained")
-            figure.suptitle("Force and speed of the actuators")
-            axes = figure.add_subplot()
-        legs = list(zip(LEG_COLOURS, LEG_STYLES, sheet.actuators, strict=True))
-        for leg, (colour, style, actuator) in enumerate(legs):
-            speed, force = sheet.speed[:, leg], sheet.force[:, leg]
-            label = f"actuator {actuator.actuator}"
-            axes.plot(speed, force, color=colour, linestyle=style, label=label)
-            peak = int(np.abs(force).argmax())
-            axes.plot(speed[peak], force[peak], "x", color=colour)
+            axes = new_axes(None, (6.4, 4.6))
+            figure_of(axes).suptitle("Force and speed of the actuators")
+        labels = [f"actuator {one.actuator}" for one in sheet.actuators]
+        plot_legs(axes, sheet.speed, sheet.force, labels)
+        peak = np.abs(sheet.force).argmax(axis=0)[None]
+        x, y = (np.take_along_axis(one, peak, axis=0) for one in (sheet.speed, sheet.force))
+        plot_legs(axes, x, y, [""] * 3, marker="x", linestyle="")
         _limit_box(axes, sheet)
         axes.axhline(0.0, color="black", linewidth=0.6)
         axes.axvline(0.0, color="black", linewidth=0.6)
@@ -123,17 +120,15 @@ def _limit_box(axes: Axes, sheet: SizingSheet) -> None:
         corner = (-speed, -force)
         axes.add_patch(Rectangle(corner, 2 * speed, 2 * force, fill=False, label="limits"))
         axes.autoscale_view()
-    elif np.isfinite(force):
-        axes.axhline(force, label="limits", **look)
-        axes.axhline(-force, **look)
-    elif np.isfinite(speed):
-        axes.axvline(speed, label="limits", **look)
-        axes.axvline(-speed, **look)
+    else:
+        for limit, line in ((force, axes.axhline), (speed, axes.axvline)):
+            if np.isfinite(limit):
+                line(limit, label="limits", **look)
+                line(-limit, **look)
     if np.isfinite(power):
         largest = speed if np.isfinite(speed) else 1.2 * float(np.abs(sheet.speed).max())
         highest = force if np.isfinite(force) else 1.2 * float(np.abs(sheet.force).max())
         if largest * highest > power:  # else the curves lie outside
             v = np.linspace(power / highest, largest, 100)
-            for sides in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-                label = "power limit" if sides == (1, 1) else None
-                axes.plot(sides[0] * v, sides[1] * power / v, ":", color="black", label=label)
+            x, y = np.outer(v, [1, 1, -1, -1]), np.outer(power / v, [1, -1, 1, -1])
+            axes.plot(x, y, ":", color="black", label=["power limit", "", "", ""])

@@ -11,16 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from rps_pin.arrays import Array
-from rps_pin.plots.style import (
-    LEG_COLOURS,
-    LEG_STYLES,
-    STYLE,
-    axes_in_space,
-    figure_of,
-    legend_above,
-    new_axes,
-)
+from rps_pin.plots import style
 from rps_pin.rps.dynamics.motion_run import MotionRun
+
+_LEGS = ("leg 1", "leg 2", "leg 3")
 
 
 def plot_path(run: MotionRun, figure: Figure | None = None) -> Figure:
@@ -28,23 +22,20 @@ def plot_path(run: MotionRun, figure: Figure | None = None) -> Figure:
 
     x and y are in millimetres; z is in millimetres above its lowest value, which the label says.
     """
-    with matplotlib.rc_context(STYLE):
-        figure = figure or Figure(figsize=(5.6, 5.0), layout="constrained")
-        axes = axes_in_space(figure)
+    with matplotlib.rc_context(style.STYLE):
+        axes = style.axes_in_space(figure, (5.6, 5.0))
         x, y, z = 1e3 * run.position.T
         base = float(z.min())
-        axes.plot(x, y, z - base, color=LEG_COLOURS[0])
+        axes.plot(x, y, z - base, color=style.BLUE)
         axes.scatter(x[:1], y[:1], z[:1] - base, color="black", s=25, label="start")
         axes.scatter(x[-1:], y[-1:], z[-1:] - base, color="black", marker="s", s=25, label="end")
-        axes.set_xlabel("$p_x$ (mm)")
-        axes.set_ylabel("$p_y$ (mm)")
+        axes.set(xlabel="$p_x$ (mm)", ylabel="$p_y$ (mm)", title="Path of the platform's centre")
         axes.set_zlabel(f"$p_z$ above {base:.6g} mm (mm)")
-        axes.set_title("Path of the platform's centre")
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
             axis.set_major_locator(MaxNLocator(5))
         axes.set_box_aspect(None, zoom=0.88)
         axes.legend(loc="upper left")
-    return figure
+    return style.figure_of(axes)
 
 
 def plot_lengths(run: MotionRun, axes: Axes | None = None) -> Figure:
@@ -59,34 +50,24 @@ def plot_forces(run: MotionRun, axes: Axes | None = None) -> Figure:
 
 def plot_length_phase(run: MotionRun, axes: Axes | None = None) -> Figure:
     """Draw each leg's speed over its length: mm/s over mm. Crosses mark the start."""
-    with matplotlib.rc_context(STYLE):
-        axes = new_axes(axes, (5.6, 4.2))
-        legs = zip(LEG_COLOURS, LEG_STYLES, 1e3 * run.length.T, 1e3 * run.speed.T, strict=True)
-        for leg, (colour, style, length, speed) in enumerate(legs, start=1):
-            axes.plot(length, speed, color=colour, linestyle=style, label=f"leg {leg}")
-            axes.plot(length[:1], speed[:1], "x", color=colour)
+    with matplotlib.rc_context(style.STYLE):
+        axes = style.new_axes(axes, (5.6, 4.2))
+        length, speed = 1e3 * run.length, 1e3 * run.speed
+        style.plot_legs(axes, length, speed, _LEGS)
+        style.plot_legs(axes, length[:1], speed[:1], [""] * 3, marker="x", linestyle="")
         axes.axhline(0.0, color="black", linewidth=0.6)
-        axes.set_xlabel("length $d_i$ (mm)")
-        axes.set_ylabel("speed $\\dot d_i$ (mm/s), positive is out")
-        legend_above(axes, columns=3)
-    return figure_of(axes)
+        axes.set(xlabel="length $d_i$ (mm)", ylabel="speed $\\dot d_i$ (mm/s), positive is out")
+        style.legend_above(axes, columns=3)
+    return style.figure_of(axes)
 
 
-def _over_time(
-    time: Array,
-    values: Array,
-    label: str,
-    title: str,
-    axes: Axes | None,
-) -> Figure:
-    with matplotlib.rc_context(STYLE):
-        axes = new_axes(axes, (6.4, 3.8))
-        for leg, (colour, style) in enumerate(zip(LEG_COLOURS, LEG_STYLES, strict=True)):
-            axes.plot(time, values[:, leg], color=colour, linestyle=style, label=f"leg {leg + 1}")
-        axes.set_xlabel("time (s)")
-        axes.set_ylabel(label)
+def _over_time(time: Array, values: Array, label: str, title: str, axes: Axes | None) -> Figure:
+    with matplotlib.rc_context(style.STYLE):
+        axes = style.new_axes(axes, (6.4, 3.8))
+        style.plot_legs(axes, time, values, _LEGS)
+        axes.set(xlabel="time (s)", ylabel=label)
         axes.set_title(title, loc="left")
         axes.margins(x=0)
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.legend(loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False)
-    return figure_of(axes)
+    return style.figure_of(axes)

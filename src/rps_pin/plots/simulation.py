@@ -38,8 +38,7 @@ def plot_simulation(
         energies.set_ylabel("energy (J)")
         visible = np.where(simulation.gap > 0, simulation.gap, np.nan)  # an axis of powers has no 0
         gaps.semilogy(simulation.time, visible, ".", markersize=2, color=COLOURS[0])
-        gaps.set_ylabel("largest loop gap (m)")
-        gaps.set_xlabel("time (s)")
+        gaps.set(xlabel="time (s)", ylabel="largest loop gap (m)")
         gaps.margins(x=0)
         positions.set_title(mechanism.name, loc="left")
     return figure

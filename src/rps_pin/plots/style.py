@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 
@@ -59,11 +61,24 @@ def three_axes(axes: Sequence[Axes] | None, title: str) -> Sequence[Axes]:
     return axes
 
 
-def axes_in_space(figure: Figure, place: tuple[int, int, int] = (1, 1, 1)) -> Axes3D:
-    """Return new three-dimensional axes on a figure."""
+def axes_in_space(
+    figure: Figure | None, size: tuple[float, float], place: tuple[int, int, int] = (1, 1, 1)
+) -> Axes3D:
+    """Return new three-dimensional axes on a figure, or on a new one of a size in inches."""
+    figure = figure or Figure(figsize=size, layout="constrained")
     axes = figure.add_subplot(*place, projection="3d")
     assert isinstance(axes, Axes3D)  # what the projection "3d" makes
     return axes
+
+
+def plot_legs(axes: Axes, x: Array, y: Array, labels: Sequence[str], **look: Any) -> None:
+    """Draw a curve for each leg (or axis): y of shape (n, 3) over x of shape (n,) or (n, 3)."""
+    both = np.broadcast_arrays(x.T, y.T)
+    for across, up, colour, style, label in zip(
+        *both, LEG_COLOURS, LEG_STYLES, labels, strict=True
+    ):
+        own: Any = {"color": colour, "linestyle": style, "label": label}
+        axes.plot(across, up, **own | look)
 
 
 def legend_above(axes: Axes, columns: int) -> None:

@@ -11,7 +11,7 @@ from typing import Protocol
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
+from matplotlib.colors import to_rgba, to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -19,20 +19,9 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.plots.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    LEG_COLOURS,
-    ORANGE,
-    PURPLE,
-    STYLE,
-    VERMILION,
-    YELLOW,
-    axes_in_space,
-    figure_of,
-    new_axes,
-)
+from rps_pin.plots import style
+from rps_pin.plots.style import GREY, LEG_COLOURS, STYLE, axes_in_space, figure_of, new_axes
+from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
 from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.geometry import boundary
@@ -40,41 +29,21 @@ from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
 
 #: The workspace, the theoretical cylinder, the platform.
-_INSIDE, _CYLINDER, _PLATFORM = BLUE, GREY, ORANGE
-#: A pale one for each family of reasons, in the order of `_FAMILIES`.
-_REASON_COLOURS = (YELLOW, ORANGE, PURPLE, VERMILION, BLACK, GREY)
+_INSIDE, _CYLINDER, _PLATFORM = style.BLUE, GREY, style.ORANGE
+#: Families of reasons: a name, the part of their names, a pale colour.
 _FAMILIES = (
-    ("a leg too short", Reason.LEG_1_SHORT | Reason.LEG_2_SHORT | Reason.LEG_3_SHORT),
-    ("a leg too long", Reason.LEG_1_LONG | Reason.LEG_2_LONG | Reason.LEG_3_LONG),
-    ("a leg's angle", Reason.LEG_1_ANGLE | Reason.LEG_2_ANGLE | Reason.LEG_3_ANGLE),
-    (
-        "a spherical joint",
-        Reason.LEG_1_SPHERICAL | Reason.LEG_2_SPHERICAL | Reason.LEG_3_SPHERICAL,
-    ),
-    ("singular", Reason.SINGULAR),
-    ("unreachable", Reason.UNREACHABLE),
+    ("a leg too short", "SHORT", style.YELLOW),
+    ("a leg too long", "LONG", style.ORANGE),
+    ("a leg's angle", "ANGLE", style.PURPLE),
+    ("a spherical joint", "SPHERICAL", style.VERMILION),
+    ("singular", "SINGULAR", style.BLACK),
+    ("unreachable", "UNREACHABLE", GREY),
 )
 _VIEWS = (("XY", 0, 1), ("XZ", 0, 2), ("YZ", 1, 2))
 
 
-class Modes(Protocol):
-    """Assembly modes, as `RPSRobot.assembly_modes` returns them."""
-
-    @property
-    def angle(self) -> Array:
-        """Leg angles, shape (k, 3), rad."""
-
-    @property
-    def position(self) -> Array:
-        """Of the platform's centre, shape (k, 3), m."""
-
-    @property
-    def rotation(self) -> Array:
-        """From platform to base axes, shape (k, 3, 3)."""
-
-
 def plot_assembly_modes(
-    parameters: RPSParameters, modes: Modes, figure: Figure | None = None
+    parameters: RPSParameters, modes: AssemblyModes, figure: Figure | None = None
 ) -> Figure:
     """Draw each assembly mode as a robot: base, legs and platform, as the paper's Fig. 2 does.
 
@@ -84,7 +53,7 @@ def plot_assembly_modes(
         The robot.
     modes
         Solutions for one triple of leg lengths: `angle` (k, 3), `position` (k, 3) and `rotation`
-        (k, 3, 3).
+        (k, 3, 3) are used.
     figure
         To draw on; default: a new one.
 
@@ -104,16 +73,16 @@ def plot_assembly_modes(
     columns = min(4, count)
     rows = -(-count // columns)
     with matplotlib.rc_context(STYLE):
-        figure = figure or Figure(figsize=(3.0 * columns, 3.4 * rows), layout="constrained")
         for k in range(count):
-            axes = axes_in_space(figure, (rows, columns, k + 1))
+            axes = axes_in_space(figure, (3.0 * columns, 3.4 * rows), (rows, columns, k + 1))
+            figure = figure_of(axes)
             _draw_robot(axes, base, tips[k])
             degrees = ", ".join(f"{angle:.0f}" for angle in np.rad2deg(modes.angle[k]))
             axes.set_title(f"{k + 1}: $\\phi$ = {degrees}°", fontsize=9)
             axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(low, high))
             _label_space(axes, size=7)
             axes.set_box_aspect((1, 1, (high - low) / (2 * reach)), zoom=0.8)
-    return figure
+    return figure_of(axes)
 
 
 def plot_theoretical(parameters: RPSParameters, figure: Figure | None = None) -> Figure:
@@ -124,25 +93,20 @@ def plot_theoretical(parameters: RPSParameters, figure: Figure | None = None) ->
     """
     h = 1e3 * parameters.platform_radius
     with matplotlib.rc_context(STYLE):
-        figure = figure or Figure(figsize=(5.6, 5.2), layout="constrained")
-        axes = axes_in_space(figure)
+        axes = axes_in_space(figure, (5.6, 5.2))
         _draw_cylinder(axes, h, -h, h)
         axes.scatter([0], [0], [0], color="black", s=20, label="level, $p_x = p_y = 0$")
         # Tilt by pi along alpha: p = h (cos 2a', ...), on the cylinder (Eq. 4)
         for i, way in enumerate(np.deg2rad([0.0, 60.0, 120.0])):
             centre = h * np.array([np.cos(2 * way), -np.sin(2 * way), 0.0])
-            axes.scatter(
-                *centre[:, None],
-                color=LEG_COLOURS[0],
-                s=20,
-                label="half a turn: the limit" if i == 0 else None,
-            )
+            label = "half a turn: the limit" if i == 0 else None
+            axes.scatter(*centre[:, None], color=LEG_COLOURS[0], s=20, label=label)
             axes.plot(*np.stack([np.zeros(3), centre], axis=1), color=LEG_COLOURS[0], lw=0.8)
         _label_space(axes, z_label="$p_z$, any height (mm)")
         axes.set_title(f"Theoretical workspace, radius h = {h:.4g} mm")
         axes.legend(loc="upper left")
         axes.set_box_aspect((1, 1, 1), zoom=0.88)
-    return figure
+    return figure_of(axes)
 
 
 def plot_effective(workspace: Workspace, figure: Figure | None = None) -> Figure:
@@ -152,24 +116,20 @@ def plot_effective(workspace: Workspace, figure: Figure | None = None) -> Figure
     h = 1e3 * workspace.parameters.platform_radius
     low, high = float(points[:, 2].min()), float(points[:, 2].max())
     with matplotlib.rc_context(STYLE):
-        figure = figure or Figure(figsize=(5.6, 5.2), layout="constrained")
-        axes = axes_in_space(figure)
+        axes = axes_in_space(figure, (5.6, 5.2))
         _draw_cylinder(axes, h, low, high)
         axes.add_collection3d(Poly3DCollection(points[mesh.faces], color=_INSIDE))
         reach = float(np.abs(points[:, :2]).max())
-        axes.text2D(
-            0.02,
-            0.94,
+        text = (
             f"grey: theoretical, radius {h:.4g} mm\n"
-            f"blue: effective, within {reach:.3g} mm of the axis in x and y",
-            transform=axes.transAxes,
-            fontsize=8,
+            f"blue: effective, within {reach:.3g} mm of the axis in x and y"
         )
+        axes.text2D(0.02, 0.94, text, transform=axes.transAxes, fontsize=8)
         axes.set(xlim=(-h, h), ylim=(-h, h), zlim=(low, high))
         _label_space(axes)
         axes.set_title("Effective and theoretical workspace")
         axes.set_box_aspect((1, 1, 1), zoom=0.88)
-    return figure
+    return figure_of(axes)
 
 
 def plot_space(workspace: Workspace, figure: Figure | None = None) -> Figure:
@@ -180,18 +140,15 @@ def plot_space(workspace: Workspace, figure: Figure | None = None) -> Figure:
     mesh = boundary(workspace)
     points = 1e3 * mesh.vertices
     with matplotlib.rc_context(STYLE):
-        figure = figure or Figure(figsize=(5.6, 5.4), layout="constrained")
-        axes = axes_in_space(figure)
-        triangles = points[mesh.faces]
-        axes.add_collection3d(
-            Poly3DCollection(triangles, facecolors=_shaded(triangles), linewidths=0)
-        )
-        low, high = points.min(axis=0), points.max(axis=0)
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        axes = axes_in_space(figure, (5.6, 5.4))
+        shape = points[mesh.faces]
+        axes.add_collection3d(Poly3DCollection(shape, facecolors=_shaded(shape), linewidths=0))
+        x, y, z = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
+        axes.set(xlim=x, ylim=y, zlim=z)
         _label_space(axes)
         axes.set_title("Effective workspace of the platform's centre")
         axes.set_box_aspect((1, 1, 1.2), zoom=0.85)
-    return figure
+    return figure_of(axes)
 
 
 def plot_views(workspace: Workspace, figure: Figure | None = None) -> Figure:
@@ -203,9 +160,8 @@ def plot_views(workspace: Workspace, figure: Figure | None = None) -> Figure:
         figure = figure or Figure(figsize=(10.5, 3.8), layout="constrained")
         for axes, (name, i, j) in zip(figure.subplots(1, 3), _VIEWS, strict=True):
             axes.plot(points[:, i], points[:, j], ",", color=_INSIDE, alpha=0.5, rasterized=True)
-            axes.set_xlabel(f"$p_{'xyz'[i]}$ (mm)")
-            axes.set_ylabel(f"$p_{'xyz'[j]}$ (mm)")
-            axes.set_title(f"{name}", loc="left")
+            axes.set(xlabel=f"$p_{'xyz'[i]}$ (mm)", ylabel=f"$p_{'xyz'[j]}$ (mm)")
+            axes.set_title(name, loc="left")
             if j == 1:
                 axes.set_aspect("equal", adjustable="datalim")
     return figure
@@ -233,15 +189,14 @@ def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) 
     plane = workspace.plane(0, height)
     if min(plane.grid.shape[1:]) < 2:
         raise InputError("a map needs at least 2 values of tilt_x and of tilt_y")
-    colours = [to_rgba(colour) for colour in (_INSIDE, *_REASON_COLOURS)]
-    reason = plane.reason[0]
-    family = np.zeros(reason.shape, dtype=int)
-    for i, (_, bits) in reversed(list(enumerate(_FAMILIES))):  # the first family wins
-        family[(reason & np.uint16(bits)) != 0] = i + 1
+    names, parts, colours = zip(("inside", "-", _INSIDE), *_FAMILIES, strict=True)
+    bits = [sum(int(one) for one in Reason if str(one.name).endswith(part)) for part in parts]
+    # 0 for inside: the first family that a reason is of, or of none
+    family = ((plane.reason[0, ..., None] & np.array(bits)) != 0).argmax(axis=-1)
     _, x, y = (np.rad2deg(axis) for axis in plane.grid.axes)
     with matplotlib.rc_context(STYLE):
         axes = new_axes(axes, (6.4, 4.4))
-        image = np.array(colours)[family]
+        image = to_rgba_array(colours)[family]
         half_x, half_y = (x[1] - x[0]) / 2, (y[1] - y[0]) / 2
         axes.imshow(
             np.swapaxes(image, 0, 1),
@@ -249,12 +204,10 @@ def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) 
             extent=(x[0] - half_x, x[-1] + half_x, y[0] - half_y, y[-1] + half_y),
             interpolation="nearest",
         )
-        names = ["inside", *(name for name, _ in _FAMILIES)]
         for i in np.unique(family):
             axes.plot([], [], "s", color=colours[i], label=names[i])
         axes.grid(visible=False)
-        axes.set_xlabel("tilt about x (°)")
-        axes.set_ylabel("tilt about y (°)")
+        axes.set(xlabel="tilt about x (°)", ylabel="tilt about y (°)")
         axes.set_title(f"Tilts at $p_z$ = {1e3 * plane.grid.axes[0][0]:.5g} mm", loc="left")
         axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1), frameon=False)
     return figure_of(axes)
@@ -288,15 +241,11 @@ def plot_comparison(rows: Sequence[_Reach], axes: Axes | None = None) -> Figure:
     radius = [1e3 * row.base_radius for row in rows]
     with matplotlib.rc_context(STYLE):
         axes = new_axes(axes, (6.4, 3.8))
-        lines = (
-            ("greatest $|p_x|$", [1e3 * max(map(abs, row.x)) for row in rows], "-o"),
-            ("greatest $|p_y|$", [1e3 * max(map(abs, row.y)) for row in rows], "--s"),
-        )
-        for (label, values, style), colour in zip(lines, LEG_COLOURS, strict=False):
-            axes.plot(radius, values, style, color=colour, label=label)
+        for axis, look, colour in (("x", "-o", style.BLUE), ("y", "--s", style.VERMILION)):
+            values = [1e3 * max(map(abs, getattr(row, axis))) for row in rows]
+            axes.plot(radius, values, look, color=colour, label=f"greatest $|p_{axis}|$")
         axes.axhline(1e3 * rows[0].stated_reach, color="black", lw=1, ls=":", label="paper")
-        axes.set_xlabel("base radius g (mm)")
-        axes.set_ylabel("reach (mm)")
+        axes.set(xlabel="base radius g (mm)", ylabel="reach (mm)")
         axes.set_ylim(bottom=0)
         axes.set_title("Parasitic reach for 50 mm of leg stroke", loc="left")
         axes.legend(loc="upper left", frameon=False)
@@ -321,12 +270,10 @@ def _draw_robot(axes: Axes3D, base: Array, tips: Array) -> None:
 
 def _draw_cylinder(axes: Axes3D, radius: float, low: float, high: float) -> None:
     turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, 73), [low, high])
-    axes.plot_surface(
-        radius * np.cos(turn), radius * np.sin(turn), height, color=_CYLINDER, alpha=0.25, lw=0
-    )
-    for end in (low, high):
-        x, y = radius * np.cos(turn[0]), radius * np.sin(turn[0])
-        axes.plot(x, y, np.full_like(x, end), color=_CYLINDER, lw=1)
+    circle = radius * np.cos(turn), radius * np.sin(turn), height
+    axes.plot_surface(*circle, color=_CYLINDER, alpha=0.25, lw=0)
+    for end in zip(*circle, strict=True):
+        axes.plot(*end, color=_CYLINDER, lw=1)
 
 
 def _shaded(triangles: Array) -> Array:
@@ -341,5 +288,5 @@ def _shaded(triangles: Array) -> Array:
     light = (normal / np.where(size > 0, size, 1.0)) @ np.array([0.36, -0.48, 0.8])
     brightness = 0.65 + 0.35 * light[:, None]
     colour = np.array(to_rgba(_INSIDE)[:3])
-    rgb = np.clip(colour * brightness + (1 - brightness) * 0.1, 0.0, 1.0)
-    return np.concatenate([rgb, np.ones((len(rgb), 1))], axis=1)
+    rgb: Array = np.clip(colour * brightness + (1 - brightness) * 0.1, 0.0, 1.0)
+    return rgb
