@@ -279,8 +279,10 @@ def newton(
         by_angle = eq.slopes(w, z, g)
         det = eq.determinant(by_angle)
         half_inverse = wanting * (-0.5) / np.where(np.abs(det) < _TINY, _TINY, det)
-        t = np.array(eq.matrix_times(eq.adjugate(by_angle), f, half_inverse))
-        w[:], z[:] = eq.turned(w, z, np.clip(t, -1.0, 1.0, out=t))
+        t = eq.matrix_times(eq.adjugate(by_angle), f, half_inverse)
+        for leg in range(3):
+            half_step = np.minimum(np.maximum(t[leg], -1.0), 1.0)
+            w[leg], z[leg] = eq.turned(w[leg], z[leg], half_step)
         wanting &= eq.largest(t) > _LAST_STEP
 
 
