@@ -13,7 +13,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PUBLIC = ("closed_loop", "rps", "trajectories", "control", "viewer", "errors")
+PUBLIC = ("closed_loop", "rps", "trajectories", "control", "viewer", "paper", "errors")
 NUMBER = re.compile(r"[-+]?\d+(?:\.(\d*))?(?:e([-+]?\d+))?")
 
 
