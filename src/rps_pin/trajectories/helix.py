@@ -24,8 +24,9 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.trajectories.curve import CurveSample, LawSample, TimedCurve
-from rps_pin.trajectories.path import checked_parameters, checked_times
+from rps_pin.trajectories.curve import CurveSample, TimedCurve
+from rps_pin.trajectories.path import checked_parameters
+from rps_pin.trajectories.piecewise_law import PiecewiseLaw
 from rps_pin.validation import choice, finite_number, positive_number
 
 #: Eq. 29: t_a and t_t of Table 1, the latter unrounded (5.2388 s).
@@ -85,37 +86,8 @@ class HelixCurve:
         )
 
 
-class HelixLaw:
-    """Eq. 29, corrected, scaled to a duration (s): phi from 0 to 2 pi."""
-
-    def __init__(self, duration: float) -> None:
-        self.duration = positive_number(duration, "duration", "seconds")
-        #: Duration of the rise and of the fall of the speed, s.
-        self.ramp = duration * PAPER_RAMP / PAPER_DURATION
-
-    def __repr__(self) -> str:
-        return f"HelixLaw(duration={self.duration:.6g})"
-
-    def at(self, t: ArrayLike) -> LawSample:
-        """Return phi and its time derivatives at times of shape (...), s."""
-        times = checked_times(t, self.duration)
-        speed = 2 * math.pi / (self.duration - self.ramp)  # of the middle piece
-        acceleration = speed / self.ramp
-        left = self.duration - times
-        rising, falling = times < self.ramp, left <= self.ramp
-        return LawSample(
-            np.select(
-                [rising, falling],
-                [acceleration * times**2 / 2, 2 * math.pi - acceleration * left**2 / 2],
-                speed * (times - self.ramp / 2),
-            ),
-            np.select([rising, falling], [acceleration * times, acceleration * left], speed),
-            np.select([rising, falling], [acceleration, -acceleration], 0.0),
-        )
-
-
 class HelixPath(TimedCurve):
-    """A helix of the platform's centre: a `HelixCurve` and a `HelixLaw`.
+    """A helix of the platform's centre: a `HelixCurve` and Eq. 29, corrected, scaled in time.
 
     See `helix` for the parameters.
     """
@@ -139,7 +111,7 @@ class HelixPath(TimedCurve):
                 f"radius = {radius} m: the centre of a platform of radius h = {platform_radius} m "
                 f"reaches 0 to {platform_radius} m sideways"
             )
-        law = HelixLaw(duration)
+        positive_number(duration, "duration", "seconds")
         self.radius = radius
         self.pitch = pitch
         self.height = height
@@ -147,7 +119,10 @@ class HelixPath(TimedCurve):
         #: The constant tilt of the platform, rad: r = h/2 (1 - cos(beta)) = h sin^2(beta/2).
         self.tilt = 2 * math.asin(math.sqrt(radius / platform_radius))
         #: Duration of the rise and of the fall of the speed, s.
-        self.ramp = law.ramp
+        self.ramp = duration * PAPER_RAMP / PAPER_DURATION
+        speed = 2 * math.pi / (duration - self.ramp)  # of the middle piece
+        pieces = [self.ramp, duration - 2 * self.ramp, self.ramp]
+        law = PiecewiseLaw(pieces, [0.0] * 3, [speed / self.ramp, 0.0, -speed / self.ramp])
         tilt = self.tilt if branch == "+" else -self.tilt
         super().__init__(HelixCurve(tilt, pitch, height), law)
 

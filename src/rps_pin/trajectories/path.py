@@ -67,12 +67,8 @@ def checked_times(t: ArrayLike, duration: float) -> Array:
     InputError
         If a time is not a finite number, or outside [0, duration] by more than rounding.
     """
-    times = numbers(t, "times", "numbers, in seconds")
-    return _within(
-        times,
-        duration,
-        "time {:.9g} s is outside the trajectory, which runs from 0 to {:.9g} s",
-    )
+    message = "time {:.9g} s is outside the trajectory, which runs from 0 to {:.9g} s"
+    return _within(numbers(t, "times", "numbers, in seconds"), duration, message)
 
 
 def checked_parameters(u: ArrayLike, length: float) -> Array:
@@ -83,10 +79,8 @@ def checked_parameters(u: ArrayLike, length: float) -> Array:
     InputError
         If one is not a finite number, or outside [0, length] by more than rounding.
     """
-    parameters = numbers(u, "parameters of a curve", "numbers")
-    return _within(
-        parameters, length, "u = {:.9g} is outside the curve, which runs from 0 to {:.9g}"
-    )
+    message = "u = {:.9g} is outside the curve, which runs from 0 to {:.9g}"
+    return _within(numbers(u, "parameters of a curve", "numbers"), length, message)
 
 
 def _within(values: Array, end: float, message: str) -> Array:

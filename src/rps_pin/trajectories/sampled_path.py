@@ -29,13 +29,8 @@ from scipy.interpolate import BPoly, BSpline, make_interp_spline
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.trajectories.path import (
-    POSE,
-    PathSample,
-    checked_poses,
-    checked_times,
-    times_from_zero,
-)
+from rps_pin.trajectories import path
+from rps_pin.trajectories.path import POSE, PathSample
 from rps_pin.trajectories.resampled import ResampledCurve
 from rps_pin.validation import choice, fixed_array
 
@@ -90,23 +85,24 @@ class SampledPath:
         *,
         ends: Ends | None = None,
     ) -> None:
-        self.poses = checked_poses(poses, "poses")
-        self.times = times_from_zero(times, len(self.poses))
+        self.poses = path.checked_poses(poses, "poses")
+        self.times = path.times_from_zero(times, len(self.poses))
         shape = self.poses.shape
         self.rates = None if rates is None else fixed_array(rates, "rates", shape, POSE)
         self.accelerations = None
         moved: Any  # BSpline or BPoly, which are used alike
         with np.errstate(all="ignore"):  # what overflows is refused
             if accelerations is None:
-                assumed = _assumed(ends, self.rates)
+                if ends == "measured" and rates is None:
+                    raise InputError("ends = 'measured': no rates are given")
+                default = "at rest" if rates is None else "measured"
+                assumed = choice(default if ends is None else ends, "ends", get_args(Ends))
                 self._from, moved = _spline(self.times, self.poses, assumed, self.rates)
+            elif self.rates is None:
+                raise InputError("accelerations are given without rates")
+            elif ends is not None:
+                raise InputError(f"ends = {ends!r}: samples with accelerations have measured ends")
             else:
-                if self.rates is None:
-                    raise InputError("accelerations are given without rates")
-                if ends is not None:
-                    raise InputError(
-                        f"ends = {ends!r}: samples with accelerations have measured ends"
-                    )
                 assumed = "measured"
                 a = fixed_array(accelerations, "accelerations", shape, POSE)
                 self._from, moved = _hermite(self.times, self.poses, self.rates, a)
@@ -140,18 +136,10 @@ class SampledPath:
         InputError
             If a time lies outside the trajectory.
         """
-        times = checked_times(t, self.duration)
+        times = path.checked_times(t, self.duration)
         i = np.searchsorted(self.times[1:-1], times, side="right")
         moved, rate, acceleration = (np.asarray(piece(times)) for piece in self._moved)
         return PathSample(self._from[i] + moved, rate, acceleration)
-
-
-def _assumed(ends: Ends | None, rates: Array | None) -> str:
-    if ends is None:
-        return "at rest" if rates is None else "measured"
-    if ends == "measured" and rates is None:
-        raise InputError("ends = 'measured': no rates are given")
-    return choice(ends, "ends", get_args(Ends))
 
 
 def _said(assumed: str, rates: Array | None, sample: int) -> str:
@@ -163,21 +151,14 @@ def _said(assumed: str, rates: Array | None, sample: int) -> str:
 
 def _spline(times: Array, poses: Array, assumed: str, rates: Array | None) -> tuple[Array, BSpline]:
     """Return where each step counts from (n - 1, 3), and the spline of the motion from there."""
-    conditions: Any = None
-    if assumed == "free":
-        if len(times) < FEWEST_POSES:
-            raise InputError(
-                f"{len(times)} samples; {FEWEST_POSES} or more are needed for a spline with free "
-                "ends"
-            )
-    else:
-        rest = np.zeros(3)
-        conditions = tuple(
-            [(1, rest), (2, rest)]
-            if rates is None or assumed == "at rest"
-            else [(1, rates[i]), (3, rest)]
-            for i in (0, -1)
+    if assumed == "free" and len(times) < FEWEST_POSES:
+        raise InputError(
+            f"{len(times)} samples; {FEWEST_POSES} or more are needed for a spline with free ends"
         )
+    rest = [(1, np.zeros(3)), (2, np.zeros(3))]
+    conditions: Any = None if assumed == "free" else (rest, rest)
+    if assumed == "measured" and rates is not None:
+        conditions = tuple([(1, rate), (3, np.zeros(3))] for rate in rates[[0, -1]])
     motion = poses - poses[0]
     try:
         spline: BSpline = make_interp_spline(times, motion, k=5, bc_type=conditions)
@@ -203,13 +184,6 @@ def _hermite(times: Array, x: Array, v: Array, a: Array) -> tuple[Array, BPoly]:
     h = np.diff(times)[:, None]
     motion = np.diff(x, axis=0)
     first, last = v[:-1] * h / 5, v[1:] * h / 5
-    curvature, last_curvature = a[:-1] * h**2 / 20, a[1:] * h**2 / 20
-    c = [
-        0 * motion,
-        first,
-        2 * first + curvature,
-        motion - 2 * last + last_curvature,
-        motion - last,
-        motion,
-    ]
-    return x[:-1], BPoly(np.stack(c), times)
+    second, fourth = 2 * first + a[:-1] * h**2 / 20, motion - 2 * last + a[1:] * h**2 / 20
+    c = np.stack([0 * motion, first, second, fourth, motion - last, motion])
+    return x[:-1], BPoly(c, times)

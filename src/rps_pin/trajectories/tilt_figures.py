@@ -146,23 +146,18 @@ def lissajous(
     InputError
         If a number is not finite, or not what it must be; or if nothing moves.
     """
-    sizes, frequencies, phases = (
-        _pair(value, name)
-        for name, value in (("amplitude", amplitude), ("frequency", frequency), ("phase", phase))
-    )
     lifted, lift_frequency = _pair(lift, "lift")
-    size = [
-        finite_number(lifted, "lift's amplitude"),
-        *(finite_number(one, "amplitude") for one in sizes),
-    ]
-    swings = [whole_number(one, "frequency") for one in frequencies]
+    size = [finite_number(lifted, "lift's amplitude")]
+    size += [finite_number(one, "amplitude") for one in _pair(amplitude, "amplitude")]
+    swings = [whole_number(one, "frequency") for one in _pair(frequency, "frequency")]
+    phases = [finite_number(one, "phase") for one in _pair(phase, "phase")]
     if not any(size):
         raise InputError("amplitude and lift are zero: nothing moves")
     curve = HarmonicCurve(
         [finite_number(height, "height"), 0.0, 0.0],
         size,
         [whole_number(lift_frequency, "lift's frequency"), *swings],
-        [0.0, *(finite_number(one, "phase") for one in phases)],
+        [0.0, *phases],
         2 * math.pi * positive_number(turns, "turns"),
     )
     return TimedCurve(curve, time_law(curve.length, profile, duration=duration))

@@ -12,8 +12,7 @@ kind that keeps limits of speed u', acceleration u'' and jerk u'''.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from math import inf, sqrt
 from typing import Literal
 
 from numpy.typing import ArrayLike
@@ -27,7 +26,7 @@ from rps_pin.validation import choice, positive_number, real
 Profile = Literal["quintic", "trapezoidal", "s-curve"]
 
 #: Of the quintic: largest speed, acceleration and jerk of D = T = 1.
-_QUINTIC_PEAKS = (15 / 8, 10 / math.sqrt(3), 60.0)
+_QUINTIC_PEAKS = (15 / 8, 10 / sqrt(3), 60.0)
 
 #: Without limits, the share of the duration in which the speed rises, and in which it falls.
 RAMP = 0.25
@@ -55,12 +54,7 @@ class QuinticLaw:
 
     @classmethod
     def within(
-        cls,
-        distance: float,
-        *,
-        speed: float = math.inf,
-        acceleration: float = math.inf,
-        jerk: float = math.inf,
+        cls, distance: float, *, speed: float = inf, acceleration: float = inf, jerk: float = inf
     ) -> QuinticLaw:
         """Return the shortest law within limits, of which one at least must be finite."""
         limits = _limits(speed, acceleration, jerk)
@@ -114,12 +108,7 @@ class TrapezoidalLaw(PiecewiseLaw):
 
     @classmethod
     def within(
-        cls,
-        distance: float,
-        *,
-        speed: float = math.inf,
-        acceleration: float = math.inf,
-        jerk: float = math.inf,
+        cls, distance: float, *, speed: float = inf, acceleration: float = inf, jerk: float = inf
     ) -> TrapezoidalLaw:
         """Return the shortest law within limits; the acceleration's must be finite.
 
@@ -129,13 +118,13 @@ class TrapezoidalLaw(PiecewiseLaw):
             Also if a limit of jerk is given: the jerk of this law has none.
         """
         v, a, j = _limits(speed, acceleration, jerk)
-        if math.isfinite(j):
+        if j < inf:
             raise InputError("trapezoidal speed cannot limit the jerk; the profile 's-curve' does")
-        if not math.isfinite(a):
+        if a == inf:
             raise InputError("trapezoidal speed needs a limit of acceleration")
         D = positive_number(distance, "distance")
         if v * v >= D * a:  # a triangle: its top is sqrt(D a)
-            return cls(D, 2 * math.sqrt(D / a), ramp=0.5)
+            return cls(D, 2 * sqrt(D / a), ramp=0.5)
         duration = D / v + v / a
         return cls(D, duration, ramp=min(v / a / duration, 0.5))
 
@@ -170,12 +159,7 @@ class SCurveLaw(PiecewiseLaw):
 
     @classmethod
     def within(
-        cls,
-        distance: float,
-        *,
-        speed: float = math.inf,
-        acceleration: float = math.inf,
-        jerk: float = math.inf,
+        cls, distance: float, *, speed: float = inf, acceleration: float = inf, jerk: float = inf
     ) -> SCurveLaw:
         """Return the shortest law within limits; the jerk's must be finite.
 
@@ -183,17 +167,17 @@ class SCurveLaw(PiecewiseLaw):
         distance without a piece of constant speed is j r (r + s) (2 r + s).
         """
         v, a, j = _limits(speed, acceleration, jerk)
-        if not math.isfinite(j):
+        if j == inf:
             raise InputError("an S-curve needs a limit of jerk")
         D = positive_number(distance, "distance")
         whole = (D / (2 * j)) ** (1 / 3)  # four rises cover the distance
-        rise = min(a / j, math.sqrt(v / j), whole)
+        rise = min(a / j, sqrt(v / j), whole)
         steady, no_cruise = 0.0, rise == whole
         if rise == a / j:
             # The longest s that the speed, and the distance without constant speed, allow.
             by_speed = v / a - rise
             # a (r + s) (2 r + s) = D, a quadratic in s
-            by_distance = (-3 * rise + math.sqrt(rise**2 + 4 * D / a)) / 2
+            by_distance = (-3 * rise + sqrt(rise**2 + 4 * D / a)) / 2
             steady = max(0.0, min(by_speed, by_distance))
             no_cruise = by_distance <= by_speed
         top = j * rise * (rise + steady)
@@ -218,9 +202,9 @@ def time_law(
     profile: Profile,
     *,
     duration: float | None = None,
-    speed: float = math.inf,
-    acceleration: float = math.inf,
-    jerk: float = math.inf,
+    speed: float = inf,
+    acceleration: float = inf,
+    jerk: float = inf,
 ) -> TimeLaw:
     """Return a law by the name of its profile: for a duration, or the shortest within limits.
 
@@ -230,19 +214,16 @@ def time_law(
         If the profile is unknown, or both a duration and limits are given, or neither is, or the
         profile needs a limit that is not given.
     """
-    made: dict[str, tuple[Callable[..., TimeLaw], Callable[..., TimeLaw]]] = {
-        "quintic": (QuinticLaw, QuinticLaw.within),
-        "trapezoidal": (TrapezoidalLaw, TrapezoidalLaw.within),
-        "s-curve": (SCurveLaw, SCurveLaw.within),
-    }
-    for_duration, within = made[choice(profile, "profile", list(made))]
-    limited = any(limit != math.inf for limit in (speed, acceleration, jerk))
+    laws: dict[str, type[QuinticLaw | TrapezoidalLaw | SCurveLaw]]
+    laws = {"quintic": QuinticLaw, "trapezoidal": TrapezoidalLaw, "s-curve": SCurveLaw}
+    law = laws[choice(profile, "profile", list(laws))]
+    limited = any(limit != inf for limit in (speed, acceleration, jerk))
     if (duration is not None) == limited:
         given = "both are given" if limited else "neither is given"
         raise InputError(f"give a duration, or limits for the shortest one: {given}")
     if duration is not None:
-        return for_duration(distance, duration)
-    return within(distance, speed=speed, acceleration=acceleration, jerk=jerk)
+        return law(distance, duration)
+    return law.within(distance, speed=speed, acceleration=acceleration, jerk=jerk)
 
 
 def _ramp(ramp: float) -> float:
@@ -255,7 +236,7 @@ def _ramp(ramp: float) -> float:
 def _limits(speed: float, acceleration: float, jerk: float) -> tuple[float, float, float]:
     """Return limits that are positive; infinity is none."""
     v, a, j = (
-        math.inf if real(value) == math.inf else positive_number(value, f"limit of {name}")
-        for name, value in (("speed", speed), ("acceleration", acceleration), ("jerk", jerk))
+        inf if real(value) == inf else positive_number(value, f"limit of {name}")
+        for name, value in {"speed": speed, "acceleration": acceleration, "jerk": jerk}.items()
     )
     return v, a, j
