@@ -20,7 +20,7 @@ from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import BinaryIO, NoReturn
+from typing import BinaryIO
 
 import numpy as np
 
@@ -52,19 +52,11 @@ UNITS = {"time": {"s": 1.0, "ms": 1e-3, "us": 1e-6}} | {
 #: Quantity and unit of every column that is read, by its name.
 READ = {f"{quantity}_{unit}": (quantity, unit) for quantity in UNITS for unit in UNITS[quantity]}
 #: Other columns that `rps_pin.rps.dynamics.motion_csv` writes; they follow from the motion.
-IGNORED = frozenset(
-    ["x_m", "y_m"]
-    + [
-        f"{quantity}_{leg}_{unit}"
-        for quantity, unit in (
-            ("length", "m"),
-            ("speed", "m_per_s"),
-            ("leg_acceleration", "m_per_s2"),
-            ("force", "N"),
-        )
-        for leg in (1, 2, 3)
-    ]
-)
+IGNORED = {"x_m", "y_m"} | {
+    name.format(leg)
+    for name in ("length_{}_m", "speed_{}_m_per_s", "leg_acceleration_{}_m_per_s2", "force_{}_N")
+    for leg in (1, 2, 3)
+}
 #: Largest values: two turns of tilt are one too many, and no robot of this kind is so high (m).
 _LARGEST = {"z": 100.0, "tilt_x": 2 * math.pi, "tilt_y": 2 * math.pi}
 _INSTEAD = {"z": "millimetres? Then name the column z_mm", "tilt": "degrees? Then name it {}_deg"}
@@ -118,7 +110,7 @@ def read_csv(
     columns = [
         np.stack([table.si(name) for name in names], axis=-1)
         for names in (COORDINATES, RATES, ACCELERATIONS)
-        if names[0] in table.columns
+        if names[0] in table.positions
     ]
     try:
         return SampledPath(table.si("time"), *columns, ends=ends)
@@ -130,35 +122,39 @@ def read_csv(
 
 
 @dataclass(frozen=True)
-class _Column:
-    name: str
-    """As in the header."""
-    values: Array
-    """Shape (rows,), in the unit of the file; finite."""
-    factor: float
-    """Value of the unit in SI."""
-
-
-@dataclass(frozen=True)
 class _Table:
     """The numbers of a file, and their lines."""
 
-    columns: Mapping[str, _Column]
-    """By quantity."""
+    names: Sequence[str]
+    """Of the columns, as in the header."""
+    positions: Mapping[str, int]
+    """Of the columns that are read, by quantity."""
+    rows: Array
+    """Shape (rows, columns), in the units of the file; finite."""
     lines: Sequence[int]
-    """The line of each row, from 1."""
-    header_line: int
+    """The line of the header, and of each row, from 1."""
     origin: str
     """The file, for messages."""
 
     def place(self, row: int) -> str:
-        """Return ``"FILE, line N"`` of a row."""
-        return f"{self.origin}, line {self.lines[row]}"
+        """Return ``"FILE, line N"`` of a row; of the header for -1."""
+        return f"{self.origin}, line {self.lines[row + 1]}"
+
+    def name(self, quantity: str) -> str:
+        """Return the name of a quantity's column."""
+        return self.names[self.positions[quantity]]
+
+    def factor(self, quantity: str) -> float:
+        """Return the value of a quantity's unit in SI."""
+        return UNITS[quantity][READ[self.name(quantity)][1]]
+
+    def written(self, quantity: str) -> Array:
+        """Return the values of a quantity in its unit in the file."""
+        return self.rows[:, self.positions[quantity]]
 
     def si(self, quantity: str) -> Array:
         """Return the values of a quantity in SI units."""
-        column = self.columns[quantity]
-        return column.values * column.factor
+        return self.written(quantity) * self.factor(quantity)
 
 
 def _lines(file: BinaryIO, origin: str) -> Iterator[tuple[int, str]]:
@@ -166,23 +162,24 @@ def _lines(file: BinaryIO, origin: str) -> Iterator[tuple[int, str]]:
     number = 0
     while raw := file.readline(LONGEST_LINE + 1):
         number += 1
-        place = f"{origin}, line {number}"
         if number > MOST_LINES:
             raise InputError(f"{origin} has more than {MOST_LINES} lines, the most that is read")
         if len(raw) > LONGEST_LINE:
-            raise InputError(f"{place}: more than {LONGEST_LINE} bytes, the most that is read")
+            raise InputError(
+                f"{origin}, line {number}: more than {LONGEST_LINE} bytes, the most that is read"
+            )
         try:
             line = raw.decode("utf-8-sig" if number == 1 else "utf-8").strip(" \r\n")
         except UnicodeDecodeError as error:
-            byte = raw[error.start]
-            raise InputError(f"{place}: not a UTF-8 text (byte 0x{byte:02x})") from None
+            byte = f"byte 0x{raw[error.start]:02x}"
+            raise InputError(f"{origin}, line {number}: not a UTF-8 text ({byte})") from None
         if line and not line.startswith("#"):
             yield number, line
 
 
 def _table(lines: Iterator[tuple[int, str]], origin: str) -> _Table:
-    header_line, header = next(lines, (0, ""))
-    if not header_line:
+    number, header = next(lines, (0, ""))
+    if not number:
         raise InputError(f"{origin} is empty: its first line must name the columns")
     try:
         used = [mark for mark in _DELIMITERS if mark in header] or [","]
@@ -192,39 +189,15 @@ def _table(lines: Iterator[tuple[int, str]], origin: str) -> _Table:
         names = [cell.strip() for cell in _cells(header, used[0])]
         positions = _columns(names)
     except InputError as error:
-        raise InputError(f"{origin}, line {header_line}: {error}") from None
-    values, numbers = array("d"), array("q")
+        raise InputError(f"{origin}, line {number}: {error}") from None
+    numbers, values = array("q", [number]), array("d")
     for number, line in lines:
-        place = f"{origin}, line {number}"
         try:
-            cells = _cells(line, used[0])
+            values.extend(_row(line, used[0], names))
         except InputError as error:
-            raise InputError(f"{place}: {error}") from None
-        if len(cells) != len(names):
-            comma = used == [","] and len(cells) > len(names) and all(map(_is_number, cells))
-            raise InputError(
-                f"{place}: {len(cells)} cell{'s' if cells[1:] else ''}, where the header names "
-                f"{len(names)} columns{_POINT if comma else ''}"
-            )
-        try:
-            if "_" in line:  # float("1_0") is 10
-                raise ValueError
-            values.extend(map(float, cells))
-        except ValueError:
-            _refuse_cell(cells, names, place)
+            raise InputError(f"{origin}, line {number}: {error}") from None
         numbers.append(number)
-    rows = np.array(values).reshape(-1, len(names))
-    finite = np.isfinite(rows)
-    if not finite.all():
-        row, column = (int(i) for i in np.argwhere(~finite)[0])
-        value = rows[row, column]
-        place = f"{origin}, line {numbers[row]}"
-        raise InputError(f"{place}: {names[column]} = {value}: it must be finite")
-    columns = {
-        quantity: _Column(names[i], rows[:, i], UNITS[quantity][READ[names[i]][1]])
-        for quantity, i in positions.items()
-    }
-    return _Table(columns, numbers, header_line, origin)
+    return _Table(names, positions, np.array(values).reshape(-1, len(names)), numbers, origin)
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
@@ -236,14 +209,32 @@ def _cells(line: str, delimiter: str) -> list[str]:
         raise InputError(str(error)) from None
 
 
-def _refuse_cell(cells: Sequence[str], names: Sequence[str], place: str) -> NoReturn:
-    """Refuse the first cell that is not a number."""
-    index = next(i for i, cell in enumerate(cells) if not _is_number(cell))
-    cell, name = cells[index].strip(), names[index]
-    if not cell:
-        raise InputError(f"{place}: {name} is empty: every sample needs all values")
-    point = _POINT if "," in cell else ""
-    raise InputError(f"{place}: {name} = {shown(cell)}: it must be a number{point}")
+def _row(line: str, delimiter: str, names: Sequence[str]) -> list[float]:
+    """Return the numbers of a line."""
+    cells = _cells(line, delimiter)
+    if len(cells) != len(names):
+        comma = delimiter == "," and len(cells) > len(names) and all(map(_is_number, cells))
+        raise InputError(
+            f"{len(cells)} cell{'s' if cells[1:] else ''}, where the header names {len(names)} "
+            f"columns{_POINT if comma else ''}"
+        )
+    try:
+        found = [float(cell) for cell in cells]
+    except ValueError:
+        found = [math.nan]
+    if "_" in line or not all(map(math.isfinite, found)):  # float("1_0") is 10
+        raise InputError(next(filter(None, map(_fault, names, cells))))
+    return found
+
+
+def _fault(name: str, cell: str) -> str:
+    """Return what is wrong with a cell; empty if it is a finite number."""
+    if not cell.strip():
+        return f"{name} is empty: every sample needs all values"
+    if not _is_number(cell):
+        point = _POINT if "," in cell else ""
+        return f"{name} = {shown(cell.strip())}: it must be a number{point}"
+    return "" if math.isfinite(float(cell)) else f"{name} = {float(cell)}: it must be finite"
 
 
 def _is_number(cell: str) -> bool:
@@ -326,12 +317,11 @@ def _names(quantity: str) -> list[str]:
 
 
 def _refuse_few(table: _Table, needed: int) -> None:
-    rows = len(table.lines)
+    rows = len(table.rows)
     if rows < needed:
-        where = table.place(rows - 1) if rows else f"{table.origin}, line {table.header_line}"
         raise InputError(
-            f"{where}: the file ends after {rows or 'no'} sample{'s' if rows != 1 else ''}; "
-            f"{needed} or more are needed"
+            f"{table.place(rows - 1)}: the file ends after {rows or 'no'} "
+            f"sample{'s' if rows != 1 else ''}; {needed} or more are needed"
         )
 
 
@@ -339,7 +329,7 @@ def _refuse_times(table: _Table, max_step: float | None) -> None:
     """Refuse times that do not increase, and gaps."""
     with np.errstate(over="ignore"):
         steps = np.diff(table.si("time"))
-    name, written = table.columns["time"].name, table.columns["time"].values
+    name, written = table.name("time"), table.written("time")
     if not (steps > 0).all():
         i = int(np.argmin(steps > 0))
         raise InputError(
@@ -363,16 +353,14 @@ def _refuse_times(table: _Table, max_step: float | None) -> None:
 def _refuse_implausible(table: _Table) -> None:
     """Refuse values that are so large that their unit must be another."""
     for quantity, largest in _LARGEST.items():
-        beyond, column = np.abs(table.si(quantity)) > largest, table.columns[quantity]
+        beyond = np.abs(table.si(quantity)) > largest
         if beyond.any():
             row = int(np.argmax(beyond))
-            unit = "m" if quantity == "z" else "rad"
-            hint = ""
-            if column.factor == 1.0:
-                hint = f"; is it in {_INSTEAD[quantity[:4]].format(quantity)}"
+            hint = f"; is it in {_INSTEAD[quantity[:4]].format(quantity)}"
             raise InputError(
-                f"{table.place(row)}: {column.name} = {column.values[row]:.9g}: it cannot be "
-                f"beyond {largest:.4g} {unit}{hint}"
+                f"{table.place(row)}: {table.name(quantity)} = {table.written(quantity)[row]:.9g}: "
+                f"it cannot be beyond {largest:.4g} {'m' if quantity == 'z' else 'rad'}"
+                f"{hint if table.factor(quantity) == 1.0 else ''}"
             )
 
 
@@ -380,17 +368,17 @@ def _refuse_wrong_derivatives(table: _Table) -> None:
     """Refuse rates that are not the poses' derivatives, and accelerations not the rates'."""
     pairs = zip(COORDINATES + RATES, RATES + ACCELERATIONS, strict=True)
     for quantity, derivative in pairs:
-        if derivative not in table.columns:
+        if derivative not in table.positions:
             continue
         found = disagreement(table.si("time"), table.si(quantity), table.si(derivative))
         if found is None:
             continue
-        column = table.columns[derivative]
-        slopes = " and ".join(f"{slope / column.factor:.6g}" for slope in found.slopes)
+        unit = table.factor(derivative)
+        slopes = " and ".join(f"{slope / unit:.6g}" for slope in found.slopes)
         like = f" (over the whole file: {found.looks_like})" if found.looks_like else ""
         raise InputError(
-            f"{table.place(found.row)}: {column.name} = {found.given / column.factor:.6g}, but "
-            f"next to it {table.columns[quantity].name} changes at {slopes} in the same "
+            f"{table.place(found.row)}: {table.name(derivative)} = {found.given / unit:.6g}, but "
+            f"next to it {table.name(quantity)} changes at {slopes} in the same "
             f"unit{like}. Correct it, sample more densely, write more digits, or leave out rates "
             "and accelerations"
         )
