@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from rps_pin.closed_loop.assembly.closing import close_gaps
@@ -10,9 +13,26 @@ from rps_pin.closed_loop.assembly.closing import close_gaps
 Array = NDArray[np.float64]
 
 
-def solve(gaps, jacobian, guess: list[float], **options: object) -> Array:
-    """On a flat space, where a step is a sum."""
-    return close_gaps(np.array(guess), gaps, jacobian, np.add, tolerance=1e-12, **options)
+def toy(gaps, jacobian, size: int, limits: Square | None = None) -> SimpleNamespace:
+    """A system of gaps and slopes on a flat space, where a step is a sum."""
+    model = pin.Model()
+    for index in range(size):
+        model.addJoint(index, pin.JointModelPX(), pin.SE3.Identity(), f"x{index}")
+    return SimpleNamespace(
+        model=model,
+        equations=SimpleNamespace(gaps=gaps, jacobian=jacobian, length=1.0),
+        limits=limits,
+        row_scale=1.0,
+        column_scale=1.0,
+        scaled=lambda matrix: matrix,
+    )
+
+
+def solve(gaps, jacobian, guess, held=None, box: Square | None = None, **options: object) -> Array:
+    size = len(guess)
+    held = np.zeros(size, dtype=bool) if held is None else held
+    system = toy(gaps, jacobian, size, box)
+    return close_gaps(system, np.array(guess), held, box is not None, **options)
 
 
 def circle(q: Array) -> Array:
@@ -74,7 +94,7 @@ def test_steps_are_few_and_limited() -> None:
 
 def test_guess_is_not_changed() -> None:
     guess = np.array([3.0, 4.0])
-    close_gaps(guess, circle, circle_slope, np.add, tolerance=1e-12)
+    close_gaps(toy(circle, circle_slope, 2), guess, np.zeros(2, dtype=bool), False)
     np.testing.assert_array_equal(guess, [3, 4])
 
 

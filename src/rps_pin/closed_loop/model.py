@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -19,15 +20,8 @@ from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.constraints.equations import LoopErrors
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION, ConstraintSystem
 from rps_pin.closed_loop.describe import MechanismDescription, describe
-from rps_pin.closed_loop.dynamics.derivatives import (
-    DynamicsDerivatives,
-    ForwardDynamicsDerivatives,
-    InverseDynamicsDerivatives,
-    Linearisation,
-    linearisation,
-)
+from rps_pin.closed_loop.dynamics import derivatives, generalised_forces
 from rps_pin.closed_loop.dynamics.forward_dynamics import forward_dynamics
-from rps_pin.closed_loop.dynamics.generalised_forces import energy, required_force, tree_mass
 from rps_pin.closed_loop.dynamics.inverse_dynamics import (
     InverseDynamics,
     constraint_forces,
@@ -37,7 +31,7 @@ from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED, Jo
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
 from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
-from rps_pin.closed_loop.io.parts import MechanismParts
+from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts
 from rps_pin.closed_loop.io.urdf import model_from_urdf
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
@@ -125,7 +119,6 @@ class ClosedLoopModel:
         self.max_condition = max_condition
         self.effects = effects
         self.name: str = name or model.name
-        self._derivatives: DynamicsDerivatives | None = None  # made when first needed
         self._home: Array | None = None
         self._start: Array = pin.neutral(model)
         if home is not None:
@@ -219,14 +212,9 @@ class ClosedLoopModel:
     def _from_parts(cls, parts: MechanismParts) -> ClosedLoopModel:
         effects = None
         if parts.damping or parts.friction or parts.stiffness:
-            effects = JointEffects.named(
-                parts.model,
-                damping=parts.damping,
-                friction=parts.friction,
-                stiffness=parts.stiffness,
-                rest=parts.rest,
-                friction_speed=parts.friction_speed or FRICTION_SPEED,
-            )
+            given: dict[str, Any] = {name: getattr(parts, name) for name in EFFECTS}
+            given["friction_speed"] = parts.friction_speed or FRICTION_SPEED
+            effects = JointEffects.named(parts.model, **given)
         mechanism = cls(
             parts.model,
             parts.closures,
@@ -244,17 +232,15 @@ class ClosedLoopModel:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Give copies, and other processes, scratch memory of their own."""
-        return _rebuilt, (
+        rebuilt = partial(
             type(self),
-            (self.model, self.closures, self.actuated),
-            {
-                "home": self._home if self._home is self._start else None,  # as given
-                "effects": self.effects,
-                "name": self.name,
-                "characteristic_length": self.characteristic_length,
-                "max_condition": self.max_condition,
-            },
+            home=self._home if self._home is self._start else None,  # as given
+            effects=self.effects,
+            name=self.name,
+            characteristic_length=self.characteristic_length,
+            max_condition=self.max_condition,
         )
+        return rebuilt, (self.model, self.closures, self.actuated)
 
     def describe(self, q: ArrayLike | None = None) -> MechanismDescription:
         """Return joints, rows, rank, mobility, redundant rows and actuation; `print` it.
@@ -404,13 +390,8 @@ class ClosedLoopModel:
         ClosureError
             If the loops do not close; says by how much, which, and which joints are at a limit.
         """
-        return close(
-            self.system,
-            self.system.normalised(q_guess, "q_guess"),
-            fixed=fixed,
-            within_limits=within_limits,
-            restarts=restarts,
-        )
+        q = self.system.normalised(q_guess, "q_guess")
+        return close(self.system, q, fixed=fixed, within_limits=within_limits, restarts=restarts)
 
     def project(self, q_guess: ArrayLike, *, within_limits: bool = True) -> Array:
         """Return the closed configuration nearest to a guess.
@@ -467,9 +448,7 @@ class ClosedLoopModel:
         J N = 0; the columns are orthonormal once angles are made lengths by
         `characteristic_length`.
         """
-        return kinematics.allowed_motions(
-            self.system, self.system.equations.jacobian(self._configuration(q))
-        )
+        return kinematics.allowed_motions(self.system, self.jacobian(q))
 
     def motion_basis(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
         """Return T, shape (nv, m): v = T u, u the velocities of m joints moving independently.
@@ -486,9 +465,8 @@ class ClosedLoopModel:
         SingularityError
             If these joints do not determine the motion, or do not move independently, here.
         """
-        return kinematics.motion_basis(
-            self.system, self._configuration(q), self.system.independent(independent)
-        )
+        chosen = self.system.independent(independent)
+        return kinematics.motion_basis(self.system, self._configuration(q), chosen)
 
     def frame_jacobian(
         self,
@@ -520,15 +498,9 @@ class ClosedLoopModel:
         """
         reference = _REFERENCES[choice(axes, "axes", tuple(_REFERENCES))]
         basis = self.motion_basis(q, independent)
-        jacobian = pin.computeFrameJacobian(
-            self.model,
-            self.system.data,
-            self._configuration(q),
-            self.system.frame(frame),
-            reference,
-        )
-        product: Array = jacobian.reshape(6, self.model.nv) @ basis
-        return product
+        q_, index = self._configuration(q), self.system.frame(frame)
+        jacobian = pin.computeFrameJacobian(self.model, self.system.data, q_, index, reference)
+        return np.asarray(jacobian.reshape(6, self.model.nv) @ basis)
 
     def velocity(
         self, q: ArrayLike, v_actuated: ArrayLike, independent: Sequence[str] | None = None
@@ -589,9 +561,8 @@ class ClosedLoopModel:
         """
         given = self.system.independent(independent)
         rates = real_vector(a_actuated, given.size, "a_actuated")
-        return kinematics.acceleration(
-            self.system, self._configuration(q), self._velocity(v), given, rates
-        )
+        q_, v_ = self._configuration(q), self._velocity(v)
+        return kinematics.acceleration(self.system, q_, v_, given, rates)
 
     def condition(self, q: ArrayLike) -> float:
         """Return the condition number of J_p, large near a singularity.
@@ -650,7 +621,7 @@ class ClosedLoopModel:
         That is ``rnea(q, v, a)`` plus the passive joint forces less the external wrenches (as in
         `inverse_dynamics`).
         """
-        return required_force(self.system, *self.system.state(q, v, a), wrenches)
+        return generalised_forces.required_force(self.system, *self.system.state(q, v, a), wrenches)
 
     def constraint_forces(
         self,
@@ -721,8 +692,7 @@ class ClosedLoopModel:
         """
         q_ = self._closed_configuration(q)
         basis = self.motion_basis(q_, independent)
-        mass: Array = basis.T @ tree_mass(self.system, q_) @ basis
-        return mass
+        return np.asarray(basis.T @ generalised_forces.tree_mass(self.system, q_) @ basis)
 
     def bias(self, q: ArrayLike, v: ArrayLike, independent: Sequence[str] | None = None) -> Array:
         """Return the reduced bias T' (rnea(q, v, a_0) + passive joint forces), shape (m,).
@@ -733,19 +703,18 @@ class ClosedLoopModel:
         q_ = self._closed_configuration(q)
         basis = self.motion_basis(q_, independent)
         a = self.acceleration(q_, v, np.zeros(basis.shape[1]), independent)
-        bias: Array = basis.T @ self.generalised_force(q_, v, a)
-        return bias
+        return np.asarray(basis.T @ self.generalised_force(q_, v, a))
 
     def gravity_forces(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
         """Return the forces T' g at the independent joints that carry the weight, shape (m,)."""
         q_ = self._closed_configuration(q)
         basis = self.motion_basis(q_, independent)
-        forces: Array = basis.T @ pin.computeGeneralizedGravity(self.model, self.system.data, q_)
-        return forces
+        weight = pin.computeGeneralizedGravity(self.model, self.system.data, q_)
+        return np.asarray(basis.T @ weight)
 
     def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
         """Return kinetic energy, rotors included, and potential energy, springs included, J."""
-        return energy(self.system, self._configuration(q), self._velocity(v))
+        return generalised_forces.energy(self.system, self._configuration(q), self._velocity(v))
 
     # Wrenches -------------------------------------------------------------------------------------
 
@@ -794,21 +763,19 @@ class ClosedLoopModel:
         model, data = self.model, self.system.data
         pin.framesForwardKinematics(model, data, q_)
         on_frames = self.system.by_frame(wrenches)
-        pin.rnea(
-            model, data, q_, v_, a_, forces_on_joints(self.system.equations, on_closures, on_frames)
-        )
+        forces = forces_on_joints(self.system.equations, on_closures, on_frames)
+        pin.rnea(model, data, q_, v_, a_, forces)
         carried = {}
-        for index, name in enumerate(model.names):
-            if index:
-                turn = data.oMi[index].rotation if axes == "world" else np.eye(3)
-                carried[name] = (data.f[index].vector.reshape(2, 3) @ turn.T).ravel()
+        for index, name in list(enumerate(model.names))[1:]:
+            turn = data.oMi[index].rotation if axes == "world" else np.eye(3)
+            carried[name] = (data.f[index].vector.reshape(2, 3) @ turn.T).ravel()
         return carried
 
     # Derivatives ----------------------------------------------------------------------------------
 
     def inverse_dynamics_derivatives(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, wrenches: Wrenches | None = None
-    ) -> InverseDynamicsDerivatives:
+    ) -> derivatives.InverseDynamicsDerivatives:
         """Return the derivatives of the actuator forces, analytic; see `derivatives`.
 
         Parameters
@@ -824,7 +791,7 @@ class ClosedLoopModel:
         MechanismError
             If the tree holds a joint whose derivatives are not known (ellipsoid, mimic).
         """
-        return self._dynamics_derivatives().inverse(*self.system.state(q, v, a), wrenches)
+        return self._derivatives.inverse(*self.system.state(q, v, a), wrenches)
 
     def forward_dynamics_derivatives(
         self,
@@ -834,7 +801,7 @@ class ClosedLoopModel:
         independent: Sequence[str] | None = None,
         *,
         wrenches: Wrenches | None = None,
-    ) -> ForwardDynamicsDerivatives:
+    ) -> derivatives.ForwardDynamicsDerivatives:
         """Return the derivatives of the acceleration, analytic; see `derivatives`.
 
         Parameters
@@ -851,7 +818,7 @@ class ClosedLoopModel:
         """
         q_, v_ = self._configuration(q), self._velocity(v)
         chosen = self.system.independent(independent)
-        return self._dynamics_derivatives().forward(q_, v_, self._forces(tau), chosen, wrenches)
+        return self._derivatives.forward(q_, v_, self._forces(tau), chosen, wrenches)
 
     def linearize(
         self,
@@ -861,7 +828,7 @@ class ClosedLoopModel:
         independent: Sequence[str] | None = None,
         *,
         wrenches: Wrenches | None = None,
-    ) -> Linearisation:
+    ) -> derivatives.Linearisation:
         """Return A and B of the motion about an operating point, dx/dt = A dx + B dtau.
 
         The state x stacks positions and velocities of the independent joints (the actuated ones if
@@ -873,9 +840,8 @@ class ClosedLoopModel:
         q, v, tau, independent, wrenches
             As for `forward_dynamics_derivatives`.
         """
-        return linearisation(
-            self.forward_dynamics_derivatives(q, v, tau, independent, wrenches=wrenches)
-        )
+        found = self.forward_dynamics_derivatives(q, v, tau, independent, wrenches=wrenches)
+        return derivatives.linearisation(found)
 
     # Simulation -----------------------------------------------------------------------------------
 
@@ -915,17 +881,8 @@ class ClosedLoopModel:
 
     def _closed(self, q: Array) -> Array:
         """Return q if it is closed, or else a closed configuration near it."""
-        if self.loop_gap(q) <= closed_gap(self.system):
-            return q
-        return close(self.system, q)
+        return q if self.loop_gap(q) <= closed_gap(self.system) else close(self.system, q)
 
-    def _dynamics_derivatives(self) -> DynamicsDerivatives:
-        if self._derivatives is None:
-            self._derivatives = DynamicsDerivatives(self.system)
-        return self._derivatives
-
-
-def _rebuilt(
-    cls: type[ClosedLoopModel], description: tuple[Any, ...], options: dict[str, Any]
-) -> ClosedLoopModel:
-    return cls(*description, **options)
+    @cached_property
+    def _derivatives(self) -> derivatives.DynamicsDerivatives:
+        return derivatives.DynamicsDerivatives(self.system)

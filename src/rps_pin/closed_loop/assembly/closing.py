@@ -11,8 +11,7 @@ are held there, and the step is computed again without them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -53,7 +52,7 @@ def close(
     start = limits.clip(guess) if within_limits else guess
     best, best_gap, rng = start, np.inf, np.random.default_rng(0)
     for attempt in range(1 + restarts):
-        q = least_norm_steps(system, start, held, within_limits)
+        q = close_gaps(system, start, held, within_limits)
         gap = equations.largest_gap(equations.gaps(q))
         if gap <= closed_gap(system):
             return q
@@ -99,81 +98,50 @@ def closed_gap(system: ConstraintSystem) -> float:
     return CLOSED * max(system.equations.length, 1.0)
 
 
-def least_norm_steps(
-    system: ConstraintSystem, start: Array, held: Bools, within_limits: bool
-) -> Array:
-    """Return the configuration that the steps from a start end in, closed or not."""
-    equations, scale = system.equations, system.column_scale
-    return close_gaps(
-        start,
-        gaps=lambda q: system.row_scale * equations.gaps(q),
-        jacobian=lambda q: system.scaled(equations.jacobian(q)),
-        integrate=lambda q, step: pin.integrate(system.model, q, scale * step),
-        tolerance=CLOSED * equations.length,
-        held=held,
-        box=system.limits if within_limits else None,
-    )
-
-
-# Steps --------------------------------------------------------------------------------------------
-
-
-class Box(Protocol):
-    """Limits that the configuration stays within; see `joint_limits.JointLimits`."""
-
-    def clip(self, q: Array) -> Array:
-        """Return q brought within the limits."""
-
-    def blocked(self, q: Array, step: Array) -> Bools:
-        """Return which entries of a step would leave the limits at once."""
-
-
 def close_gaps(
+    system: ConstraintSystem,
     guess: Array,
-    gaps: Callable[[Array], Array],
-    jacobian: Callable[[Array], Array],
-    integrate: Callable[[Array, Array], Array],
-    tolerance: float,
+    held: Bools,
+    within_limits: bool,
     iterations: int = 200,
-    *,
-    held: Bools | None = None,
-    box: Box | None = None,
 ) -> Array:
     """Return the configuration that Levenberg-Marquardt steps from a guess end in.
 
     Parameters
     ----------
+    system
+        The system; its gaps end below `CLOSED` if the steps close them.
     guess
-        Configuration to start from, shape (nq,); within the box.
-    gaps
-        e(q), shape (nc,), in one unit.
-    jacobian
-        de/dv at q, shape (nc, nv), scaled like `integrate`'s steps.
-    integrate
-        (q, step) to configuration; the step in scaled coordinates, shape (nv,).
-    tolerance
-        The steps end once they no longer reduce a gap norm below this.
+        Configuration to start from, shape (nq,); within the joint limits if these count.
+    held
+        Velocities that stay zero, shape (nv,).
+    within_limits
+        Whether to stay within the joint limits.
     iterations
         At most so many steps.
-    held
-        Velocities that stay zero, shape (nv,); none if left out.
-    box
-        Limits to stay within; none if left out.
 
     Returns
     -------
     array
         The best configuration met, shape (nq,), whether its loops are closed or not.
     """
-    q, error, damping = guess, gaps(guess), _FIRST_DAMPING
+    equations, limits = system.equations, system.limits
+    tolerance = CLOSED * equations.length
+    q, error, damping = guess, system.row_scale * equations.gaps(guess), _FIRST_DAMPING
     for _ in range(iterations):
         size = float(np.linalg.norm(error))
-        step_for = _Steps(jacobian(q), error, q, held, box)
+        jacobian, still = system.scaled(equations.jacobian(q)), held.copy()
+        factors = _factors(jacobian, still)
         while True:
-            step = step_for(damping * size)
-            candidate = integrate(q, step)
-            candidate = candidate if box is None else box.clip(candidate)
-            candidate_error = gaps(candidate)
+            step = _damped_step(factors, error, damping * size)
+            step[still] = 0.0
+            if within_limits and (blocked := limits.blocked(q, step) & ~still).any():
+                still |= blocked
+                factors = _factors(jacobian, still)
+                continue
+            candidate = pin.integrate(system.model, q, system.column_scale * step)
+            candidate = limits.clip(candidate) if within_limits else candidate
+            candidate_error = system.row_scale * equations.gaps(candidate)
             if np.linalg.norm(candidate_error) < size:
                 break
             if size <= tolerance or np.linalg.norm(step) < _SMALLEST_STEP:
@@ -187,47 +155,14 @@ def close_gaps(
     return q
 
 
-class _Steps:
-    """Steps from one configuration, for any damping."""
-
-    def __init__(
-        self,
-        jacobian: Array,
-        error: Array,
-        q: Array,
-        held: Bools | None,
-        box: Box | None,
-    ) -> None:
-        self._jacobian, self._error, self._q, self._box = jacobian, error, q, box
-        self._held = np.zeros(jacobian.shape[1], dtype=bool) if held is None else held.copy()
-        self._factorise()
-
-    def __call__(self, damping: float) -> Array:
-        step = self._free_step(damping)
-        while self._box is not None:
-            blocked = self._box.blocked(self._q, step) & ~self._held
-            if not blocked.any():
-                break
-            self._held |= blocked
-            self._factorise()
-            step = self._free_step(damping)
-        return step
-
-    def _factorise(self) -> None:
-        left, self._values, self._right = np.linalg.svd(
-            np.where(self._held, 0.0, self._jacobian), full_matrices=False
-        )
-        self._along = left.T @ self._error
-
-    def _free_step(self, damping: float) -> Array:
-        step: Array = -self._right.T @ (_filter(self._values, damping) * self._along)
-        step[self._held] = 0.0
-        return step
+def _factors(jacobian: Array, still: Bools) -> tuple[Array, Array, Array]:
+    """Return the singular value decomposition of J without the columns that stand still."""
+    return np.linalg.svd(np.where(still, 0.0, jacobian), full_matrices=False)
 
 
-def _filter(values: Array, damping: float) -> Array:
-    """Return s / (s^2 + mu^2) of singular values s, and 0 where s is rounding error."""
+def _damped_step(factors: tuple[Array, Array, Array], error: Array, damping: float) -> Array:
+    """Return -V s / (s^2 + mu^2) U' e, without singular values s that are rounding error."""
+    left, values, right = factors
     count = rank(values, _ROUNDING)
-    filtered = np.zeros(values.size)
-    filtered[:count] = values[:count] / (values[:count] ** 2 + damping**2)
-    return filtered
+    kept = values[:count] / (values[:count] ** 2 + damping**2)
+    return np.asarray(-right[:count].T @ (kept * (left.T @ error)[:count]))

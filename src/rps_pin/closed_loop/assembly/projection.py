@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.assembly.closing import close, closed_gap, least_norm_steps
+from rps_pin.closed_loop.assembly.closing import close, close_gaps, closed_gap
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError
 from rps_pin.numerics.linear_algebra import null_space
@@ -42,7 +42,7 @@ def project(system: ConstraintSystem, given: Array, *, within_limits: bool = Tru
             return q
         moved = pin.integrate(model, q, length * step * system.column_scale)
         moved = limits.clip(moved) if within_limits else moved
-        moved = least_norm_steps(system, moved, none, within_limits)
+        moved = close_gaps(system, moved, none, within_limits)
         nearer, moved_towards = _distance(system, moved, given)
         gap = equations.largest_gap(equations.gaps(moved))
         if nearer < distance and gap <= closed_gap(system):
@@ -76,5 +76,4 @@ def _step(system: ConstraintSystem, q: Array, towards: Array, within_limits: boo
         upper = np.maximum(limits.upper - q[limits.q], 0.0)
         if (limited @ y < lower).any() or (limited @ y > upper).any():
             y = y + by_least_squares(limited, lower - limited @ y, upper - limited @ y)
-    step: Array = motions @ y
-    return step
+    return np.asarray(motions @ y)
