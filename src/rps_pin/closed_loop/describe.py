@@ -9,7 +9,7 @@ rank, N a basis of the null space of J.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -145,30 +145,9 @@ class MechanismDescription:
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it as plain data, ready for JSON (infinities as None)."""
-        return {
-            "name": self.name,
-            "joints": [
-                joint._asdict() | {"lower": _plain(joint.lower), "upper": _plain(joint.upper)}
-                for joint in self.joints
-            ],
-            "closures": [
-                closure._asdict() | {"between": list(closure.between)} for closure in self.closures
-            ],
-            "configuration": self.configuration.tolist(),
-            "home_is_singular": self.home_is_singular,
-            "nv": self.nv,
-            "rows": self.rows,
-            "rank": self.rank,
-            "mobility": self.mobility,
-            "redundant_rows": self.redundant_rows,
-            "singular_values": self.singular_values.tolist(),
-            "actuated": list(self.actuated),
-            "passive": list(self.passive),
-            "actuated_velocities": self.actuated_velocities,
-            "actuated_rank": self.actuated_rank,
-            "actuation": str(self.actuation),
-            "condition": _plain([self.condition])[0],
-        }
+        names = [field.name for field in fields(self)]
+        names += ["mobility", "redundant_rows", "passive", "actuation"]
+        return {name: _plain(getattr(self, name)) for name in names}
 
     def __str__(self) -> str:
         joints = [
@@ -188,7 +167,8 @@ class MechanismDescription:
             "",
             f"velocities {self.nv}, closure rows {self.rows}, rank {self.rank}, "
             f"redundant rows {self.redundant_rows}",
-            f"singular values of the closures' Jacobian: {_numbers(self.singular_values)}",
+            "singular values of the closures' Jacobian: "
+            + " ".join(f"{value:.3g}" for value in self.singular_values),
             f"condition number of the passive joints' part: {self.condition:.4g}",
         ]
         if self.home_is_singular:
@@ -288,8 +268,17 @@ def _closure(
     return ClosureDescription(closure.name, kind, between, closure.size, needed)
 
 
-def _plain(values: Any) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
+def _plain(value: Any) -> Any:
+    """Return a value of a description as plain data; infinities and NaN as None."""
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (JointDescription, ClosureDescription)):
+        return {name: _plain(part) for name, part in value._asdict().items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return str(value) if isinstance(value, str) else value
 
 
 def _limits(joint: JointDescription) -> str:
@@ -297,10 +286,6 @@ def _limits(joint: JointDescription) -> str:
         return "none"
     pairs = zip(joint.lower, joint.upper, strict=True)
     return ", ".join(f"{low:.4g} to {high:.4g}" for low, high in pairs)
-
-
-def _numbers(values: Array) -> str:
-    return " ".join(f"{value:.3g}" for value in values)
 
 
 def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:

@@ -72,14 +72,12 @@ def pseudo_inverse(matrix: Array) -> Array:
     """Return the pseudo-inverse, singular values that do not count taken as zero."""
     left, values, right = np.linalg.svd(matrix, full_matrices=False)
     count = rank(values)
-    inverse: Array = (right[:count].T / values[:count]) @ left[:, :count].T
-    return inverse
+    return np.asarray((right[:count].T / values[:count]) @ left[:, :count].T)
 
 
 def least_norm(matrix: Array, right: Array) -> Array:
     """Return the least-squares solution x of A x = b of least norm, shape (n,) or (n, k)."""
-    solution: Array = pseudo_inverse(matrix) @ right
-    return solution
+    return pseudo_inverse(matrix) @ right
 
 
 def condition_number(matrix: Array) -> float:

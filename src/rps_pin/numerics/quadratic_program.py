@@ -231,8 +231,7 @@ def by_least_squares(rows: Array, lower: Array, upper: Array) -> Array:
     remainder = system @ nnls(system, target)[0] - target
     if not abs(remainder[-1]) > np.finfo(np.float64).eps:
         return np.zeros(rows.shape[1])
-    x: Array = -remainder[:-1] / remainder[-1]
-    return x
+    return np.asarray(-remainder[:-1] / remainder[-1])
 
 
 def least_violation(rows: Array, lower: Array, upper: Array, size: float) -> tuple[Array, Array]:

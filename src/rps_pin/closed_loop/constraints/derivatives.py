@@ -127,8 +127,7 @@ def closure_force_slope(motions: FrameMotions, multipliers: Array) -> Array:
 def world_wrench_slope(frame: _Frame, wrench: Array) -> Array:
     """Return d(J_f' w)/dq beyond that of a wrench fixed in the body, w fixed in world axes."""
     local = (wrench.reshape(2, 3) @ frame.placement.rotation).ravel()
-    slope: Array = frame.jacobian.T @ _turned_back(local) @ frame.jacobian
-    return slope
+    return frame.jacobian.T @ _turned_back(local) @ frame.jacobian
 
 
 def external_force_slope(motions: FrameMotions, wrenches: Mapping[int, Array]) -> Array:
@@ -173,8 +172,7 @@ def _point(frame: _Frame) -> tuple[Array, Array, Array]:
 
     def classical(spatial: Array, twist: Array) -> Array:
         """Return d(v' + w x v) of d(v', w') and d(v, w)."""
-        result: Array = spatial[:3] + pin.skew(w) @ twist[:3] - pin.skew(v) @ twist[3:]
-        return result
+        return np.asarray(spatial[:3] + pin.skew(w) @ twist[:3] - pin.skew(v) @ twist[3:])
 
     by_q = classical(frame.acceleration_q, frame.twist_q) - pin.skew(along) @ turning
     by_v = classical(frame.acceleration_v, frame.jacobian)
@@ -232,8 +230,7 @@ def _skews(x: Array) -> Array:
 
 def _cross(twist: Array) -> Array:
     """Return the matrix of y -> twist x y."""
-    matrix: Array = pin.Motion(twist).action
-    return matrix
+    return np.asarray(pin.Motion(twist).action)
 
 
 def _turned_back(wrench: Array) -> Array:

@@ -168,8 +168,7 @@ class _TallFactors:
         return self._columns[:, None] * solved, left
 
     def _solve(self, right: Array, transposed: int) -> Array:
-        solved: Array = dtrsm(1.0, self._packed[: self._size], right, trans_a=transposed)
-        return solved
+        return dtrsm(1.0, self._packed[: self._size], right, trans_a=transposed)
 
     def _turn(self, right: Array, transposed: str) -> Array:
         turned, _, _ = dormqr("L", transposed, self._packed, self._reflectors, right, self._work)

@@ -191,8 +191,7 @@ class ParallelRows(AxisRows):
         turn = self.across @ (skew(n) @ self.axis)
         sine = math.sqrt(turn @ turn)
         angle = math.atan2(sine, n @ self.axis)
-        gap: Array = angle * (turn / sine if sine > 0 else np.array([1.0, 0.0]))
-        return gap
+        return angle * (turn / sine if sine > 0 else np.array([1.0, 0.0]))
 
 
 class FrameRows(Rows):

@@ -158,8 +158,7 @@ class ConstraintSystem:
 
     def scaled(self, jacobian: Array) -> Array:
         """Return J with all entries in one unit."""
-        scaled: Array = self._scale * jacobian
-        return scaled
+        return self._scale * jacobian
 
     def condition(self, jacobian: Array) -> float:
         """Return the condition number of J_p."""

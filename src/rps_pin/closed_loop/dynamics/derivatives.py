@@ -151,8 +151,7 @@ class DynamicsDerivatives:
             """Return da of dF and dc, shapes (nv, k) and (nc, k)."""
             x = -following.solved(opening)
             along = np.linalg.solve(mass, -T.T @ (of_force + force.a @ x))
-            da: Array = T @ along + x
-            return da
+            return T @ along + x
 
         by_q = response(force.q, rows.acceleration_q)
         by_v = response(force.v, rows.acceleration_v)
@@ -237,8 +236,7 @@ class Following:
     def _held(self, right: Array) -> Array:
         """Return x with J x = right and zero rows for the independent joints."""
         x = self.solved(right)
-        held: Array = x - self.T @ x[self._chosen]
-        return held
+        return x - self.T @ x[self._chosen]
 
 
 def linearisation(derivatives: ForwardDynamicsDerivatives) -> Linearisation:

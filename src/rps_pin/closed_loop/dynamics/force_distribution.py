@@ -227,8 +227,7 @@ class ForceDistribution:
         """Return lambda of least norm, shape (nc,): J' lambda = f - S' tau."""
         rest = self._columns * force
         rest[self._actuated] -= self._actuated_columns * tau
-        multipliers: Array = self._rows * factors.least_norm(rest)
-        return multipliers
+        return self._rows * factors.least_norm(rest)
 
     def _point_within_limits(
         self, factors: _Factors, force: Array, aim: Array, effort: Array, free: Array
@@ -338,13 +337,11 @@ class _Factors:
         """Return the scaled lambda of least norm with J' lambda = force, (nv,) or (nv, n)."""
         rank = self.rank
         along = (force.T @ self.right[:rank].T) / self.values[:rank]
-        product: Array = (along @ self.left[:, :rank].T).T
-        return product
+        return (along @ self.left[:, :rank].T).T
 
     def redundant(self) -> Array:
         """Return K: scaled lambdas with J' lambda = 0, shape (nc, nc - rank), cheap ones."""
-        cheap: Array = self.left[:, self.rank :] / REDUNDANCY_WEIGHT
-        return cheap
+        return self.left[:, self.rank :] / REDUNDANCY_WEIGHT
 
 
 def _spread(value: ArrayLike, size: int, name: str) -> Array:

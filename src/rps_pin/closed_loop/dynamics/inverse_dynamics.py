@@ -187,8 +187,7 @@ def constraint_forces(
     rest = required_force(system, q, v, a, wrenches)
     rest[system.actuated] -= tau
     jacobian = system.scaled(system.equations.jacobian(q))
-    scaled: Array = system.row_scale * least_norm(jacobian.T, system.column_scale * rest)
-    return scaled
+    return system.row_scale * least_norm(jacobian.T, system.column_scale * rest)
 
 
 def _by_null_space(system: ConstraintSystem, jacobian: Array, force: Array) -> InverseDynamics:

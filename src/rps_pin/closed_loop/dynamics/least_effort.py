@@ -78,8 +78,7 @@ def residual_force(motions: Array, missing: Array, scale: Array) -> Array:
     scale
         Scaling of the velocities to one unit, shape (nv,): D.
     """
-    force: Array = (motions @ missing) / scale**2  # D^-1 (D^-1 N) missing
-    return force
+    return (motions @ missing) / scale**2  # D^-1 (D^-1 N) missing
 
 
 def refuse_nearly_singular(values: Array, max_condition: float, size: float = 1.0) -> None:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -23,7 +22,7 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number, tanh
-from rps_pin.validation import positive_number, real_vector
+from rps_pin.validation import positive_number, read_only, real_vector
 
 #: rad/s or m/s.
 FRICTION_SPEED = 1e-2
@@ -78,11 +77,10 @@ class JointEffects:
     def __post_init__(self) -> None:
         size = np.size(self.damping)
         for name in ("damping", "friction", "stiffness", "rest"):
-            array = real_vector(getattr(self, name), size, name).copy()
+            array = real_vector(getattr(self, name), size, name)
             if name != "rest" and (array < 0).any():
                 raise InputError(f"{name} must not be negative: entry {int(array.argmin())} is")
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, read_only(array))
         positive_number(self.friction_speed, "friction_speed", "rad/s or m/s")
 
     @classmethod
@@ -115,30 +113,22 @@ class JointEffects:
             If there is no such joint (lists those there are), or a spring is put on a joint of
             several coordinates.
         """
-        given = {
-            "damping": damping,
-            "friction": friction,
-            "stiffness": stiffness,
-            "rest": rest,
-        }
+        given = {"damping": damping, "friction": friction, "stiffness": stiffness, "rest": rest}
         arrays = {what: by_joint(model, values or {}, what) for what, values in given.items()}
         return cls(**arrays, friction_speed=friction_speed)
 
     def force(self, q: Array, v: Array, q_of_v: Indices) -> Array:
         """Return e(q, v), shape (nv,); `q_of_v` from `coordinate_indices`."""
-        force: Array = friction_force(v, self.damping, self.friction, self.friction_speed)
-        force += self.springs(q, q_of_v)
-        return force
+        resisting = friction_force(v, self.damping, self.friction, self.friction_speed)
+        return np.asarray(resisting + self.springs(q, q_of_v))
 
     def springs(self, q: Array, q_of_v: Indices) -> Array:
         """Return the springs' part of e(q, v), shape (nv,)."""
-        force: Array = self.stiffness * (q[q_of_v] - self.rest)
-        return force
+        return self.stiffness * (q[q_of_v] - self.rest)
 
     def slopes(self, v: Array) -> tuple[Array, Array]:
         """Return the derivatives of e with respect to q and v, both diagonal, shapes (nv,)."""
-        slope: Array = friction_slope(v, self.damping, self.friction, self.friction_speed)
-        return self.stiffness, slope
+        return self.stiffness, friction_slope(v, self.damping, self.friction, self.friction_speed)
 
     def energy(self, q: Array, q_of_v: Indices) -> float:
         """Return the energy of the springs, k (q - q_0)^2 / 2, J."""
@@ -173,7 +163,7 @@ def by_joint(model: pin.Model, values: Mapping[str, ArrayLike], what: str) -> Ar
     for name, value in values.items():
         if name not in names:
             raise MechanismError(f"{what}: no joint {name!r}; there are: {', '.join(names)}")
-        joint: Any = model.joints[model.getJointId(name)]
+        joint = model.joints[model.getJointId(name)]
         if what in ("stiffness", "rest") and not joint.nq == joint.nv == 1:
             raise MechanismError(f"{what}: joint {name!r} has {joint.nq} coordinates, not one")
         try:

@@ -209,23 +209,18 @@ def _check_link(model: pin.Model, what: str, first: int, second: int) -> None:
 
 
 def _check_axes(model: pin.Model, what: str, merge: JointMerge, row: list[int]) -> None:
-    axes = _axes(model, row)
-    for (i, first), (j, second) in pairwise(enumerate(axes)):
+    """Refuse axes that do not make a universal joint, or do not reach every rotation."""
+    for (before, first), (after, second) in pairwise(
+        zip(merge.joints, _axes(model, row), strict=True)
+    ):
         cosine = abs(float(first @ second))
         if merge.into == "universal" and cosine > _PERPENDICULAR:
             raise MechanismError(
-                f"{what}: the axes of {merge.joints[i]!r} and {merge.joints[j]!r} are at "
+                f"{what}: the axes of {before!r} and {after!r} are at "
                 f"{np.degrees(np.arccos(min(cosine, 1.0))):.6g} degrees; those of a universal "
                 "joint are perpendicular"
             )
-    if merge.into == "spherical":
-        _check_reach(what, axes)
-
-
-def _check_reach(what: str, axes: list[Array]) -> None:
-    """Refuse three joints with parallel neighbours, which do not reach every rotation."""
-    for first, second in pairwise(axes):
-        if np.linalg.norm(np.cross(first, second)) < _PARALLEL:
+        if merge.into == "spherical" and np.linalg.norm(np.cross(first, second)) < _PARALLEL:
             raise MechanismError(
                 f"{what}: neighbouring axes are parallel, so the joints are not a ball joint"
             )

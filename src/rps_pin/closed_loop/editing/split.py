@@ -14,7 +14,7 @@ massless links between, has constant subspaces, the same q and v, and the same d
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -34,13 +34,9 @@ _UNIT = 1e-9
 _SAMPLES = 3
 
 
-class _Part(NamedTuple):
-    """One of the joints in a row that a joint is split into."""
-
-    placement: pin.SE3
-    """In the part before, or in the joint's own frame."""
-    kind: Any
-    """A Pinocchio joint model."""
+#: One of the joints in a row that a joint is split into: its placement in the part before, or in
+#: the joint's own frame, and a Pinocchio joint model.
+_Part = tuple[pin.SE3, Any]
 
 
 def split(model: pin.Model) -> pin.Model:
@@ -68,13 +64,15 @@ def split(model: pin.Model) -> pin.Model:
         one whose axes are not of unit length), if a joint mimics another, or if the name of a new
         joint is taken.
     """
-    _refuse_mimics(model)
+    for joint in model.mimicking_joints:
+        raise MechanismError(
+            f"Pinocchio's derivatives are not those of joint {model.names[joint]!r} (Mimic): it "
+            "has none for a model with mimic joints; couple the joints instead"
+        )
     rows = {joint: _row(model, joint) for joint in _changing(model)}
     if not rows:
         return model
-    _refuse_taken(model, rows)
-    new = {joint: JointRow(_new_joints(model, joint, row), [joint]) for joint, row in rows.items()}
-    result = rebuilt(model, new)
+    result = rebuilt(model, rows)
     for entry in model.referenceConfigurations:
         result.referenceConfigurations[entry.key()] = entry.data()
     return result
@@ -92,19 +90,29 @@ def _changing(model: pin.Model) -> list[int]:
 
 def _is_constant(joint: Any, samples: list[Array]) -> bool:
     """Return whether S is the same at all configurations q (nq,) of the model."""
-    data = joint.createData()
-    subspaces = []
+    data, subspaces = joint.createData(), []
     for q in samples:
         joint.calc(data, q)
         subspaces.append(np.array(data.S))
-    first = subspaces[0]
-    tolerance = _CONSTANT * max(1.0, float(np.abs(first).max()))
-    return all(float(np.abs(other - first).max()) <= tolerance for other in subspaces[1:])
+    change = np.abs(np.subtract(subspaces, subspaces[0])).max()
+    return bool(change <= _CONSTANT * max(1.0, np.abs(subspaces[0]).max()))
 
 
-def _row(model: pin.Model, joint: int) -> list[_Part]:
-    """Return the joints in a row that are joint number `joint`."""
-    return list(_parts(model.joints[joint], f"joint {model.names[joint]!r}"))
+def _row(model: pin.Model, joint: int) -> JointRow:
+    """Return the joints in a row that are joint number `joint`; the last has its name."""
+    name, at = model.names[joint], model.jointPlacements[joint]
+    parts = list(_parts(model.joints[joint], f"joint {name!r}"))
+    names = [f"{name}:{number}" for number in range(1, len(parts))]
+    for new in names:
+        if new in set(model.names):
+            raise MechanismError(
+                f"joint {name!r} is split into {len(parts)} joints, one of them called {new!r}; "
+                "that name is taken"
+            )
+    (first, kind), *others = parts
+    new_parts = [(at * first, kind), *others]
+    labelled = zip([*names, name], new_parts, strict=True)
+    return JointRow([NewJoint(label, kind, at) for label, (at, kind) in labelled], [joint])
 
 
 def _parts(joint: Any, what: str) -> Iterator[_Part]:
@@ -118,42 +126,18 @@ def _parts(joint: Any, what: str) -> Iterator[_Part]:
                 raise MechanismError(
                     f"{what} is universal with an axis of length {length:.6g}; axes have length 1"
                 )
-            yield _Part(here, pin.JointModelRevoluteUnaligned(axis))
+            yield here, pin.JointModelRevoluteUnaligned(axis)
     elif kind == _ZYX:
         for one in (pin.JointModelRZ(), pin.JointModelRY(), pin.JointModelRX()):
-            yield _Part(here, one)
+            yield here, one
     elif kind == _COMPOSITE:
         composite = joint.extract()
         for placement, member in zip(composite.jointPlacements, composite.joints, strict=True):
-            for number, part in enumerate(_parts(member, f"{what} (Composite)")):
-                yield part if number else _Part(placement * part.placement, part.kind)
+            for number, (at, part) in enumerate(_parts(member, f"{what} (Composite)")):
+                yield at if number else placement * at, part
     else:
         _refuse_indivisible(joint, kind, what)
-        yield _Part(here, joint)
-
-
-def _new_joints(model: pin.Model, joint: int, row: list[_Part]) -> list[NewJoint]:
-    """Return the parts as joints; the first is placed in the joint's parent."""
-    names = _names(model.names[joint], len(row))
-    joints = [NewJoint(name, kind, at) for name, (at, kind) in zip(names, row, strict=True)]
-    first = model.jointPlacements[joint] * row[0].placement
-    return [joints[0]._replace(placement=first), *joints[1:]]
-
-
-def _names(name: str, count: int) -> list[str]:
-    """Return the names of the joints in a row; the last has that of the whole."""
-    return [f"{name}:{number}" for number in range(1, count)] + [name]
-
-
-# Checks -------------------------------------------------------------------------------------------
-
-
-def _refuse_mimics(model: pin.Model) -> None:
-    for joint in model.mimicking_joints:
-        raise MechanismError(
-            f"Pinocchio's derivatives are not those of joint {model.names[joint]!r} (Mimic): it "
-            "has none for a model with mimic joints; couple the joints instead"
-        )
+        yield here, joint
 
 
 def _refuse_indivisible(joint: Any, kind: str, what: str) -> None:
@@ -166,14 +150,3 @@ def _refuse_indivisible(joint: Any, kind: str, what: str) -> None:
             f"({kind.removeprefix('JointModel')}): its axes turn with its own coordinates, and it "
             "cannot be split into joints whose axes do not"
         )
-
-
-def _refuse_taken(model: pin.Model, rows: dict[int, list[_Part]]) -> None:
-    taken = set(model.names)
-    for joint, row in rows.items():
-        for name in _names(model.names[joint], len(row))[:-1]:
-            if name in taken:
-                raise MechanismError(
-                    f"joint {model.names[joint]!r} is split into {len(row)} joints, one of them "
-                    f"called {name!r}; that name is taken"
-                )

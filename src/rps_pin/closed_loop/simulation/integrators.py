@@ -168,8 +168,7 @@ class AdaptiveStepper:
         if self._flat:
             return v
         slope = pin.dIntegrate(self._model, start, u, pin.ArgumentPosition.ARG1)
-        rate: Array = np.linalg.solve(slope, v)
-        return rate
+        return np.linalg.solve(slope, v)
 
 
 def times(duration: float, step: float) -> Iterator[tuple[int, float]]:

@@ -208,5 +208,4 @@ class ClosedManifold:
         _, multipliers, info = dposv(rows @ rows.T, right)
         if info:
             self._refuse_singular(0.0)
-        least: Array = rows.T @ multipliers
-        return least
+        return np.asarray(rows.T @ multipliers)

@@ -87,14 +87,12 @@ class Simulation:
     @property
     def energy_balance(self) -> Array:
         """Energy less the work done, zero at the start, shape (n,), J: the integration's error."""
-        balance: Array = self.energy - self.energy[:1] - self.work
-        return balance
+        return self.energy - self.energy[:1] - self.work
 
     @property
     def energy(self) -> Array:
         """Kinetic and potential energy together, shape (n,), J."""
-        total: Array = self.kinetic + self.potential
-        return total
+        return self.kinetic + self.potential
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write all of it as a table with a heading; the file is written whole or not at all.
