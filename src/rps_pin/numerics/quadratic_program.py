@@ -126,7 +126,16 @@ class LeastDistance:
         n = rows.shape[1]
         solver = self._solvers.get(n)
         if solver is None:
-            solver = self._solvers[n] = _new_problem(n, len(rows))
+            proxqp = proxsuite.proxqp
+            solver = self._solvers[n] = proxqp.dense.QP(n, 0, len(rows))
+            settings = solver.settings
+            settings.eps_abs, settings.eps_rel = _PROXQP_TOLERANCE, 0.0
+            settings.max_iter = settings.max_iter_in = _PROXQP_ITERATIONS
+            settings.initial_guess = proxqp.InitialGuess.WARM_START
+            # Without it ProxQP takes a warm start that is feasible, but not optimal, for the
+            # solution.
+            settings.check_duality_gap = True
+            settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = _PROXQP_TOLERANCE, 0.0
             solver.init(np.eye(n), np.zeros(n), None, None, rows, lower, upper)
         else:
             solver.update(None, None, None, None, rows, lower, upper, update_preconditioner=False)
@@ -182,20 +191,6 @@ def _scaled(
         np.where(constant, np.inf, upper / (norms * size)),
     )
     return problem, (size / norms, size)
-
-
-def _new_problem(n: int, limits: int) -> Any:
-    """Return an empty ProxQP problem with our settings."""
-    proxqp = proxsuite.proxqp
-    problem = proxqp.dense.QP(n, 0, limits)
-    settings = problem.settings
-    settings.eps_abs, settings.eps_rel = _PROXQP_TOLERANCE, 0.0
-    settings.max_iter = settings.max_iter_in = _PROXQP_ITERATIONS
-    settings.initial_guess = proxqp.InitialGuess.WARM_START
-    # Without it ProxQP takes a warm start that is feasible, but not optimal, for the solution.
-    settings.check_duality_gap = True
-    settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = _PROXQP_TOLERANCE, 0.0
-    return problem
 
 
 def active_limits(x: Array, rows: Array, lower: Array, upper: Array) -> ActiveSet:

@@ -47,10 +47,10 @@ class _Frame(NamedTuple):
     placement: pin.SE3
     twist: Array
     acceleration: Array
-    jacobian: Array
     twist_q: Array
     acceleration_q: Array
     acceleration_v: Array
+    jacobian: Array
 
 
 class FrameMotions:
@@ -73,7 +73,14 @@ class FrameMotions:
     def __getitem__(self, index: int) -> _Frame:
         """Return a frame's, by its index; before the data are used for anything else."""
         if index not in self._frames:
-            self._frames[index] = _frame(self.equations, index)
+            model, data = self.equations.model, self.equations.data
+            of = model, data, index, _LOCAL
+            self._frames[index] = _Frame(
+                data.oMf[index],
+                pin.getFrameVelocity(*of).vector,
+                pin.getFrameAcceleration(*of).vector,
+                *(part.reshape(6, model.nv) for part in pin.getFrameAccelerationDerivatives(*of)),
+            )
         return self._frames[index]
 
 
@@ -84,11 +91,10 @@ def closure_derivatives(motions: FrameMotions) -> ClosureDerivatives:
     found = ClosureDerivatives(np.zeros(shape), np.zeros(shape), np.zeros(shape))
     for frames in equations.closed_frames:
         of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
-        derivatives = (
-            _of_point(of_a, of_b)
-            if frames.closure.kind == "spherical"
-            else _of_frames(frames, of_a, of_b)
-        )
+        if frames.closure.kind == "spherical":
+            derivatives = [a - b for a, b in zip(_point(of_a), _point(of_b), strict=True)]
+        else:
+            derivatives = [*_of_frames(frames, of_a, of_b)]
         for whole, part in zip(found, derivatives, strict=True):
             whole[frames.rows] = part
     return found
@@ -109,8 +115,8 @@ def closure_force_slope(motions: FrameMotions, multipliers: Array) -> Array:
         force = multipliers[frames.rows]
         of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
         if frames.closure.kind == "spherical":
-            slope += world_wrench_slope(of_a, np.concatenate([force, np.zeros(3)]))
-            slope -= world_wrench_slope(of_b, np.concatenate([force, np.zeros(3)]))
+            wrench = np.concatenate([force, np.zeros(3)])
+            slope += world_wrench_slope(of_a, wrench) - world_wrench_slope(of_b, wrench)
             continue
         placement = of_a.placement.actInv(of_b.placement)
         A, B = of_a.jacobian, placement.toActionMatrix() @ of_b.jacobian
@@ -133,34 +139,8 @@ def world_wrench_slope(frame: _Frame, wrench: Array) -> Array:
 def external_force_slope(motions: FrameMotions, wrenches: Mapping[int, Array]) -> Array:
     """Return the same of external wrenches by frame index, shape (nv, nv)."""
     nv = motions.equations.model.nv
-    slope = np.zeros((nv, nv))
-    for frame, wrench in wrenches.items():
-        slope += world_wrench_slope(motions[frame], wrench)
-    return slope
-
-
-def _frame(equations: ClosureEquations, index: int) -> _Frame:
-    model, data = equations.model, equations.data
-    nv = model.nv
-    twist_q, acceleration_q, acceleration_v, jacobian = (
-        np.asarray(part).reshape(6, nv)
-        for part in pin.getFrameAccelerationDerivatives(model, data, index, _LOCAL)
-    )
-    return _Frame(
-        data.oMf[index],
-        pin.getFrameVelocity(model, data, index, _LOCAL).vector,
-        pin.getFrameAcceleration(model, data, index, _LOCAL).vector,
-        jacobian,
-        twist_q,
-        acceleration_q,
-        acceleration_v,
-    )
-
-
-def _of_point(of_a: _Frame, of_b: _Frame) -> tuple[Array, Array, Array]:
-    """Return the derivatives for two points, in world axes."""
-    a, b = _point(of_a), _point(of_b)
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    slopes = (world_wrench_slope(motions[frame], wrench) for frame, wrench in wrenches.items())
+    return sum(slopes, np.zeros((nv, nv)))
 
 
 def _point(frame: _Frame) -> tuple[Array, Array, Array]:

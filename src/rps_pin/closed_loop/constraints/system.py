@@ -99,11 +99,7 @@ class ConstraintSystem:
     def state(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> tuple[Array, Array, Array]:
         """Return q, v and a as finite arrays of the right shapes."""
         nv = self.model.nv
-        return (
-            real_vector(q, self.model.nq, "q"),
-            real_vector(v, nv, "v"),
-            real_vector(a, nv, "a"),
-        )
+        return real_vector(q, self.model.nq, "q"), real_vector(v, nv, "v"), real_vector(a, nv, "a")
 
     def normalised(self, q: ArrayLike, name: str) -> Array:
         """Return a checked configuration with quaternions of unit length."""

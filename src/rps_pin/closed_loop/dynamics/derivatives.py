@@ -88,14 +88,6 @@ class Linearisation(NamedTuple):
     """Shape (2 m, na)."""
 
 
-class _ForceDerivatives(NamedTuple):
-    """F_q, F_v and M, shapes (nv, nv)."""
-
-    q: Array
-    v: Array
-    a: Array
-
-
 class DynamicsDerivatives:
     """Derivatives of the dynamics of one system.
 
@@ -120,18 +112,17 @@ class DynamicsDerivatives:
     ) -> InverseDynamicsDerivatives:
         """Return the derivatives of tau; the independent joints are the actuated ones."""
         system = self._system
-        basis = motion_basis(system, q, system.actuated)
+        T = motion_basis(system, q, system.actuated)
         multipliers = inverse_dynamics(system, q, v, a, wrenches).constraint_forces
         force, rows = self._force_derivatives((q, v, a), multipliers, wrenches)
-        following = Following(basis, system.actuated, self._solution(q), rows)
-        T = following.T
+        V_y, A_y, A_dy = following(T, system.actuated, self._solution(q), rows)
         by_q, by_v, by_a = (T.T @ derivative for derivative in force)
         return InverseDynamicsDerivatives(
             by_q,
             by_v,
             by_a,
-            by_q @ T + by_v @ following.velocity_y + by_a @ following.acceleration_y,
-            by_v @ T + by_a @ following.acceleration_dy,
+            by_q @ T + by_v @ V_y + by_a @ A_y,
+            by_v @ T + by_a @ A_dy,
             by_a @ T,
         )
 
@@ -142,33 +133,34 @@ class DynamicsDerivatives:
         system = self._system
         a = forward_dynamics(system, q, v, tau, wrenches)
         multipliers = constraint_forces(system, q, v, a, tau, wrenches)
-        basis = motion_basis(system, q, chosen)
-        force, rows = self._force_derivatives((q, v, a), multipliers, wrenches)
-        following = Following(basis, chosen, self._solution(q), rows)
-        T, mass = following.T, basis.T @ force.a @ basis
+        T = motion_basis(system, q, chosen)
+        (F_q, F_v, M), rows = self._force_derivatives((q, v, a), multipliers, wrenches)
+        solved = self._solution(q)
+        V_y, _, _ = following(T, chosen, solved, rows)
+        mass = T.T @ M @ T
 
         def response(of_force: Array, opening: Array) -> Array:
             """Return da of dF and dc, shapes (nv, k) and (nc, k)."""
-            x = -following.solved(opening)
-            along = np.linalg.solve(mass, -T.T @ (of_force + force.a @ x))
+            x = -solved(opening)
+            along = np.linalg.solve(mass, -T.T @ (of_force + M @ x))
             return T @ along + x
 
-        by_q = response(force.q, rows.acceleration_q)
-        by_v = response(force.v, rows.acceleration_v)
+        by_q = response(F_q, rows.acceleration_q)
+        by_v = response(F_v, rows.acceleration_v)
         by_tau = T @ np.linalg.solve(mass, T[system.actuated].T)
         return ForwardDynamicsDerivatives(
             by_q,
             by_v,
             by_tau,
-            (by_q @ T + by_v @ following.velocity_y)[chosen],
+            (by_q @ T + by_v @ V_y)[chosen],
             (by_v @ T)[chosen],
             by_tau[chosen],
         )
 
     def _force_derivatives(
         self, motion: tuple[Array, Array, Array], multipliers: Array, wrenches: Wrenches | None
-    ) -> tuple[_ForceDerivatives, ClosureDerivatives]:
-        """Return the derivatives of F with lambda held, and those of the closures' rows."""
+    ) -> tuple[tuple[Array, Array, Array], ClosureDerivatives]:
+        """Return F_q, F_v and M (nv, nv), lambda held, and the closures' derivatives."""
         system, equations = self._system, self._equations
         model, on_frames = equations.model, system.by_frame(wrenches)
         on_closures = closure_wrenches(equations, motion[0], multipliers)
@@ -186,7 +178,7 @@ class DynamicsDerivatives:
             stiffness, damping = system.effects.slopes(motion[1])
             by_q += np.diag(stiffness)
             by_v += np.diag(damping)
-        return _ForceDerivatives(by_q, by_v, mass), rows
+        return (by_q, by_v, mass), rows
 
     def _solution(self, q: Array) -> Solved:
         """Return a solver of J x = b at q: x has passive rows only, if they determine it."""
@@ -208,8 +200,10 @@ class DynamicsDerivatives:
         return solved
 
 
-class Following:
-    """Dependence of the whole mechanism on independent coordinates: T, V_y, A_y and A_y'.
+def following(
+    basis: Array, chosen: Indices, solved: Solved, rows: ClosureDerivatives
+) -> tuple[Array, Array, Array]:
+    """Return V_y, A_y and A_y': how the whole mechanism follows independent coordinates.
 
     Parameters
     ----------
@@ -223,20 +217,14 @@ class Following:
         Derivatives of the closures' rows.
     """
 
-    def __init__(
-        self, basis: Array, chosen: Indices, solved: Solved, rows: ClosureDerivatives
-    ) -> None:
-        self.T, self._chosen, self.solved = basis, chosen, solved
-        self.velocity_y = self._held(-rows.rate_q @ basis)
-        self.acceleration_y = self._held(
-            -rows.acceleration_q @ basis - rows.acceleration_v @ self.velocity_y
-        )
-        self.acceleration_dy = self._held(-rows.acceleration_v @ basis)
-
-    def _held(self, right: Array) -> Array:
+    def held(right: Array) -> Array:
         """Return x with J x = right and zero rows for the independent joints."""
-        x = self.solved(right)
-        return x - self.T @ x[self._chosen]
+        x = solved(right)
+        return np.asarray(x - basis @ x[chosen])
+
+    velocity_y = held(-rows.rate_q @ basis)
+    acceleration_y = held(-rows.acceleration_q @ basis - rows.acceleration_v @ velocity_y)
+    return velocity_y, acceleration_y, held(-rows.acceleration_v @ basis)
 
 
 def linearisation(derivatives: ForwardDynamicsDerivatives) -> Linearisation:

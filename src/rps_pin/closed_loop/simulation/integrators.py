@@ -124,9 +124,12 @@ class AdaptiveStepper:
 
         def slope(time: float, y: Array) -> Array:
             u, v = y[:nv], y[nv:-1]
-            a = acceleration(time, pin.integrate(model, start, u), v)
             rate = np.empty(y.size)
-            rate[:nv], rate[nv:-1], rate[-1] = self._chart_rate(start, u, v), a, _SCALE * power()
+            rate[:nv], rate[nv:-1] = v, acceleration(time, pin.integrate(model, start, u), v)
+            rate[-1] = _SCALE * power()
+            if not self._flat:
+                chart = pin.dIntegrate(model, start, u, pin.ArgumentPosition.ARG1)
+                rate[:nv] = np.linalg.solve(chart, v)
             return rate
 
         # The work is scaled so that its error counts for nothing; DOP853 takes the root mean square
@@ -162,13 +165,6 @@ class AdaptiveStepper:
 
         self.work = lambda time: float(values(time)[-1] / _SCALE)
         return float(solver.t), at
-
-    def _chart_rate(self, start: Array, u: Array, v: Array) -> Array:
-        """Return u' = D(u)^-1 v."""
-        if self._flat:
-            return v
-        slope = pin.dIntegrate(self._model, start, u, pin.ArgumentPosition.ARG1)
-        return np.linalg.solve(slope, v)
 
 
 def times(duration: float, step: float) -> Iterator[tuple[int, float]]:

@@ -80,13 +80,10 @@ class ClosedManifold:
                 self._system.max_condition,
             )
         self._rank, nv = found, self.model.nv
-        if found == 0:
-            self._rows, self._dependent = np.zeros(0, np.intp), np.zeros(0, np.intp)
-        else:
-            *_, order = qr(jacobian.T, mode="economic", pivoting=True)
-            self._rows = np.sort(order[:found]).astype(np.intp)
-            *_, order = qr(jacobian[self._rows], mode="economic", pivoting=True)
-            self._dependent = np.sort(order[:found]).astype(np.intp)
+        *_, order = qr(jacobian.T, mode="economic", pivoting=True)
+        self._rows = np.sort(order[:found]).astype(np.intp)
+        *_, order = qr(jacobian[self._rows], mode="economic", pivoting=True)
+        self._dependent = np.sort(order[:found]).astype(np.intp)
         self._independent = np.setdiff1d(np.arange(nv), self._dependent)
         self._all_rows = found == self._equations.size
         self._factors = eigenpy.PartialPivLU(max(found, 1))

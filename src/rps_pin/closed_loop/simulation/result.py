@@ -99,16 +99,10 @@ class Simulation:
 
         Numbers have 17 digits: they read back as they were.
         """
-        of_columns = {
-            "q": self.q_names,
-            "v": self.v_names,
-            "a": self.v_names,
-            "tau": self.tau_names,
-        }
+        entries = {"q": self.q_names, "v": self.v_names, "a": self.v_names, "tau": self.tau_names}
         names: list[str] = []
         for array in _ARRAYS:
-            found = of_columns.get(array)
-            names += [array] if found is None else [f"{array}_{name}" for name in found]
+            names += [f"{array}_{name}" for name in entries[array]] if array in entries else [array]
         columns = [getattr(self, array) for array in _ARRAYS]
         if self.constraint_forces is not None:
             names += [f"lambda_{row}" for row in range(self.constraint_forces.shape[1])]
@@ -152,7 +146,7 @@ class Recorder:
             "tau_names": tuple(v_names[index] for index in actuated),
         }
         nv = model.nv
-        self._widths = {"q": model.nq, "v": nv, "a": nv, "tau": actuated.size}
+        self._shapes = {"q": (model.nq,), "v": (nv,), "a": (nv,), "tau": (actuated.size,)}
 
     def watch(self, time: float, q: Array) -> None:
         """Note the joints that are outside their limits for the first time."""
@@ -167,12 +161,10 @@ class Recorder:
             passed = JointLimitPassed(limits.names[index], time, float(x[index]), lower, upper)
             self._passed.append(passed)
 
-    def add(self, constraint_forces: Array | None = None, **row: Any) -> None:
+    def add(self, **row: Any) -> None:
         """Keep a row of all arrays of a `Simulation`, by name."""
         for name, value in row.items():
             self._columns[name].append(value)
-        if constraint_forces is not None:
-            self._columns["constraint_forces"].append(constraint_forces)
 
     def simulation(self) -> Simulation:
         """Return what was recorded until now."""
@@ -180,8 +172,7 @@ class Recorder:
         arrays: dict[str, Any] = {}
         for name in _ARRAYS:
             values = np.array(self._columns[name], dtype=np.float64)
-            wide = name in self._widths
-            arrays[name] = values.reshape(-1, self._widths[name]) if wide else values
+            arrays[name] = values.reshape(len(values), *self._shapes.get(name, ()))
         return Simulation(
             **arrays,
             **self._names,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.constraints.system import ConstraintSystem, Mechanism
+from rps_pin.closed_loop.constraints.system import Mechanism
 from rps_pin.closed_loop.dynamics.generalised_forces import energy
 from rps_pin.closed_loop.dynamics.inverse_dynamics import constraint_forces
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
@@ -134,7 +134,7 @@ def simulate(
     drive = Drive(system, controller, tau, wrenches)
     start = closed_start(system, q, v)
     motion = Motion(system, start, drive, baumgarte_gain if closing == "baumgarte" else 0.0)
-    advance: _Advance = _Fixed(motion)
+    advance = _fixed(motion)
     if method == "adaptive":
         stepper = AdaptiveStepper(system.model, tolerance, min(step, duration))
         advance = _Adaptive(motion, stepper, start, None if controller else duration)
@@ -142,13 +142,22 @@ def simulate(
     time, shown, work = 0.0, 0.0, 0.0
     try:
         state, gap = start, motion.gap(start[0])
-        for k, time, following in _intervals(duration, step):
+        grid = list(times(duration, step))
+        followers = [*(t for _, t in grid[1:]), None]
+        for (k, time), following in zip(grid, followers, strict=True):
             drive.command(time, *state)
             recorder.watch(time, state[0])
             with np.errstate(over="ignore", invalid="ignore"):  # refused in words
                 a = motion.acceleration(time, *state)
             if k % record_every == 0 or following is None:
-                _record(recorder, system, drive, (time, *state), a, forces, gap=gap, work=work)
+                kinetic, potential = energy(system, *state)
+                row = {"time": time, "a": a, "tau": drive.tau, "gap": gap, "work": work}
+                if forces:
+                    acting = drive.wrenches(time, *state)
+                    row["constraint_forces"] = constraint_forces(
+                        system, *state, a, drive.tau, acting
+                    )
+                recorder.add(q=state[0], v=state[1], kinetic=kinetic, potential=potential, **row)
             if following is None:
                 break
             with np.errstate(over="ignore", invalid="ignore"):
@@ -175,26 +184,24 @@ def simulate(
 _Advance = Callable[[float, State, float, Array], tuple[State, float, float]]
 
 
-class _Fixed:
-    """One step of fixed length."""
+def _fixed(motion: Motion) -> _Advance:
+    """Return the function that takes one step of fixed length."""
 
-    def __init__(self, motion: Motion) -> None:
-        self._motion = motion
-        self._powers: list[float] = []
-
-    def __call__(
-        self, time: float, state: State, following: float, a: Array
+    def advance(
+        time: float, state: State, following: float, a: Array
     ) -> tuple[State, float, float]:
-        motion, step = self._motion, following - time
-        self._powers = [motion.power]  # at the start, where a comes from
-        moved = rk4_step(motion.model, self._acceleration, time, state, step, a)
-        work = step * sum(w * p for w, p in zip(RK4_WEIGHTS, self._powers, strict=True))
+        powers = [motion.power]  # at the start, where a comes from
+
+        def acceleration(t: float, q: Array, v: Array) -> Array:
+            a = motion.acceleration(t, q, v)
+            powers.append(motion.power)
+            return a
+
+        moved = rk4_step(motion.model, acceleration, time, state, following - time, a)
+        work = (following - time) * sum(w * p for w, p in zip(RK4_WEIGHTS, powers, strict=True))
         return *motion.finish(moved), work
 
-    def _acceleration(self, t: float, q: Array, v: Array) -> Array:
-        a = self._motion.acceleration(t, q, v)
-        self._powers.append(self._motion.power)
-        return a
+    return advance
 
 
 class _Adaptive:
@@ -231,29 +238,3 @@ class _Adaptive:
         if following == self._time:
             return self._state, self._gap, work
         return *self._motion.finish(self._at(following)), work
-
-
-def _intervals(duration: float, step: float) -> list[tuple[int, float, float | None]]:
-    """Return (k, t_k, t_k+1), None for the time after the last."""
-    grid = list(times(duration, step))
-    following: list[float | None] = [time for _, time in grid[1:]]
-    return [(k, t, after) for (k, t), after in zip(grid, [*following, None], strict=True)]
-
-
-def _record(
-    recorder: Recorder,
-    system: ConstraintSystem,
-    drive: Drive,
-    at: tuple[float, Array, Array],
-    a: Array,
-    forces: bool,
-    **numbers: float,
-) -> None:
-    time, q, v = at
-    multipliers = None
-    if forces:
-        wrenches = drive.wrenches(time, q, v)
-        multipliers = constraint_forces(system, q, v, a, drive.tau, wrenches)
-    kinetic, potential = energy(system, q, v)
-    row = {"time": time, "q": q, "v": v, "a": a, "tau": drive.tau, **numbers}
-    recorder.add(multipliers, kinetic=kinetic, potential=potential, **row)
