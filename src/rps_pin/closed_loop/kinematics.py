@@ -16,8 +16,7 @@ from rps_pin.numerics.linear_algebra import (
     condition_number,
     least_norm,
     null_space,
-    refuse_condition,
-    singular_values,
+    solve_transposed,
 )
 
 #: Opening rate that `velocity` and `acceleration` accept, relative to the rates given.
@@ -46,12 +45,10 @@ def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
             system.max_condition,
         )
     # N is orthonormal in one unit: joints that take part in all motions have a block of size 1.
-    scaled = of_chosen / system.column_scale[chosen][:, None]
-    smallest = float(singular_values(scaled).min(initial=1.0))
-    condition = 1 / smallest if smallest > 0 else np.inf
+    scale = system.column_scale[chosen]
     reason = "these joints do not determine the motion here"
-    refuse_condition(condition, system.max_condition, reason)
-    return np.asarray(np.linalg.solve(of_chosen.T, motions.T).T, dtype=np.float64)
+    scaled = of_chosen / scale[:, None]
+    return solve_transposed(scaled, motions.T, system.max_condition, reason).T / scale
 
 
 def actuated_basis(system: ConstraintSystem, solved: Array) -> Array:

@@ -62,6 +62,45 @@ def full_svd(matrix: Array) -> tuple[Array, Array, Array]:
     return left, values, right
 
 
+class Decomposition:
+    """Singular values of a matrix A of finite entries, its rank, and solutions of least norm.
+
+    Attributes
+    ----------
+    left, values, right : arrays
+        U, the singular values and V', as `full_svd` returns them.
+    rank : int
+    """
+
+    def __init__(self, matrix: Array) -> None:
+        self.left, self.values, self.right = full_svd(matrix)
+        self.rank = rank(self.values)
+
+    def null_space(self) -> Array:
+        """Return an orthonormal basis N of all x with A x = 0, shape (n, n - rank)."""
+        return self.right[self.rank :].T
+
+    def least_norm(self, right: Array) -> Array:
+        """Return the least-squares solution x of A x = b of least norm, shape (n,) or (n, k)."""
+        along = (right.T @ self.left[:, : self.rank]) / self.values[: self.rank]
+        return np.asarray((along @ self.right[: self.rank]).T)
+
+    def transposed_least_norm(self, right: Array) -> Array:
+        """Return the same of A' x = b."""
+        along = (right.T @ self.right[: self.rank].T) / self.values[: self.rank]
+        return np.asarray((along @ self.left[:, : self.rank].T).T)
+
+
+def solve_transposed(matrix: Array, right: Array, limit: float, reason: str) -> Array:
+    """Return x with A' x = b of a square A whose singular values are at most 1.
+
+    A smallest one below 1 / limit raises `SingularityError` for a reason.
+    """
+    smallest = float(singular_values(matrix).min(initial=1.0))
+    refuse_condition(1 / smallest if smallest > 0 else math.inf, limit, reason)
+    return np.asarray(np.linalg.solve(matrix.T, right), np.float64)
+
+
 def null_space(matrix: Array) -> Array:
     """Return an orthonormal basis N of all x with A x = 0, shape (n, n - rank)."""
     _, values, right = np.linalg.svd(matrix)

@@ -48,15 +48,6 @@ class LoopErrors(NamedTuple):
     the frames' angular accelerations, which is that where their angular velocities agree."""
 
 
-class _Coupled(NamedTuple):
-    """Indices and numbers of a coupling."""
-
-    q: tuple[int, int]
-    v: tuple[int, int]
-    ratio: float
-    offset: float
-
-
 class ClosedFrames(NamedTuple):
     """A closure of two frames, its rows and Pinocchio's data."""
 
@@ -132,7 +123,6 @@ class ClosureEquations:
         self.constraints = pin.StdVec_RigidConstraintModel()
         self.constraint_data = pin.StdVec_RigidConstraintData()
         self.closed_frames: list[ClosedFrames] = []
-        self.couplings: list[tuple[int, _Coupled]] = []
         of_frames = [closure for closure in self.closures if isinstance(closure, LoopClosure)]
         for closure in of_frames:
             constraint = closure.constraint_model(model)
@@ -149,15 +139,9 @@ class ClosureEquations:
             self.closed_frames.append(
                 ClosedFrames(closure, rows, *ids, rows_of(closure), in_world, data)
             )
-        for closure in self.closures:
-            if isinstance(closure, JointCoupling):
-                one, other = (model.joints[index] for index in closure.joint_ids(model))
-                at = (one.idx_q, other.idx_q), (one.idx_v, other.idx_v)
-                coupled = _Coupled(*at, closure.ratio, closure.offset)
-                self.couplings.append((self.rows(closure.name).start, coupled))
         self._points = [f for f in self.closed_frames if f.closure.kind == "spherical"]
         self._frames = [f for f in self.closed_frames if f.closure.kind != "spherical"]
-        self.plain = bool(self.closed_frames) and not self.couplings
+        self.plain = 0 < len(of_frames) == len(self.closures)
         self.plain = self.plain and all(frames.in_world for frames in self.closed_frames)
         self.length = self._length(characteristic_length)
         self.angular_velocities = angular = self._is_angular()
@@ -165,8 +149,16 @@ class ClosureEquations:
         self.angular_rows = np.zeros(self.size, dtype=bool)
         for frames in self.closed_frames:
             self.angular_rows[frames.rows] = frames.selected.angular
-        for row, coupled in self.couplings:
-            self.angular_rows[row] = angular[coupled.v[0]]
+        #: Row, two indices in q, ratio and offset of each coupling; and their rows of J.
+        self._couplings: list[tuple[int, int, int, float, float]] = []
+        self._coupling_rows = np.zeros((self.size, model.nv))
+        for closure in self.closures:
+            if isinstance(closure, JointCoupling):
+                row, ratio = self.rows(closure.name).start, closure.ratio
+                one, other = (model.joints[index] for index in closure.joint_ids(model))
+                self._couplings.append((row, one.idx_q, other.idx_q, ratio, closure.offset))
+                self._coupling_rows[row, [one.idx_v, other.idx_v]] = 1.0, -ratio
+                self.angular_rows[row] = angular[one.idx_v]
         self.row_scale = np.where(self.angular_rows, self.length, 1.0)
         self._groups = self._row_groups()
         self._open_limit = (OPEN * self.length) ** 2
@@ -197,7 +189,7 @@ class ClosureEquations:
         """Return J, shape (nc, nv), from what Pinocchio's `getConstraintsJacobian` returned."""
         if self.plain:
             return jacobian.reshape(self.size, self.model.nv)  # a single row or column comes flat
-        rows = np.zeros((self.size, self.model.nv))
+        rows = self._coupling_rows.copy()
         all_rows = jacobian.reshape(-1, self.model.nv)
         start = 0
         for frames in self.closed_frames:
@@ -209,8 +201,6 @@ class ClosureEquations:
                 else frames.selected.wrenches(frames.constraint_data.c1Mc2) @ block
             )
             start = stop
-        for row, coupled in self.couplings:
-            rows[row, coupled.v[0]], rows[row, coupled.v[1]] = 1.0, -coupled.ratio
         return rows
 
     # Gaps -----------------------------------------------------------------------------------------
@@ -230,8 +220,8 @@ class ClosureEquations:
             if frames.in_world:
                 gap = (gap.reshape(-1, 3) @ frames.constraint_data.oMc1.rotation.T).ravel()
             gaps[frames.rows] = gap
-        for row, (at, _, ratio, offset) in self.couplings:
-            gaps[row] = q[at[0]] - ratio * q[at[1]] - offset
+        for row, one, other, ratio, offset in self._couplings:
+            gaps[row] = q[one] - ratio * q[other] - offset
         return gaps
 
     def largest_gap(self, gaps: Array) -> float:
@@ -253,8 +243,8 @@ class ClosureEquations:
         for point, rotation, squared_gap in self._open_frames:
             if not squared_gap(point(), rotation()) <= limit:
                 return True
-        for row, (at, _, ratio, offset) in self.couplings:
-            gap = self.row_scale[row] * (q[at[0]] - ratio * q[at[1]] - offset)
+        for row, one, other, ratio, offset in self._couplings:
+            gap = self.row_scale[row] * (q[one] - ratio * q[other] - offset)
             if not gap * gap <= limit:
                 return True
         return False
@@ -297,14 +287,11 @@ class ClosureEquations:
         """Return gaps, their rates and their accelerations."""
         gaps = self.gaps(q)
         pin.forwardKinematics(self.model, self.data, q, v, a)
-        rates, accelerations = np.empty(self.size), np.empty(self.size)
+        rates, accelerations = self._coupling_rows @ v, self._coupling_rows @ a
         for frames in self.closed_frames:
             rates[frames.rows], accelerations[frames.rows] = (
                 self._world_motion(frames) if frames.in_world else self._selected_motion(frames)
             )
-        for row, (_, at, ratio, _) in self.couplings:
-            rates[row] = v[at[0]] - ratio * v[at[1]]
-            accelerations[row] = a[at[0]] - ratio * a[at[1]]
         return LoopErrors(gaps, rates, accelerations)
 
     def bias(self, q: Array, v: Array) -> Array:
@@ -337,26 +324,10 @@ class ClosureEquations:
         )
 
     def _selected_motion(self, frames: ClosedFrames) -> tuple[Array, Array]:
-        """Return J v = W X and its derivative W A + W' X, X the twist of a relative to b.
+        """Return J v = W X and its derivative W A + W' X, X the twist of a relative to b, A = X'.
 
-        In world axes, with R and w of frame a: R W X, and R (W X)' + R (w x W X).
-        """
-        placement, twist, acceleration, twist_a = self.relative_motion(frames)
-        wrenches = frames.selected.wrenches(placement)
-        rate = wrenches @ twist
-        change = wrenches @ acceleration + frames.selected.bias(placement, twist)
-        if not frames.in_world:
-            return rate, change
-        frame = self.model.frames[frames.frame_a]
-        turn = self.data.oMi[frame.parentJoint].rotation @ frame.placement.rotation
-        rate, change = rate.reshape(-1, 3), change.reshape(-1, 3)
-        change = change + np.cross(twist_a.angular, rate)
-        return (rate @ turn.T).ravel(), (change @ turn.T).ravel()
-
-    def relative_motion(self, frames: ClosedFrames) -> tuple[pin.SE3, Array, Array, pin.Motion]:
-        """Return b's placement in a, a's twist X relative to b, its derivative A, and a's twist.
-
-        In a's axes at its origin, after a `forwardKinematics` with velocities and accelerations.
+        In world axes, with R and w of frame a: R W X, and R (W X)' + R (w x W X). After a
+        `forwardKinematics` with velocities and accelerations.
         """
         model, data = self.model, self.data
         local = pin.ReferenceFrame.LOCAL
@@ -372,7 +343,15 @@ class ClosureEquations:
         b = placement.act(pin.getFrameAcceleration(model, data, frames.frame_b, local))
         # d/dt (Ad_M nu_b) = Ad_M nu_b' + xi x (Ad_M nu_b), xi = -X; and X x nu_b = X x nu_a.
         acceleration = a - b + twist.cross(twist_a)
-        return placement, twist.vector, acceleration.vector, twist_a
+        wrenches = frames.selected.wrenches(placement)
+        rate = wrenches @ twist.vector
+        change = wrenches @ acceleration.vector + frames.selected.bias(placement, twist.vector)
+        if not frames.in_world:
+            return rate, change
+        turn = placement_a.rotation
+        rate, change = rate.reshape(-1, 3), change.reshape(-1, 3)
+        change = change + np.cross(twist_a.angular, rate)
+        return (rate @ turn.T).ravel(), (change @ turn.T).ravel()
 
     def _length(self, given: float | None) -> float:
         """Return the given length, or the longest lever of a closure, or 1 m if there is none."""
@@ -391,9 +370,8 @@ class ClosureEquations:
         neutral = pin.neutral(self.model)
         pin.computeJointJacobians(self.model, self.data, neutral)
         angular = np.zeros(self.model.nv, dtype=bool)
-        for index, joint in enumerate(self.model.joints):
-            if index == 0:
-                continue
+        for index in range(1, self.model.njoints):
+            joint = self.model.joints[index]
             columns = slice(joint.idx_v, joint.idx_v + joint.nv)
             local = pin.getJointJacobian(self.model, self.data, index, pin.ReferenceFrame.LOCAL)
             subspace = local.reshape(6, self.model.nv)[:, columns]

@@ -39,7 +39,7 @@ from rps_pin.closed_loop.dynamics.least_effort import (
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.errors import InfeasibleError, InputError, LimitExcess
-from rps_pin.numerics.linear_algebra import full_svd, rank
+from rps_pin.numerics.linear_algebra import Decomposition
 from rps_pin.numerics.quadratic_program import LeastDistance, NearestPoint, least_violation
 from rps_pin.validation import real_vector
 
@@ -111,7 +111,6 @@ class ForceDistribution:
         na = self._actuated.size
         self._angular = mechanism.angular_velocities
         self._actuated_columns = self._columns[self._actuated]
-        self._scale = self._rows[:, None] * self._columns
         self.weights = self._actuated_columns.copy()
         if weights is not None:
             self.weights = _spread(weights, na, "weights")
@@ -177,7 +176,7 @@ class ForceDistribution:
         aim = np.zeros(self.weights.size)
         if preferred is not None:
             aim = real_vector(preferred, aim.size, "preferred")
-        factors = _Factors(*full_svd(self._scale * jacobian))
+        factors = Decomposition(self.mechanism.system.scaled(jacobian))
         effort, free = self._unlimited(factors, force, aim)
         names: tuple[str, ...] = ()
         iterations, redundant = 0, None
@@ -191,7 +190,7 @@ class ForceDistribution:
         tau = aim + effort / self.weights
         multipliers = self._multipliers(factors, force, tau)
         if redundant is not None and redundant.size:
-            multipliers += self._rows * (factors.redundant() @ redundant)
+            multipliers += self._rows * (self._redundant(factors) @ redundant)
         rest = force - multipliers @ jacobian
         rest[self._actuated] -= tau
         return DistributedForces(
@@ -203,7 +202,7 @@ class ForceDistribution:
             iterations,
         )
 
-    def _unlimited(self, factors: _Factors, force: Array, aim: Array) -> tuple[Array, Array]:
+    def _unlimited(self, factors: Decomposition, force: Array, aim: Array) -> tuple[Array, Array]:
         """Return W (tau_l - tau_0), shape (na,), and W F, shape (na, na - rank).
 
         Raises
@@ -211,7 +210,7 @@ class ForceDistribution:
         InfeasibleError, SingularityError
             As `solve`.
         """
-        motions = factors.right[factors.rank :]  # N' in scaled units
+        motions = factors.null_space().T  # N' in scaled units
         rest = self._columns * force
         rest[self._actuated] -= self._actuated_columns * aim
         reduced = motions @ rest
@@ -223,14 +222,18 @@ class ForceDistribution:
             raise self._infeasible_motion(residual_force(motions, best.missing, self._columns))
         return best.tau, best.free
 
-    def _multipliers(self, factors: _Factors, force: Array, tau: Array) -> Array:
+    def _multipliers(self, factors: Decomposition, force: Array, tau: Array) -> Array:
         """Return lambda of least norm, shape (nc,): J' lambda = f - S' tau."""
         rest = self._columns * force
         rest[self._actuated] -= self._actuated_columns * tau
-        return self._rows * factors.least_norm(rest)
+        return self._rows * factors.transposed_least_norm(rest)
+
+    def _redundant(self, factors: Decomposition) -> Array:
+        """Return K: scaled lambdas with J' lambda = 0, shape (nc, nc - rank), cheap ones."""
+        return factors.left[:, factors.rank :] / REDUNDANCY_WEIGHT
 
     def _point_within_limits(
-        self, factors: _Factors, force: Array, aim: Array, effort: Array, free: Array
+        self, factors: Decomposition, force: Array, aim: Array, effort: Array, free: Array
     ) -> NearestPoint:
         """Return (y, z) of the solution, z only where bounds rest on redundant rows."""
         values, rows = effort + self.weights * aim, free
@@ -238,8 +241,8 @@ class ForceDistribution:
             multipliers = self._multipliers(factors, force, aim + effort / self.weights)
             of_effort = np.zeros((self._columns.size, free.shape[1]))
             of_effort[self._actuated] = -self._levers[:, None] * free
-            of_point = self._bounded @ factors.least_norm(of_effort)
-            redundant = self._bounded @ factors.redundant()
+            of_point = self._bounded @ factors.transposed_least_norm(of_effort)
+            redundant = self._bounded @ self._redundant(factors)
             values = np.concatenate([values, self._directions @ multipliers])
             rows = np.zeros((values.size, free.shape[1] + redundant.shape[1]))
             rows[: effort.size, : free.shape[1]] = free
@@ -324,24 +327,6 @@ class ForceDistribution:
     def _actuator_names(self) -> list[str]:
         names = column_names(self.mechanism.model)[1]
         return [f"actuator {names[i]!r}" for i in self._actuated]
-
-
-class _Factors:
-    """Singular value decomposition of J in scaled units."""
-
-    def __init__(self, left: Array, values: Array, right: Array) -> None:
-        self.left, self.values, self.right = left, values, right
-        self.rank = rank(values)
-
-    def least_norm(self, force: Array) -> Array:
-        """Return the scaled lambda of least norm with J' lambda = force, (nv,) or (nv, n)."""
-        rank = self.rank
-        along = (force.T @ self.right[:rank].T) / self.values[:rank]
-        return (along @ self.left[:, :rank].T).T
-
-    def redundant(self) -> Array:
-        """Return K: scaled lambdas with J' lambda = 0, shape (nc, nc - rank), cheap ones."""
-        return self.left[:, self.rank :] / REDUNDANCY_WEIGHT
 
 
 def _spread(value: ArrayLike, size: int, name: str) -> Array:

@@ -22,7 +22,7 @@ from rps_pin.closed_loop.dynamics.generalised_forces import resisting_force, tre
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.kinematics import actuated_basis
 from rps_pin.errors import SingularityError
-from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, rank
+from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, Decomposition
 
 #: A squared pivot below this, relative to the largest, counts as no inertia.
 _NO_INERTIA = 1e-14
@@ -103,10 +103,8 @@ def basis_and_bias(jacobian: Array, bias: Array, scale: Array) -> tuple[Array, A
     scale
         Scaling of the velocities to one unit, shape (nv,).
     """
-    left, values, right = np.linalg.svd(jacobian * scale)
-    count = rank(values)
-    along = (left[:, :count].T @ bias) / values[:count]
-    return scale[:, None] * right[count:].T, -scale * (right[:count].T @ along)
+    factors = Decomposition(jacobian * scale)
+    return scale[:, None] * factors.null_space(), -scale * factors.least_norm(bias)
 
 
 def solve_reduced(mass: Array, force: Array) -> Array:

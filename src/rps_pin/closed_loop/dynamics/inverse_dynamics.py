@@ -36,11 +36,9 @@ from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.errors import InputError
 from rps_pin.numerics.linear_algebra import (
     RANK_TOLERANCE,
+    Decomposition,
     condition_number,
-    least_norm,
-    null_space,
-    refuse_condition,
-    singular_values,
+    solve_transposed,
 )
 
 _INFINITY = math.inf
@@ -186,23 +184,21 @@ def constraint_forces(
     """Return lambda (nc,) of a motion under given actuator forces, of least norm."""
     rest = required_force(system, q, v, a, wrenches)
     rest[system.actuated] -= tau
-    jacobian = system.scaled(system.equations.jacobian(q))
-    return system.row_scale * least_norm(jacobian.T, system.column_scale * rest)
+    factors = Decomposition(system.scaled(system.equations.jacobian(q)))
+    return system.row_scale * factors.transposed_least_norm(system.column_scale * rest)
 
 
 def _by_null_space(system: ConstraintSystem, jacobian: Array, force: Array) -> InverseDynamics:
     if not np.isfinite(force).all():
         raise InputError("q, v and a must be finite")
     jacobian = jacobian.reshape(system.equations.size, system.model.nv)
-    rows, scale = system.row_scale, system.column_scale
-    scaled_rows = rows[:, None] * jacobian
-    motions = scale[:, None] * null_space(scaled_rows * scale)
-    if motions.shape[1] == system.actuated.size:
+    factors = Decomposition(system.scaled(jacobian))
+    if system.model.nv - factors.rank == system.actuated.size:
         system.refuse_singular(system.condition(jacobian))
     tau, scaled, unproduced = null_space_solution(
-        scaled_rows, system.actuated, force, scale, system.max_condition, motions
+        factors, system.actuated, force, system.column_scale, system.max_condition
     )
-    multipliers = rows * scaled
+    multipliers = system.row_scale * scaled
     error = force - jacobian.T @ multipliers
     if unproduced is not None:
         error -= unproduced
@@ -229,19 +225,18 @@ class NullSpaceSolution(NamedTuple):
 
 
 def null_space_solution(
-    jacobian: Array,
+    factors: Decomposition,
     actuated: Indices,
     force: Array,
     scale: Array,
     max_condition: float = 1 / RANK_TOLERANCE,
-    motions: Array | None = None,
 ) -> NullSpaceSolution:
     """Return tau and lambda for any number of closure rows and actuators.
 
     Parameters
     ----------
-    jacobian
-        J, shape (nc, nv), its rows in one unit.
+    factors
+        Of J times the scale, shape (nc, nv), all entries in one unit.
     actuated
         Indices of the actuated velocities, shape (na,).
     force
@@ -250,21 +245,19 @@ def null_space_solution(
         Positive scaling of the velocities, shape (nv,): coordinates v / scale share one unit.
     max_condition
         Largest condition number of the actuators' part in the motions that is accepted.
-    motions
-        N, shape (nv, m), N / scale orthonormal; computed if left out.
 
     Raises
     ------
     SingularityError
         If as many actuators as motions do not move all of the mechanism, or others hardly do.
     """
-    if motions is None:
-        motions = scale[:, None] * null_space(jacobian * scale)
+    motions = scale[:, None] * factors.null_space()
     of_actuators, reduced = motions[actuated], motions.T @ force
     remaining = None
     if of_actuators.shape[0] == of_actuators.shape[1]:
-        tau = _exact(of_actuators / scale[actuated][:, None], reduced, max_condition)
-        tau = tau / scale[actuated]
+        scaled = of_actuators / scale[actuated][:, None]
+        reason = "the actuated joints do not move all of the mechanism here"
+        tau = solve_transposed(scaled, reduced, max_condition, reason) / scale[actuated]
     else:
         effort = least_effort(of_actuators, reduced, weights=scale[actuated])
         refuse_nearly_singular(effort.values, max_condition)
@@ -273,13 +266,4 @@ def null_space_solution(
             remaining = residual_force(motions, effort.missing, scale)
     rest = force.copy() if remaining is None else force - remaining
     rest[actuated] -= tau
-    return NullSpaceSolution(tau, least_norm((jacobian * scale).T, scale * rest), remaining)
-
-
-def _exact(of_actuators: Array, reduced: Array, max_condition: float) -> Array:
-    """Return tau with (S N)' tau = N' f, S N square and of one unit, of size 1 at best."""
-    smallest = float(singular_values(of_actuators).min(initial=1.0))
-    condition = 1 / smallest if smallest > 0 else np.inf
-    reason = "the actuated joints do not move all of the mechanism here"
-    refuse_condition(condition, max_condition, reason)
-    return np.asarray(np.linalg.solve(of_actuators.T, reduced), np.float64)
+    return NullSpaceSolution(tau, factors.transposed_least_norm(scale * rest), remaining)
