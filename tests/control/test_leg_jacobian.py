@@ -1,4 +1,4 @@
-"""Jacobian of the legs ajacobiant the library's arrays and the ball joints' speeds."""
+"""Jacobian of the legs, and the twist, against the library's arrays and the ball joints' speeds."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from rps_pin.control.estimator.leg_jacobian import (
     pose_rate,
     wrench_of_force,
 )
-from rps_pin.control.estimator.state_estimate import state_estimate
+from rps_pin.control.estimator.state_estimate import platform_twist, state_estimate
 from rps_pin.rps.kinematics import rates
 from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.rps.singularity.measures import singularity_measures
 from tests import strategies
+from tests.reference import newton_euler as ne
 
 
 @pytest.mark.parametrize("largest_tilt", [0.0, 1e-9, 1.0, 3.1])
@@ -41,6 +42,8 @@ def test_singular_values_rates_and_twists_are_the_library_s(largest_tilt: float)
             assert least.of(jacobian) == pytest.approx(measures.type_ii[i], abs=1e-13)
             assert jacobian.determinant == pytest.approx(measures.determinant[i], abs=1e-13)
             np.testing.assert_allclose(jacobian.K, legs.length_jacobian[i], rtol=0, atol=1e-13)
+            twist = platform_twist(geometry, rate, h)
+            np.testing.assert_allclose(twist, twists[i], rtol=1e-12, atol=1e-12)
             if measures.type_ii[i] > 0.05:
                 d1, d2, d3 = (legs.length_jacobian[i] @ speeds[i]).tolist()
                 back = pose_rate(jacobian, (d1, d2, d3))
@@ -62,3 +65,17 @@ def test_singular_values_rates_and_twists_are_the_library_s(largest_tilt: float)
             if measures.type_ii[i] > 0.05:
                 again = force_of_wrench(jacobian, wrench_of_force(jacobian, (f1, f2, f3)))
                 np.testing.assert_allclose(again, force, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("largest_tilt", [0.0, 1e-9, 1.0, 3.1, 6.0])
+def test_twist_is_the_reference_s(largest_tilt: float) -> None:
+    rng = np.random.default_rng(3)
+    p = strategies.random_parameters(rng)
+    poses, speeds, _ = strategies.random_motions(rng, p, 200, largest_tilt)
+    moving = ne.kinematics(p, poses, speeds, np.zeros_like(poses))
+    expected = np.concatenate([moving.velocity, moving.angular_velocity], axis=-1)
+    for pose, speed, twist in zip(poses.tolist(), speeds.tolist(), expected, strict=True):
+        geometry = leg_geometry(tuple(pose), p.base_radius, p.platform_radius)
+        assert geometry is not None
+        found = platform_twist(geometry, tuple(speed), p.platform_radius)
+        np.testing.assert_allclose(found, twist, rtol=1e-12, atol=1e-12)

@@ -61,12 +61,7 @@ def test_a_weak_robot_stays_nearer_to_its_path_at_its_pace() -> None:
     for paced in (False, True):
         controller = ComputedTorque(robot, start, Gains.placed(15.0), force_limit=5.2)
         run = run_loop(
-            controller,
-            Plant(robot, start, substeps=1),
-            path,
-            settle=0.05,
-            duration=1.2,
-            paced=paced,
+            controller, Plant(robot, start), path, settle=0.05, duration=1.2, paced=paced
         )
         assert np.abs(run.command).max() <= 5.2
         assert LoopSummary.of(run).saturated > 0.05

@@ -48,6 +48,27 @@ def run(kind: str, *faults: Fault, duration: float = 0.5, **more: Any) -> LoopRu
     return found
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_step_in_a_tick_is_the_plant(kind: str) -> None:
+    """The runs of this file integrate each tick in one step: the error is below 1e-12 m."""
+    robot = RPSRobot.from_preset("micro")
+    path = circle(height=0.223, tilt=0.08, duration=1.0)
+    start = path.sample(0.0).pose
+    one, eight = (
+        run_loop(
+            made(kind, start=start),
+            Plant(robot, start, substeps=steps),
+            path,
+            faults=[Fault("jump", 0.05, leg=3, size=1e-3)],
+            duration=0.1,
+        )
+        for steps in (1, 8)
+    )
+    np.testing.assert_array_equal(one.status, eight.status)
+    np.testing.assert_allclose(one.length, eight.length, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(one.command, eight.command, rtol=0, atol=2e-8)
+
+
 def said(found: LoopRun, flag: Status) -> NDArray[np.int64]:
     return np.flatnonzero(found.status & int(flag))
 

@@ -79,7 +79,7 @@ def answers(f: dict[str, Any], numbers: list[Any]) -> list[float]:
             *(f["closure_determinant"](at, G, H), f["robot_state"](at, rate, acceleration, H)),
             *(f["pose_rate"](jacobian, rate), f["leg_speed"](jacobian, rate)),
             *(f["force_of_wrench"](jacobian, rate), f["wrench_of_force"](jacobian, rate)),
-            f["leg_motion"](at, rate, acceleration, H),
+            *(f["leg_motion"](at, rate, acceleration, H), f["platform_twist"](at, rate, H)),
             f["state_estimate"](goal, followed.directions, rate, G, H),
         )
     )

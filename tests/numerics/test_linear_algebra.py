@@ -30,7 +30,7 @@ def test_null_space_is_an_orthonormal_basis(rank: int, rows: int, columns: int) 
     motions = null_space(jacobian)
     assert motions.shape == (columns, columns - rank)
     np.testing.assert_allclose(jacobian @ motions, 0, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(motions.T @ motions, np.eye(columns - rank), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(motions.T @ motions, np.eye(columns - rank), rtol=0, atol=1e-14)
 
 
 def test_without_closures_every_motion_is_allowed() -> None:

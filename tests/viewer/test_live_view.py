@@ -303,9 +303,16 @@ def test_a_view_runs_once(view):
     assert view.alive
 
 
-@pytest.mark.parametrize("pose", [(0.22, 0.0), np.full(3, np.nan), (np.inf, 0.0, 0.0)])
-def test_a_first_pose_that_is_none_is_refused(robot, pose):
-    with pytest.raises(InputError, match="pose"):
+@pytest.mark.parametrize(
+    ("pose", "why"),
+    [
+        ((0.22, 0.0), r"pose has shape \(2,\); it must be \(3,\)"),
+        (np.full(3, np.nan), "pose is not finite: entry 0 is nan"),
+        ((np.inf, 0.0, 0.0), "pose is not finite: entry 0 is inf"),
+    ],
+)
+def test_a_first_pose_that_is_none_is_refused(robot, pose, why):
+    with pytest.raises(InputError, match=why):
         LiveView(robot, pose)
 
 

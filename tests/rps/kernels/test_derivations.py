@@ -14,6 +14,8 @@ from scipy.spatial.transform import Rotation
 from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_slope
 from rps_pin.rps.kernels import forces, leg_equations, legs, placement, platform, tips
 from rps_pin.rps.kernels.tilt_functions import stumpff, tilt_functions
+from tests import strategies
+from tests.reference import newton_euler as ne
 
 Array = NDArray[np.float64]
 RNG = np.random.default_rng(8)
@@ -24,6 +26,11 @@ ACROSS = np.cross([0.0, 0.0, 1.0], RADIAL)
 POSES = [(0.4, *RNG.uniform(-size, size, 2).tolist()) for size in (1e-6, 0.3, 1.0, 1.9, 2.2) * 4]
 POSES.append((0.4, 0.0, 0.0))
 STEP = 1e-30
+#: Squares of tilts: zero, tiny, about 1 and 4, of half a turn, large.
+SQUARES = [
+    *(0.0, 1e-300, 1e-12, 1e-8, 1e-3, 0.3, 0.5, 1 - 1e-15, 1.0, 1.1, 1.5),
+    *(3.9, 4.0, 4.1, 5.0, pi**2, 20.0, 30.0, 60.0),
+]
 
 
 def tilt_at(x: Any, y: Any) -> Any:
@@ -70,7 +77,7 @@ def tip_vectors(z: float, x: float, y: float) -> Array:
     return vectors
 
 
-@pytest.mark.parametrize("s", [0.0, 1e-8, 0.5, 3.9, 4.0, 4.1, 20.0, 60.0])
+@pytest.mark.parametrize("s", SQUARES)
 def test_stumpff_functions_are_their_series(s: float) -> None:
     # In whole numbers over 10^40: the terms cancel in floats.
     one, whole = 10**40, int(s * 10**20)
@@ -81,13 +88,13 @@ def test_stumpff_functions_are_their_series(s: float) -> None:
         assert abs(value - series / one) < 1e-15
 
 
-@pytest.mark.parametrize("s", [0.0, 1e-8, 0.5, 3.9, 4.1, 20.0])
+@pytest.mark.parametrize("s", [s for s in SQUARES if s <= 30.0])
 def test_slopes_of_tilt_functions(s: float) -> None:
     a, b, _, d, a_s, b_s, d_s, a_ss, b_ss = tilt_functions(s)
     slope = change(tilt_functions, [s], [1.0])
     near([a_s, b_s, d_s, a_ss, b_ss], slope[[0, 1, 3, 4, 5]], 1e-13)
     near(slope[2], -a / 2, 1e-14)  # C = cos(sqrt(s))
-    near([b, d], [(1 - cos(sqrt(s))) / s, (1 - a) / s] if s > 0.1 else [1 / 2, 1 / 6], 1e-8)
+    near([b, d], [(1 - cos(sqrt(s))) / s, (1 - a) / s] if s > 1e-4 else [1 / 2, 1 / 6], 1e-8)
 
 
 @pytest.mark.parametrize("pose", POSES)
@@ -149,6 +156,47 @@ def test_tips_and_their_derivatives(pose: Any) -> None:
     squares = [np.square(tips.at_legs(ring)).sum() for ring in tips.tip_rates(slopes, 0.0, dx, dy)]
     xx, xy, yy = tips.speed_form(slopes)
     near(xx * dx * dx + 2 * xy * dx * dy + yy * dy * dy, sum(squares))
+
+
+@pytest.mark.parametrize("largest", [1e-3, 1.5, 3.1, 6.0])
+def test_tips_on_arrays_are_the_reference_s(largest: float) -> None:
+    """The reference carries its derivatives by jets, from legs in space."""
+    rng = np.random.default_rng(3)
+    pose = strategies.random_poses(300, largest_tilt=largest)
+    rate, acceleration = rng.normal(size=(2, 300, 3))
+    robot = ne.ReferenceRobot(2 * H, H, 1.0, np.eye(3))
+
+    def jets(acceleration: Array, rate: Array) -> tuple[ne.Jet, ne.Jet]:
+        moving = ne.motion(robot, pose, rate, acceleration)
+        leg = moving.length.map(lambda d: d[..., None]) * moving.direction
+        radial = leg.map(lambda one: np.sum(one * ne.RADIAL, axis=-1)).shift(2 * H)
+        return radial, leg.map(lambda one: one[..., 2])
+
+    (z, x, y), (dz, dx, dy), (ddz, ddx, ddy) = (
+        np.ascontiguousarray(one.T) for one in (pose, rate, acceleration)
+    )
+    tilt = tilt_at(x, y)
+    slopes = tips.tip_slopes(x, y, tilt)
+    moving = (x, y, dx, dy, ddx, ddy)
+    found = (
+        tips.tips(z, x, y, tilt, H),
+        tips.tip_rates(slopes, dz, H * dx, H * dy),
+        tips.tip_accelerations(moving, ddz, tilt, H),
+    )
+    expected = jets(acceleration, rate)
+    for rings, order in zip(found, ("value", "first", "second"), strict=True):
+        for ring, jet in zip(rings, expected, strict=True):
+            assert_legs(ring, getattr(jet, order), 2e-12)
+    for axis, pair in ((1, slopes[0::2]), (2, slopes[1::2])):
+        alone = np.zeros_like(pose)
+        alone[:, axis] = 1 / H  # slopes are by h times the tilt
+        for ring, jet in zip(pair, jets(alone, alone), strict=True):
+            assert_legs(ring, jet.first, 1e-12)
+
+
+def assert_legs(ring: Any, expected: Array, tolerance: float) -> None:
+    legs_ = np.asarray(tips.at_legs(ring)).T
+    np.testing.assert_allclose(legs_, expected, rtol=0, atol=tolerance)
 
 
 @pytest.mark.parametrize("pose", POSES)

@@ -32,6 +32,16 @@ class StateEstimate(NamedTuple):
 
 
 @compiled
+def platform_twist(geometry: LegGeometry, rate: Triple, h: float) -> Twist:
+    """Return the platform's twist."""
+    (_, x, y), (dz, dx, dy) = geometry.pose, rate
+    (_, vx, vy), _ = tip_rates(tip_slopes(x, y, geometry.tilt), dz, h * dx, h * dy)
+    w_x, w_y, w_z = angular_velocity(x, y, dx, dy, geometry.tilt)
+    # The centre is half of the tips' horizontal vector; base axes turn the sign of w_z.
+    return 0.5 * vx, 0.5 * vy, dz, w_x, w_y, -w_z
+
+
+@compiled
 def state_estimate(
     d: Triple, direction: LegDirections, speed: Triple, g: float, h: float
 ) -> tuple[StateEstimate, Twist] | None:
@@ -46,9 +56,4 @@ def state_estimate(
     if jacobian.determinant == 0.0:
         return None
     rate = pose_rate(jacobian, speed)
-    dz, dx, dy = rate
-    (_, vx, vy), _ = tip_rates(tip_slopes(x, y, tilt), dz, h * dx, h * dy)
-    w_x, w_y, w_z = angular_velocity(x, y, dx, dy, tilt)
-    # The centre is half of the tips' horizontal vector; base axes turn the sign of w_z.
-    twist = (0.5 * vx, 0.5 * vy, dz, w_x, w_y, -w_z)
-    return StateEstimate(geometry, rate, speed, jacobian), twist
+    return StateEstimate(geometry, rate, speed, jacobian), platform_twist(geometry, rate, h)
