@@ -48,19 +48,20 @@ def parts_from_yaml(path: str | os.PathLike[str]) -> MechanismParts:
     """
     file, description = read_config(path, "mechanism", Description)
     tree = _tree(file, description, Path(path))
-    parts = _merged(file, description, tree)
+    merges = []
+    for i, entry in enumerate(description.merge):
+        with file.at("merge", i):
+            merges.append(JointMerge(**entry.model_dump()))
+    parts = _merged(file, description, tree, merges) if merges else tree
     parts = _with_effects(file, description, parts)
-    closures = (*parts.closures, *_closures(file, description, parts.model))
     actuated = parts.actuated if description.actuated is None else tuple(description.actuated)
-    joints = list(parts.model.names)[1:]
     for index, name in enumerate(actuated):
-        if name not in joints:
-            raise _unknown(file, ("actuated", index), "joint", name, joints)
+        _check_name(file, ("actuated", index), name, list(parts.model.names)[1:])
     return replace(
         parts,
-        closures=closures,
+        closures=(*parts.closures, *_closures(file, description, parts.model)),
         actuated=actuated,
-        home=_home(file, description, tree, parts),
+        home=_home(file, description, tree, parts, merges),
         name=description.name or parts.name or Path(path).stem,
         friction_speed=description.friction_speed,
         characteristic_length=description.characteristic_length,
@@ -72,7 +73,7 @@ def parts_from_yaml(path: str | os.PathLike[str]) -> MechanismParts:
 
 
 def _tree(file: YamlFile, description: Description, path: Path) -> MechanismParts:
-    """Return the parts in the URDF or MJCF, before merging, with the description's gravity."""
+    """Return the parts in the URDF or MJCF, before merging."""
     if (description.urdf is None) == (description.mjcf is None):
         both = description.urdf is not None
         where = file.place(("mjcf",)) if both else file.origin
@@ -87,27 +88,18 @@ def _tree(file: YamlFile, description: Description, path: Path) -> MechanismPart
             f"{file.place(('root',))}: root belongs to urdf; an MJCF has its own free joints"
         )
     target = path.parent / Path(source).expanduser()
-
     with file.at(key):
         if description.mjcf:
-            parts = parts_from_mjcf(target, actuated=description.actuated)
-        else:
-            parts = parts_from_urdf(target, description.root or "fixed")
-    if description.gravity is not None:
-        model = pin.Model(parts.model)
-        model.gravity.linear = np.array(description.gravity)
-        parts = replace(parts, model=model)
-    return parts
+            return parts_from_mjcf(target, actuated=description.actuated)
+        return parts_from_urdf(target, description.root or "fixed")
 
 
-def _merged(file: YamlFile, description: Description, tree: MechanismParts) -> MechanismParts:
+def _merged(
+    file: YamlFile, description: Description, tree: MechanismParts, merges: Sequence[JointMerge]
+) -> MechanismParts:
     """Merge joints, and leave out the effects at those that are merged."""
-    merges = _merges(file, description)
-    if not merges:
-        return tree
     with file.at("merge"):
         model = merged(tree.model, merges)
-    kept = set(model.names)
     changes: dict[str, Any] = {"model": model}
     for effect in EFFECTS:
         values = getattr(tree, effect)
@@ -118,20 +110,14 @@ def _merged(file: YamlFile, description: Description, tree: MechanismParts) -> M
                     f"{file.place(('merge',))}: joint {lost[0]!r} has {effect} and is merged; say "
                     f"what {merge.name!r} has, in {effect}"
                 )
-        changes[effect] = {name: value for name, value in values.items() if name in kept}
+        changes[effect] = {
+            name: value for name, value in values.items() if model.existJointName(name)
+        }
     with file.at("merge"):
         for closure in tree.closures:
             needed = closure.joint_ids if isinstance(closure, JointCoupling) else closure.frame_ids
             needed(model)
     return replace(tree, **changes)
-
-
-def _merges(file: YamlFile, description: Description) -> list[JointMerge]:
-    merges = []
-    for i, entry in enumerate(description.merge):
-        with file.at("merge", i):
-            merges.append(JointMerge(**entry.model_dump()))
-    return merges
 
 
 # Effects at joints -------------------------------------------------------------------------------
@@ -140,43 +126,42 @@ def _merges(file: YamlFile, description: Description) -> list[JointMerge]:
 def _with_effects(
     file: YamlFile, description: Description, parts: MechanismParts
 ) -> MechanismParts:
-    """Replace effects of the tree's file by the description's; set armature on a copy."""
-    joints = list(parts.model.names)[1:]
-    changes: dict[str, Any] = {}
+    """Replace effects of the tree's file by the description's, on a copy of its model."""
     for effect in (*EFFECTS, "armature"):
-        given = getattr(description, effect)
-        for name in given:
-            if name not in joints:
-                raise _unknown(file, (effect, name), "joint", name, joints)
-        if effect != "armature":
-            changes[effect] = {**getattr(parts, effect), **given}
-    if description.armature:
-        model = pin.Model(parts.model)
-        armature = model.armature.copy()
-        for name, value in description.armature.items():
-            joint = model.joints[model.getJointId(name)]
-            armature[joint.idx_v : joint.idx_v + joint.nv] = value
-        model.armature = armature
-        changes["model"] = model
-    return replace(parts, **changes)
+        for name in getattr(description, effect):
+            _check_name(file, (effect, name), name, list(parts.model.names)[1:])
+    model = pin.Model(parts.model)
+    if description.gravity is not None:
+        model.gravity.linear = np.array(description.gravity)
+    armature = model.armature.copy()
+    for name, value in description.armature.items():
+        joint = model.joints[model.getJointId(name)]
+        armature[joint.idx_v : joint.idx_v + joint.nv] = value
+    model.armature = armature
+    effects: Any = {
+        name: {**getattr(parts, name), **getattr(description, name)} for name in EFFECTS
+    }
+    return replace(parts, model=model, **effects)
 
 
 def _home(
-    file: YamlFile, description: Description, tree: MechanismParts, parts: MechanismParts
+    file: YamlFile,
+    description: Description,
+    tree: MechanismParts,
+    parts: MechanismParts,
+    merges: Sequence[JointMerge],
 ) -> Array | None:
     """Return the home of the tree's file, with the coordinates that the description gives."""
     if tree.home is None and not description.home:
         return None
-    merges = _merges(file, description)
-    before = tree.home if tree.home is not None else pin.neutral(tree.model)
-    before, known = before.copy(), {*list(tree.model.names)[1:], *list(parts.model.names)[1:]}
+    before = pin.neutral(tree.model) if tree.home is None else tree.home.copy()
     for name in description.home:
-        if name not in known:
-            raise _unknown(file, ("home", name), "joint", name, list(parts.model.names)[1:])
+        if name not in list(tree.model.names)[1:]:
+            _check_name(file, ("home", name), name, list(parts.model.names)[1:])
     _set_joints(file, description.home, tree.model, before)
     q = merged_configuration(tree.model, merges, before) if merges else before
-    new = {name for name in description.home if not tree.model.existJointName(name)}
-    _set_joints(file, {name: description.home[name] for name in new}, parts.model, q)
+    new = {k: v for k, v in description.home.items() if not tree.model.existJointName(k)}
+    _set_joints(file, new, parts.model, q)
     return q
 
 
@@ -194,17 +179,17 @@ def _set_joints(
                 f"{where}: home of {name!r} ({joint.shortname()}) has {given.size} numbers; "
                 f"it must have {joint.nq}"
             )
-        own = q.copy()
-        own[joint.idx_q : joint.idx_q + joint.nq] = given
+        own, here = q.copy(), slice(joint.idx_q, joint.idx_q + joint.nq)
+        own[here] = given
         whole = pin.normalize(model, own)
-        normed = whole[joint.idx_q : joint.idx_q + joint.nq]
+        normed = whole[here]
         near = np.abs(normed - given).max() <= _NORMED
         if not (near and pin.isNormalized(model, whole, _NORMED)):  # zeros stay zeros
             raise InputError(
                 f"{where}: home of {name!r} ({joint.shortname()}) = {shown(value)} is not a "
                 "rotation; a quaternion (x, y, z, w), or a cosine and a sine, has length 1"
             )
-        q[joint.idx_q : joint.idx_q + joint.nq] = normed
+        q[here] = normed
 
 
 # Closures -----------------------------------------------------------------------------------------
@@ -217,8 +202,7 @@ def _closures(file: YamlFile, description: Description, model: pin.Model) -> lis
         for end in ("frame_a", "frame_b"):
             name = getattr(entry, end)
             where = ("closures", i, end)
-            if name not in frames:
-                raise _unknown(file, where, "frame", name, frames)
+            _check_name(file, where, name, frames, "frame")
             if frames.count(name) > 1:
                 raise MechanismError(
                     f"{file.place(where)}: {end} = {name!r}: {frames.count(name)} frames have "
@@ -237,9 +221,14 @@ def _closures(file: YamlFile, description: Description, model: pin.Model) -> lis
 # Messages -----------------------------------------------------------------------------------------
 
 
-def _unknown(
-    file: YamlFile, path: tuple[str | int, ...], what: str, name: str, there: Sequence[str]
-) -> MechanismError:
-    return MechanismError(
-        f"{file.place(path)}: {path[0]}: no {what} {name!r}; there are: {', '.join(there)}"
-    )
+def _check_name(
+    file: YamlFile,
+    path: tuple[str | int, ...],
+    name: str,
+    there: Sequence[str],
+    what: str = "joint",
+) -> None:
+    if name not in there:
+        raise MechanismError(
+            f"{file.place(path)}: {path[0]}: no {what} {name!r}; there are: {', '.join(there)}"
+        )

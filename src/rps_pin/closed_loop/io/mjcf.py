@@ -23,15 +23,7 @@ from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts
 from rps_pin.errors import MechanismError
 
 #: Attributes for what an actuator acts on; only the first two are joints.
-_TRANSMISSIONS = (
-    "joint",
-    "jointinparent",
-    "tendon",
-    "site",
-    "body",
-    "cranksite",
-    "slidersite",
-)
+_TRANSMISSIONS = "joint", "jointinparent", "tendon", "site", "body", "cranksite", "slidersite"
 _NAME_THEM = "name the actuated joints yourself (actuated)"
 #: Effects at joints, by the attributes that give them.
 _OPTIONS = {"damping": "damping", "frictionloss": "friction", "stiffness": "stiffness"}
@@ -74,7 +66,10 @@ def parts_from_mjcf(
     _refuse_tendons(file)
     tree = MjcfTree(file)
     equalities = read_equalities(file, tree)
-    driven = _driven(file, tree) if actuated is None else _as_names(actuated)
+    if actuated is None:
+        driven = _driven(file, tree)
+    else:
+        driven = (actuated,) if isinstance(actuated, str) else tuple(actuated)
     model, home = _reduced(tree, equalities, driven)
     return MechanismParts(
         model,
@@ -86,14 +81,10 @@ def parts_from_mjcf(
     )
 
 
-def _as_names(actuated: Sequence[str]) -> tuple[str, ...]:
-    return (actuated,) if isinstance(actuated, str) else tuple(actuated)
-
-
 def _driven(file: MjcfFile, tree: MjcfTree) -> tuple[str, ...]:
     """Return the joints that actuators act on, each once."""
     joints = {joint.name: joint for joint in tree.joints}
-    found: list[str] = []
+    found: dict[str, None] = {}  # a set in order
     for section in file.sections("actuator"):
         for actuator in map(file.plain, children(section.xml)):
             given = [name for name in _TRANSMISSIONS if name in actuator]
@@ -108,8 +99,7 @@ def _driven(file: MjcfFile, tree: MjcfTree) -> tuple[str, ...]:
                     f"acts on {name!r} ({joints[name].kind}) about one axis of several; "
                     f"{_NAME_THEM}"
                 )
-            if name not in found:
-                found.append(name)
+            found[name] = None
     return tuple(found)
 
 

@@ -56,10 +56,8 @@ class MjcfFile:
                 f"{self.origin} is not a valid MJCF: its root element is <{self.root.tag}>, "
                 "not <mujoco>"
             )
-        for element in self.root.iter("include"):
-            self.plain(element).refuse(
-                "is not read; put the included elements into the file itself"
-            )
+        for element in map(self.plain, self.root.iter("include")):
+            element.refuse("is not read; put the included elements into the file itself")
         self._read_compiler()
         self._classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for section in self.sections("default"):
@@ -81,19 +79,18 @@ class MjcfFile:
         """Return an element without defaults."""
         return MjcfElement(self, element, element.attrib)
 
-    def read(self, element: Any, inherited: str = "main", tag: str = "") -> MjcfElement:
+    def read(self, element: Any, tag: str = "") -> MjcfElement:
         """Return an element with the attributes of its default class.
 
         Parameters
         ----------
         element
             The element.
-        inherited
-            The class that applies if the element names none.
         tag
             The tag that default classes have for it; its own if left out.
         """
-        wanted = element.get("class", inherited)
+        around = element.xpath("string(ancestor::*[@childclass][1]/@childclass)")
+        wanted = element.get("class", around or "main")
         if wanted not in self._classes:
             self.plain(element).refuse(
                 f"is of class {wanted!r}; there are: {', '.join(sorted(self._classes))}"

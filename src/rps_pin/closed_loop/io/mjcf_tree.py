@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -85,12 +85,14 @@ class MjcfTree:
         self._sites: list[tuple[str, str, pin.SE3]] = []
         self.body_frames: dict[str, str] = {}
         self.site_frames: dict[str, str] = {}
+        self._joint_names: dict[str, str] = {}
+        self._taken = {"universe", WORLD}
         self._name_all()
         plain = etree.Element("mujoco", model=file.root.get("model", "mechanism"))
         etree.SubElement(plain, "compiler", angle="radian", inertiafromgeom="auto")
         world = etree.SubElement(etree.SubElement(plain, "worldbody"), "body", name=WORLD)
         for section in file.sections("worldbody"):
-            self._read_contents(section.xml, world, WORLD, pin.SE3.Identity(), "main", False)
+            self._read_contents(section.xml, world, pin.SE3.Identity())
         if not self.joints:
             raise MechanismError(f"{file.origin} has no joints, so it is not a mechanism")
         self.model = self._built(etree.tostring(plain))
@@ -114,22 +116,20 @@ class MjcfTree:
 
     def _name_all(self) -> None:
         """Give every named element a name of its own: joints first, then bodies, then sites."""
-        self._taken = {"universe", WORLD}
-        self._joint_names: dict[str, str] = {}
-        self._name(("joint", "freejoint"), self._joint_names, "_joint")
-        self._name(("body",), self.body_frames, "_body")
-        self._name(("site",), self.site_frames, "_site")
+        for tags, names in (
+            (("joint", "freejoint"), self._joint_names),
+            (("body",), self.body_frames),
+            (("site",), self.site_frames),
+        ):
+            for section in self._file.sections("worldbody"):
+                for element in map(self._file.plain, section.xml.iter(*tags)):
+                    name = element.name
+                    if name in names:
+                        element.refuse("has a name that another one has")
+                    if name:
+                        free = name not in self._taken
+                        names[name] = self._fresh(name if free else f"{name}_{tags[0]}")
         self.body_frames[WORLD] = WORLD
-
-    def _name(self, tags: tuple[str, ...], names: dict[str, str], suffix: str) -> None:
-        for section in self._file.sections("worldbody"):
-            for element in section.xml.iter(*tags):
-                name = element.get("name")
-                if not name:
-                    continue
-                if name in names:
-                    self._file.plain(element).refuse("has a name that another one has")
-                names[name] = self._fresh(name if name not in self._taken else name + suffix)
 
     def _fresh(self, name: str) -> str:
         while name in self._taken:
@@ -140,13 +140,7 @@ class MjcfTree:
     # The plain form -------------------------------------------------------------------------------
 
     def _read_contents(
-        self,
-        element: Any,
-        plain: Any,
-        frame: str,
-        pose: pin.SE3,
-        childclass: str,
-        in_frame: bool,
+        self, element: Any, plain: Any, pose: pin.SE3
     ) -> list[tuple[MjcfElement, pin.SE3]]:
         """Read the elements of a body (or of a ``frame`` in it); return its geoms, placed in it."""
         file = self._file
@@ -154,70 +148,55 @@ class MjcfTree:
         for child in children(element):
             tag = child.tag
             if tag in _OF_THE_BODY:  # read with it
-                if in_frame:
+                if element.tag == "frame":
                     file.plain(child).refuse("cannot be in a frame element")
             elif tag == "geom":
-                geoms.append((file.read(child, childclass), pose))
+                geoms.append((file.read(child), pose))
             elif tag == "site":
-                site = file.read(child, childclass)
+                site = file.read(child)
                 if site.name:
                     placed = pose * site.segment()[0]
-                    self._sites.append((self.site_frames[site.name], frame, placed))
+                    self._sites.append((self.site_frames[site.name], plain.get("name"), placed))
             elif tag == "frame":
-                inner = child.get("childclass", childclass)
-                around = pose * file.plain(child).pose()
-                geoms += self._read_contents(child, plain, frame, around, inner, True)
+                geoms += self._read_contents(child, plain, pose * file.plain(child).pose())
             elif tag == "body":
-                self._read_body(file.plain(child), plain, pose, childclass)
+                self._read_body(file.plain(child), plain, pose)
             elif tag not in _SEEN_ONLY:
                 known = (*_OF_THE_BODY, "geom", "site", "frame", "body")
                 file.plain(child).refuse(f"is not read; known here: {', '.join(known)}")
         return geoms
 
-    def _read_body(self, body: MjcfElement, plain: Any, around: pin.SE3, childclass: str) -> None:
+    def _read_body(self, body: MjcfElement, plain: Any, around: pin.SE3) -> None:
         if body.number("gravcomp"):
             body.refuse("has gravcomp, which is not read")
         if body.get("mocap", "false") != "false":
             body.refuse("is moved by motion capture, which is not read")
-        childclass = body.get("childclass", childclass)
-        if body.name:
-            frame = self.body_frames[body.name]
-        else:
-            frame = self._fresh(f"{plain.get('name')}_child")
+        frame = self.body_frames.get(body.name) or self._fresh(f"{plain.get('name')}_child")
         pose = around * body.pose()
         joints = [child for child in children(body.xml) if child.tag in ("joint", "freejoint")]
         for number, joint in enumerate(joints, 1):
             link = frame if number == len(joints) else self._fresh(f"{frame}_{number}")
             plain = etree.SubElement(plain, "body", name=link, **placement(pose))
             alone = len(joints) == 1
-            unnamed = f"{frame}_joint" + ("" if alone else f"_{number}")
-            self._read_joint(joint, plain, unnamed, pose, childclass, alone)
+            self._read_joint(joint, plain, f"{frame}_joint" + ("" if alone else f"_{number}"), pose)
             pose = pin.SE3.Identity()
         if not joints:
             plain = etree.SubElement(plain, "body", name=frame, **placement(pose))
-        inside = self._read_contents(body.xml, plain, frame, pin.SE3.Identity(), childclass, False)
-        add_inertia(body, plain, inside)
+        add_inertia(body, plain, self._read_contents(body.xml, plain, pin.SE3.Identity()))
 
-    def _read_joint(
-        self,
-        element: Any,
-        plain: Any,
-        unnamed: str,
-        pose: pin.SE3,
-        childclass: str,
-        alone: bool,
-    ) -> None:
+    def _read_joint(self, element: Any, plain: Any, unnamed: str, pose: pin.SE3) -> None:
         file = self._file
         free = element.tag == "freejoint"
-        joint = file.plain(element) if free else file.read(element, childclass)
+        joint = file.plain(element) if free else file.read(element)
         kind = "free" if free else joint.choice("type", "hinge slide ball free", "hinge")
         if kind == "free":
+            alone = len(element.getparent().xpath("joint | freejoint")) == 1
             if not (alone and plain.getparent().get("name") == WORLD):
                 joint.refuse("is free: its body must be in the world and have no other joint")
             plain.attrib.update({"pos": "0 0 0", "quat": "1 0 0 0"})  # q is its placement
         name = self._joint_names[joint.name] if joint.name else self._fresh(unnamed)
         written = {"name": name, "type": kind, "armature": text([joint.number("armature")])}
-        found = MjcfJoint(name, kind, joint, 0.0, ())
+        ref = 0.0
         if kind != "free":
             written["pos"] = text(joint.vector("pos", (0.0, 0.0, 0.0)))
         if kind in ("hinge", "slide"):
@@ -225,12 +204,13 @@ class MjcfTree:
             if not axis.any():
                 joint.refuse("has an axis without direction")
             written["axis"] = text(axis / np.linalg.norm(axis))
-            found = replace(found, ref=found.coordinate(joint.number("ref")))
-            written["ref"] = text([found.ref])
+            ref = joint.number("ref")
+            ref = file.angle(ref) if kind == "hinge" else ref
+            written["ref"] = text([ref])
         etree.SubElement(plain, "joint", **written)
         quaternion = pin.Quaternion(pose.rotation).coeffs()[[3, 0, 1, 2]]
         start = {"ball": (1.0, 0.0, 0.0, 0.0), "free": (*pose.translation, *quaternion)}
-        self.joints.append(replace(found, start=start.get(kind, (found.ref,))))
+        self.joints.append(MjcfJoint(name, kind, joint, ref, start.get(kind, (ref,))))
 
     def _built(self, plain: bytes) -> pin.Model:
         """Return Pinocchio's model of a plain text; it reads files only."""
