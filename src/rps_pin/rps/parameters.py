@@ -4,28 +4,19 @@ from __future__ import annotations
 
 import math
 import os
-from importlib import resources
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PlainSerializer,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
+import pydantic
+from pydantic import Field, ValidationInfo
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED
-from rps_pin.config import Finite, NonNegative, Positive, YamlFile, first_problem, read_yaml
+from rps_pin.config import Finite, NonNegative, Positive, first_problem, read_yaml
 from rps_pin.errors import InputError, ParameterError, did_you_mean
 from rps_pin.files import whole_file
 from rps_pin.validation import fixed_array, inertia_fault, read_only
@@ -33,9 +24,10 @@ from rps_pin.validation import fixed_array, inertia_fault, read_only
 #: A printed table rounds its inertias (the paper's Table 1 by 0.5 %): this much of the largest
 #: principal moment may be missing from the triangle inequality.
 INERTIA_ROUNDING = 0.01
+_PRESETS = Path(__file__).parent / "presets"
 
 
-def _array(*shape: int) -> BeforeValidator:
+def _array(*shape: int) -> pydantic.BeforeValidator:
     """Return a validator that makes a finite, read-only float array of the given shape."""
     wanted = f"must be {' x '.join(map(str, shape))} finite numbers, shape {shape}"
 
@@ -46,17 +38,17 @@ def _array(*shape: int) -> BeforeValidator:
             raise ValueError(wanted) from None
         return read_only(array + 0.0)  # no negative zeros: equal arrays, equal hashes
 
-    return BeforeValidator(convert)
+    return pydantic.BeforeValidator(convert)
 
 
-_ToList = PlainSerializer(lambda array: array.tolist(), return_type=list)
+_ToList = pydantic.PlainSerializer(lambda array: array.tolist(), return_type=list)
 Vector3 = Annotated[np.ndarray, _array(3), _ToList]
 Matrix3 = Annotated[np.ndarray, _array(3, 3), _ToList]
 Bound = Annotated[float, Field(gt=0)]  # infinity means: no bound
 Angle = Annotated[float, Field(ge=-math.pi, le=math.pi, allow_inf_nan=False)]
 
 
-class RPSParameters(BaseModel):
+class RPSParameters(pydantic.BaseModel):
     """Parameters of a 3-RPS: geometry, masses, limits, friction, gravity. SI units.
 
     Immutable; compare with ``==``, make a changed copy with :meth:`replace`. There is a field for
@@ -79,7 +71,7 @@ class RPSParameters(BaseModel):
         If a value is not possible; the error has the field, the value and the rule.
     """
 
-    model_config = ConfigDict(
+    model_config = pydantic.ConfigDict(
         frozen=True, extra="forbid", arbitrary_types_allowed=True, validate_default=True
     )
 
@@ -159,10 +151,10 @@ class RPSParameters(BaseModel):
     def __init__(self, **values: Any) -> None:
         try:
             super().__init__(**values)
-        except ValidationError as error:
+        except pydantic.ValidationError as error:
             raise _parameter_error(error) from None
 
-    @field_validator("*", mode="before")
+    @pydantic.field_validator("*", mode="before")
     @classmethod
     def _numbers_are_numbers(cls, value: object, info: ValidationInfo) -> object:
         """Refuse truth values and text, which pydantic would convert to numbers."""
@@ -173,7 +165,7 @@ class RPSParameters(BaseModel):
                     raise ValueError(f"must be a number, not a {kind}")
         return value
 
-    @field_validator("platform_inertia")
+    @pydantic.field_validator("platform_inertia")
     @classmethod
     def _inertia_of_a_rigid_body(cls, inertia: Array) -> Array:
         if not inertia.any():
@@ -182,7 +174,7 @@ class RPSParameters(BaseModel):
             raise ValueError(fault)
         return inertia
 
-    @field_validator("leg_length_limits", "leg_angle_limits")
+    @pydantic.field_validator("leg_length_limits", "leg_angle_limits")
     @classmethod
     def _limits_in_order(
         cls, limits: tuple[float, float], info: ValidationInfo
@@ -198,7 +190,7 @@ class RPSParameters(BaseModel):
             raise ValueError("angles lie between -pi and pi")
         return limits
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def _bodies_exist(self) -> Self:
         for part in ("leg", "rod"):
             inertia = getattr(self, f"{part}_inertia")
@@ -225,7 +217,7 @@ class RPSParameters(BaseModel):
 
     def replace(self, **changes: Any) -> RPSParameters:
         """Return a copy with some fields changed, validated anew."""
-        return RPSParameters(**(self._values() | changes))
+        return RPSParameters(**(dict(self) | changes))
 
     def without_limits(self) -> RPSParameters:
         """Return a copy without limits of lengths, angles and spherical joints."""
@@ -235,17 +227,13 @@ class RPSParameters(BaseModel):
             spherical_cone_limit=math.pi,
         )
 
-    def _values(self) -> dict[str, Any]:
-        return {field: getattr(self, field) for field in type(self).model_fields}
-
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RPSParameters):
             return NotImplemented
         return self.model_dump() == other.model_dump()
 
     def __hash__(self) -> int:
-        values = self._values().values()
-        return hash(tuple(x.tobytes() if isinstance(x, np.ndarray) else x for x in values))
+        return hash(tuple(x.tobytes() if isinstance(x, np.ndarray) else x for _, x in self))
 
     def __copy__(self) -> RPSParameters:
         return self
@@ -254,7 +242,7 @@ class RPSParameters(BaseModel):
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _restored, (self._values(),)
+        return partial(RPSParameters, **dict(self)), ()  # the constructor makes arrays read-only
 
     def __setattr__(self, name: str, value: object) -> None:
         raise ParameterError(name, value, "parameters are frozen; replace() makes a changed copy")
@@ -264,10 +252,7 @@ class RPSParameters(BaseModel):
     @classmethod
     def presets(cls) -> tuple[str, ...]:
         """Return the names of the presets that come with the package."""
-        folder = resources.files("rps_pin.rps") / "presets"
-        return tuple(
-            sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
-        )
+        return tuple(sorted(path.stem for path in _PRESETS.glob("*.yaml")))
 
     @classmethod
     def from_preset(cls, name: str) -> RPSParameters:
@@ -280,7 +265,7 @@ class RPSParameters(BaseModel):
         """
         if name not in cls.presets():
             raise InputError(f"no preset {name!r}; there are: {', '.join(cls.presets())}")
-        return cls.from_yaml(Path(str(resources.files("rps_pin.rps"))) / "presets" / f"{name}.yaml")
+        return cls.from_yaml(_PRESETS / f"{name}.yaml")
 
     @classmethod
     def from_yaml(cls, path: str | os.PathLike[str]) -> RPSParameters:
@@ -293,10 +278,7 @@ class RPSParameters(BaseModel):
         ParameterError
             If a value is not possible, a field is missing, or one is unknown.
         """
-        return cls._from_file(read_yaml(path, "parameter file"))
-
-    @classmethod
-    def _from_file(cls, file: YamlFile) -> RPSParameters:
+        file = read_yaml(path, "parameter file")
         try:
             return cls(**file.values)
         except ParameterError as error:
@@ -315,12 +297,7 @@ class RPSParameters(BaseModel):
             yaml.dump(document, scratch)
 
 
-def _restored(values: dict[str, Any]) -> RPSParameters:
-    """Unpickle through the constructor, which makes the arrays read-only."""
-    return RPSParameters(**values)
-
-
-def _parameter_error(error: ValidationError) -> ParameterError:
+def _parameter_error(error: pydantic.ValidationError) -> ParameterError:
     """Return pydantic's first problem as a `ParameterError`."""
     first = first_problem(error)
     cause = first.get("ctx", {}).get("error")

@@ -14,8 +14,7 @@ z up, and the joint turns about -y. The joint positions are then the paper's phi
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import yourdfpy
@@ -83,7 +82,7 @@ def build_urdf(parameters: RPSParameters) -> str:
         links += [yourdfpy.Link(on_platform), yourdfpy.Link(on_rod)]
         ball = _polar(parameters.platform_radius, direction)
         joints += [
-            _joint(f"{on_platform}_fixed", "fixed", "platform", on_platform, _at(*ball)),
+            _joint(f"{on_platform}_fixed", "fixed", "platform", on_platform, origin=_at(*ball)),
             _joint(f"{on_rod}_fixed", "fixed", f"leg_{leg}_rod", on_rod),
         ]
     robot = yourdfpy.Robot(name=parameters.name, links=links, joints=joints)
@@ -102,18 +101,13 @@ class _Sizes:
         if math.isinf(longest):  # drawn for legs about as long as the robot is wide
             longest = max(1.2 * radius, 1.5 * shortest)
         #: Length of a cylinder and of a rod: they overlap at full stroke.
-        self.part = _to_micrometre(max(0.75 * shortest, 0.52 * longest))
+        self.part = round(max(0.75 * shortest, 0.52 * longest), 6)
         #: Radii of cylinder, rod and ball.
-        self.cylinder = _to_micrometre(0.06 * self.part)
-        self.rod = _to_micrometre(0.038 * self.part)
-        self.ball = _to_micrometre(0.065 * self.part)
+        self.cylinder, self.rod, self.ball = (
+            round(share * self.part, 6) for share in (0.06, 0.038, 0.065)
+        )
         #: Thickness of the base plate, height of the clevises above it.
-        self.plate = _to_micrometre(0.05 * radius)
-        self.clevis = _to_micrometre(0.12 * self.part)
-
-
-def _to_micrometre(length: float) -> float:
-    return round(length, 6)
+        self.plate, self.clevis = round(0.05 * radius, 6), round(0.12 * self.part, 6)
 
 
 # Links --------------------------------------------------------------------------------------------
@@ -149,12 +143,8 @@ def _platform(parameters: RPSParameters, size: _Sizes) -> yourdfpy.Link:
 
     The balls' centres, and the platform's own, lie in one plane; the disc lies on the balls.
     """
-    inertial = yourdfpy.Inertial(
-        origin=np.eye(4),
-        mass=parameters.platform_mass,
-        inertia=np.array(parameters.platform_inertia),
-    )
-    link = yourdfpy.Link("platform", inertial=inertial)
+    mass, inertia = parameters.platform_mass, np.array(parameters.platform_inertia)
+    link = yourdfpy.Link("platform", inertial=yourdfpy.Inertial(np.eye(4), mass, inertia))
     radius, thickness = parameters.platform_radius, 0.8 * size.plate
     outer = radius + 1.3 * size.ball
     low = 0.7 * size.ball
@@ -182,11 +172,9 @@ def _platform(parameters: RPSParameters, size: _Sizes) -> yourdfpy.Link:
 
 def _cylinder_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfpy.Link:
     """Return the part of a leg that only turns; x runs along the leg from the revolute joint."""
-    inertia = _bar_inertia(parameters.leg_mass, parameters.leg_inertia_about_com, size.cylinder)
-    link = yourdfpy.Link(
-        f"leg_{leg}_cylinder",
-        inertial=_bar_inertial(parameters.leg_mass, parameters.leg_com, inertia),
-    )
+    p = parameters
+    inertial = _bar(p.leg_mass, p.leg_com, p.leg_inertia_about_com, size.cylinder)
+    link = yourdfpy.Link(f"leg_{leg}_cylinder", inertial=inertial)
     tube = yourdfpy.Cylinder(size.cylinder, size.part - size.cylinder)
     middle = _at((size.part + size.cylinder) / 2, 0, 0) @ _TO_X
     _add(link, "tube", tube, middle, _DARK)
@@ -204,11 +192,9 @@ def _cylinder_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfp
 
 def _rod_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfpy.Link:
     """Return the part of a leg that also slides; its origin is the tip, x runs on outwards."""
-    inertia = _bar_inertia(parameters.rod_mass, parameters.rod_inertia, size.rod)
-    link = yourdfpy.Link(
-        f"leg_{leg}_rod",
-        inertial=_bar_inertial(parameters.rod_mass, -parameters.rod_com, inertia),
-    )
+    p = parameters
+    inertial = _bar(p.rod_mass, -p.rod_com, p.rod_inertia, size.rod)
+    link = yourdfpy.Link(f"leg_{leg}_rod", inertial=inertial)
     rod = yourdfpy.Cylinder(size.rod, size.part)
     _add(link, "rod", rod, _at(-size.part / 2, 0, 0) @ _TO_X, _BRIGHT)
     nut = yourdfpy.Cylinder(1.35 * size.rod, 1.2 * size.ball)
@@ -216,20 +202,16 @@ def _rod_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfpy.Lin
     return link
 
 
-def _bar_inertia(mass: float, across: float, radius: float) -> Array:
-    """Return the inertia of a bar along x about its centre of mass, shape (3, 3).
+def _bar(mass: float, com: float, across: float, radius: float) -> yourdfpy.Inertial | None:
+    """Return the inertia of a bar along x with its centre of mass at `com`; None without a mass.
 
     Only the moment across the bar, in the plane the leg moves in, does work; the bar is taken as a
     body of revolution. The moment along it is a solid cylinder's, at most what a rigid body allows.
     """
-    along = min(mass * radius**2 / 2, 2 * across)
-    return np.diag([along, across, across])
-
-
-def _bar_inertial(mass: float, com: float, inertia: Array) -> yourdfpy.Inertial | None:
     if mass == 0:
         return None
-    return yourdfpy.Inertial(origin=_at(com, 0, 0), mass=mass, inertia=inertia)
+    along = min(mass * radius**2 / 2, 2 * across)
+    return yourdfpy.Inertial(_at(com, 0, 0), mass, np.diag([along, across, across]))
 
 
 def _add(link: yourdfpy.Link, name: str, shape: Shape, origin: Array, paint: Paint) -> None:
@@ -257,53 +239,25 @@ def _decorate(
 
 
 def _leg_joints(parameters: RPSParameters, leg: int, direction: float) -> list[yourdfpy.Joint]:
-    low_angle, high_angle = parameters.leg_angle_limits
     shortest, longest = parameters.leg_length_limits
     if math.isinf(longest):
         longest = 10 * (parameters.base_radius + parameters.platform_radius)
-    revolute = _joint(
-        f"leg_{leg}_revolute",
-        "revolute",
-        "base",
-        f"leg_{leg}_cylinder",
-        origin=_leg_placement(parameters, direction),
-        axis=(0.0, -1.0, 0.0),
-        limit=yourdfpy.Limit(URDF_UNLIMITED, URDF_UNLIMITED, low_angle, high_angle),
-    )
-    prismatic = _joint(
-        f"leg_{leg}_prismatic",
-        "prismatic",
-        f"leg_{leg}_cylinder",
-        f"leg_{leg}_rod",
-        axis=(1.0, 0.0, 0.0),
-        limit=yourdfpy.Limit(
-            min(parameters.actuator_force_limit, URDF_UNLIMITED),
-            min(parameters.actuator_speed_limit, URDF_UNLIMITED),
-            shortest,
-            longest,
-        ),
-    )
-    return [revolute, prismatic]
+    force = min(parameters.actuator_force_limit, URDF_UNLIMITED)
+    speed = min(parameters.actuator_speed_limit, URDF_UNLIMITED)
+    swing = yourdfpy.Limit(URDF_UNLIMITED, URDF_UNLIMITED, *parameters.leg_angle_limits)
+    stroke = yourdfpy.Limit(force, speed, shortest, longest)
+    place = _leg_placement(parameters, direction)
+    turn, slide = np.array([0.0, -1.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    names = [f"leg_{leg}_{part}" for part in ("revolute", "prismatic", "cylinder", "rod")]
+    revolute, prismatic, cylinder, rod = names
+    return [
+        _joint(revolute, "revolute", "base", cylinder, origin=place, axis=turn, limit=swing),
+        _joint(prismatic, "prismatic", cylinder, rod, axis=slide, limit=stroke),
+    ]
 
 
-def _joint(
-    name: str,
-    kind: str,
-    parent: str,
-    child: str,
-    origin: Array | None = None,
-    axis: Sequence[float] | None = None,
-    limit: yourdfpy.Limit | None = None,
-) -> yourdfpy.Joint:
-    return yourdfpy.Joint(
-        name=name,
-        type=kind,
-        parent=parent,
-        child=child,
-        origin=np.eye(4) if origin is None else origin,
-        axis=None if axis is None else np.array(axis),
-        limit=limit,
-    )
+def _joint(name: str, kind: str, parent: str, child: str, **more: Any) -> yourdfpy.Joint:
+    return yourdfpy.Joint(name, kind, parent, child, **{"origin": np.eye(4)} | more)
 
 
 # Placements, homogeneous (4, 4) -------------------------------------------------------------------

@@ -16,15 +16,15 @@ import os
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from rps_pin.config import YamlFile, read_yaml
 from rps_pin.errors import InputError, shown
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
-from rps_pin.rps.motion.trajectory_schema import Csv, Described, Fastest, Helix, validated
+from rps_pin.rps.motion.trajectory_schema import Fastest, validated
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.helix import helix
@@ -32,13 +32,6 @@ from rps_pin.trajectories.path import Trajectory
 from rps_pin.trajectories.point_to_point import point_to_point
 from rps_pin.trajectories.spline import spline
 from rps_pin.trajectories.tilt_figures import circle, lissajous
-
-_MAKERS: dict[str, Callable[..., Trajectory]] = {
-    "point_to_point": point_to_point,
-    "spline": spline,
-    "circle": circle,
-    "lissajous": lissajous,
-}
 
 
 def load_trajectory(path: str | os.PathLike[str], robot: RPSRobot) -> Trajectory:
@@ -87,41 +80,29 @@ def described_trajectory(file: YamlFile, folder: Path, robot: RPSRobot) -> Traje
         As `load_trajectory`.
     """
     described = validated(file)
-    trajectory = _made(file, described, folder, robot)
-    if described.fastest is None:
-        return trajectory
-    return _fastest(file, robot, trajectory, described.fastest)
-
-
-def _made(file: YamlFile, described: Described, folder: Path, robot: RPSRobot) -> Trajectory:
-    """Return the trajectory with its own time law."""
     keys = described.model_dump(exclude={"kind", "fastest"}, exclude_none=True)
+    makers: dict[str, Callable[..., Trajectory]] = {
+        "helix": partial(helix, robot),
+        "point_to_point": point_to_point,
+        "spline": spline,
+        "circle": circle,
+        "lissajous": lissajous,
+        "csv": lambda file, **more: read_csv(folder / file, **more),
+    }
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            trajectory = _called(described, keys, folder, robot)
+            trajectory = makers[described.kind](**keys)
             trajectory.sample([0.0, trajectory.duration / 3, trajectory.duration])
     except InputError as error:
-        key = "file" if isinstance(described, Csv) else _key(file, str(error))
+        word = re.match(r"\w*", str(error))
+        key = word.group() if word and word.group() in file.values else "kind"
+        key = "file" if described.kind == "csv" else key
         raise InputError(f"{file.place((key,))}: {error}") from None
     except ArithmeticError as error:
         raise InputError(f"{file.place(('kind',))}: numbers too large or small: {error}") from None
-    return trajectory
-
-
-def _called(
-    described: Described, keys: dict[str, Any], folder: Path, robot: RPSRobot
-) -> Trajectory:
-    if isinstance(described, Csv):
-        return read_csv(folder / keys.pop("file"), **keys)
-    if isinstance(described, Helix):
-        return helix(robot, **keys)
-    return _MAKERS[described.kind](**keys)
-
-
-def _key(file: YamlFile, message: str) -> str:
-    """Return the key that a message begins with, else the kind."""
-    word = re.match(r"\w*", message)
-    return word.group() if word and word.group() in file.values else "kind"
+    if described.fastest is None:
+        return trajectory
+    return _fastest(file, robot, trajectory, described.fastest)
 
 
 def _fastest(
@@ -130,8 +111,6 @@ def _fastest(
     from rps_pin.rps.motion.time_optimal import time_optimal  # noqa: PLC0415 (slow to import)
 
     given = limits.model_dump(exclude_none=True)
+    allowed = replace(ActuatorLimits.of(robot.parameters), **given)
     with file.at("fastest"):
-        found: Trajectory = time_optimal(
-            robot, trajectory, limits=replace(ActuatorLimits.of(robot.parameters), **given)
-        )
-    return found
+        return time_optimal(robot, trajectory, limits=allowed)

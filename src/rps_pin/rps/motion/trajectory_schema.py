@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    ValidationInfo,
-    field_validator,
-)
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
 from rps_pin.config import Entry, Finite, Positive, Text, Three, YamlFile
 from rps_pin.errors import InputError, shown
@@ -132,12 +126,7 @@ class Csv(_Described):
 Described = Helix | PointToPoint | Spline | Circle | Lissajous | Csv
 
 KINDS: dict[str, type[Described]] = {
-    "helix": Helix,
-    "point_to_point": PointToPoint,
-    "spline": Spline,
-    "circle": Circle,
-    "lissajous": Lissajous,
-    "csv": Csv,
+    get_args(schema.model_fields["kind"].annotation)[0]: schema for schema in get_args(Described)
 }
 
 
