@@ -39,7 +39,7 @@ _FAMILIES = (
     ("singular", "SINGULAR", style.BLACK),
     ("unreachable", "UNREACHABLE", GREY),
 )
-_VIEWS = (("XY", 0, 1), ("XZ", 0, 2), ("YZ", 1, 2))
+_POSITION = ("$p_x$ (mm)", "$p_y$ (mm)", "$p_z$ (mm)")
 
 
 def plot_assembly_modes(
@@ -80,7 +80,7 @@ def plot_assembly_modes(
             degrees = ", ".join(f"{angle:.0f}" for angle in np.rad2deg(modes.angle[k]))
             axes.set_title(f"{k + 1}: $\\phi$ = {degrees}°", fontsize=9)
             axes.set(xlim=(-reach, reach), ylim=(-reach, reach), zlim=(low, high))
-            _label_space(axes, size=7)
+            _label_space(axes, ("x (mm)", "y (mm)", "z (mm)"), size=7, ticks=3)
             axes.set_box_aspect((1, 1, (high - low) / (2 * reach)), zoom=0.8)
     return figure_of(axes)
 
@@ -102,7 +102,7 @@ def plot_theoretical(parameters: RPSParameters, figure: Figure | None = None) ->
             label = "half a turn: the limit" if i == 0 else None
             axes.scatter(*centre[:, None], color=LEG_COLOURS[0], s=20, label=label)
             axes.plot(*np.stack([np.zeros(3), centre], axis=1), color=LEG_COLOURS[0], lw=0.8)
-        _label_space(axes, z_label="$p_z$, any height (mm)")
+        _label_space(axes, ("$p_x$ (mm)", "$p_y$ (mm)", "$p_z$, any height (mm)"))
         axes.set_title(f"Theoretical workspace, radius h = {h:.4g} mm")
         axes.legend(loc="upper left")
         axes.set_box_aspect((1, 1, 1), zoom=0.88)
@@ -158,10 +158,10 @@ def plot_views(workspace: Workspace, figure: Figure | None = None) -> Figure:
         raise InputError("no point is inside the workspace: there is nothing to draw")
     with matplotlib.rc_context(STYLE):
         figure = figure or Figure(figsize=(10.5, 3.8), layout="constrained")
-        for axes, (name, i, j) in zip(figure.subplots(1, 3), _VIEWS, strict=True):
+        for axes, (i, j) in zip(figure.subplots(1, 3), ((0, 1), (0, 2), (1, 2)), strict=True):
             axes.plot(points[:, i], points[:, j], ",", color=_INSIDE, alpha=0.5, rasterized=True)
-            axes.set(xlabel=f"$p_{'xyz'[i]}$ (mm)", ylabel=f"$p_{'xyz'[j]}$ (mm)")
-            axes.set_title(name, loc="left")
+            axes.set(xlabel=_POSITION[i], ylabel=_POSITION[j])
+            axes.set_title("XYZ"[i] + "XYZ"[j], loc="left")
             if j == 1:
                 axes.set_aspect("equal", adjustable="datalim")
     return figure
@@ -252,12 +252,13 @@ def plot_comparison(rows: Sequence[_Reach], axes: Axes | None = None) -> Figure:
     return figure_of(axes)
 
 
-def _label_space(axes: Axes3D, z_label: str = "$p_z$ (mm)", size: int = 9) -> None:
-    labels = ("$p_x$ (mm)", "$p_y$ (mm)", z_label) if size == 9 else ("x (mm)", "y (mm)", "z (mm)")
+def _label_space(
+    axes: Axes3D, labels: Sequence[str] = _POSITION, size: int | None = None, ticks: int = 5
+) -> None:
     for axis, label in zip((axes.xaxis, axes.yaxis, axes.zaxis), labels, strict=True):
-        axis.set_label_text(label, fontsize=size if size < 9 else None)
-        axis.set_major_locator(MaxNLocator(5 if size == 9 else 3))
-        axis.set_tick_params(labelsize=size)
+        axis.set_label_text(label, fontsize=size)
+        axis.set_major_locator(MaxNLocator(ticks))
+        axis.set_tick_params(labelsize=size or 9)
 
 
 def _draw_robot(axes: Axes3D, base: Array, tips: Array) -> None:

@@ -19,6 +19,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import yourdfpy
 from lxml import etree
+from yourdfpy import Box, Cylinder, Sphere
 
 from rps_pin.arrays import Array
 from rps_pin.rps.parameters import RPSParameters
@@ -43,7 +44,7 @@ _LEGS = (
     ("leg_3", (0.0, 0.620, 0.451, 1.0)),
 )
 
-Shape: TypeAlias = yourdfpy.Box | yourdfpy.Cylinder | yourdfpy.Sphere
+Shape: TypeAlias = Box | Cylinder | Sphere
 Paint = tuple[str, tuple[float, float, float, float]]
 
 
@@ -118,23 +119,21 @@ def _base(parameters: RPSParameters, size: _Sizes) -> yourdfpy.Link:
     link = yourdfpy.Link("base")
     radius = parameters.base_radius + 2.5 * size.clevis
     top = -size.clevis
-    plate = _at(0.0, 0.0, top - size.plate / 2)
-    _add(link, "plate", yourdfpy.Cylinder(radius, size.plate), plate, _STEEL)
+    _add(link, "plate", Cylinder(radius, size.plate), _at(0, 0, top - size.plate / 2), _STEEL)
     gap = 1.3 * size.cylinder
     cheek = np.array([1.6 * size.cylinder, 0.5 * size.cylinder, 2 * size.clevis])
     foot = np.array([3.2 * size.cylinder, 3.8 * size.cylinder, 0.3 * size.clevis])
     for leg, direction in zip(LEGS, LEG_DIRECTIONS, strict=True):
         joint = _leg_placement(parameters, direction)
         place = joint @ _at(0, 0, top + foot[2] / 2)
-        _decorate(link, f"foot_{leg}", yourdfpy.Box(foot), place, _DARK)
+        _decorate(link, f"foot_{leg}", Box(foot), place, _DARK)
         for side, offset in (("left", gap), ("right", -gap)):
-            place = joint @ _at(0, offset, 0)
-            _add(link, f"clevis_{leg}_{side}", yourdfpy.Box(cheek), place, _DARK)
-            end = yourdfpy.Cylinder(0.8 * size.cylinder, 0.5 * size.cylinder)
-            place = joint @ _at(0, offset, size.clevis) @ _turn_x(math.pi / 2)
+            _add(link, f"clevis_{leg}_{side}", Box(cheek), joint @ _at(0, offset, 0), _DARK)
+            end = Cylinder(0.8 * size.cylinder, 0.5 * size.cylinder)
+            place = joint @ _at(0, offset, size.clevis) @ _TO_Y
             _decorate(link, f"clevis_{leg}_{side}_end", end, place, _DARK)
-        pin = yourdfpy.Cylinder(0.45 * size.cylinder, 3.4 * size.cylinder)
-        _add(link, f"pin_{leg}", pin, joint @ _turn_x(math.pi / 2), _BRASS)
+        pin = Cylinder(0.45 * size.cylinder, 3.4 * size.cylinder)
+        _add(link, f"pin_{leg}", pin, joint @ _TO_Y, _BRASS)
     return link
 
 
@@ -149,24 +148,20 @@ def _platform(parameters: RPSParameters, size: _Sizes) -> yourdfpy.Link:
     outer = radius + 1.3 * size.ball
     low = 0.7 * size.ball
     top = low + thickness
-    disc = yourdfpy.Cylinder(outer, thickness)
-    _add(link, "disc", disc, _at(0, 0, low + thickness / 2), _BLUE)
-    face, mark = 0.04 * thickness, 0.08 * thickness
-    white = yourdfpy.Cylinder(outer - 0.8 * size.ball, 2 * face)
-    _decorate(link, "face", white, _at(0, 0, top), _WHITE)
+    _add(link, "disc", Cylinder(outer, thickness), _at(0, 0, low + thickness / 2), _BLUE)
+    mark = 0.08 * thickness
+    _decorate(link, "face", Cylinder(outer - 0.8 * size.ball, mark), _at(0, 0, top), _WHITE)
     for leg, direction in zip(LEGS, LEG_DIRECTIONS, strict=True):
         ball = _at(*_polar(radius, direction))
-        _add(link, f"ball_{leg}", yourdfpy.Sphere(size.ball), ball, _BRASS)
-        socket = yourdfpy.Cylinder(1.15 * size.ball, 0.8 * size.ball)
+        _add(link, f"ball_{leg}", Sphere(size.ball), ball, _BRASS)
+        socket = Cylinder(1.15 * size.ball, 0.8 * size.ball)
         _decorate(link, f"socket_{leg}", socket, ball @ _at(0, 0, 0.55 * size.ball), _DARK)
-        spoke = yourdfpy.Box(np.array([0.62 * radius, 0.055 * radius, 2 * mark]))
-        turned = _turn(0, 1, direction) @ _at(0.55 * radius, 0, top)
-        _decorate(link, f"mark_{leg}", spoke, turned, _LEGS[leg - 1])
-        dot = yourdfpy.Cylinder(0.075 * radius, 2 * mark)
-        tip = _turn(0, 1, direction) @ _at(0.86 * radius, 0, top)
-        _decorate(link, f"mark_{leg}_end", dot, tip, _LEGS[leg - 1])
-    centre = yourdfpy.Cylinder(0.05 * radius, 2 * mark)
-    _decorate(link, "centre", centre, _at(0, 0, top), _DARK)
+        spoke = Box(np.array([0.62 * radius, 0.055 * radius, 2 * mark]))
+        dot = Cylinder(0.075 * radius, 2 * mark)
+        for name, shape, away in ((f"mark_{leg}", spoke, 0.55), (f"mark_{leg}_end", dot, 0.86)):
+            turned = _turn(0, 1, direction) @ _at(away * radius, 0, top)
+            _decorate(link, name, shape, turned, _LEGS[leg - 1])
+    _decorate(link, "centre", Cylinder(0.05 * radius, 2 * mark), _at(0, 0, top), _DARK)
     return link
 
 
@@ -175,17 +170,15 @@ def _cylinder_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfp
     p = parameters
     inertial = _bar(p.leg_mass, p.leg_com, p.leg_inertia_about_com, size.cylinder)
     link = yourdfpy.Link(f"leg_{leg}_cylinder", inertial=inertial)
-    tube = yourdfpy.Cylinder(size.cylinder, size.part - size.cylinder)
-    middle = _at((size.part + size.cylinder) / 2, 0, 0) @ _TO_X
-    _add(link, "tube", tube, middle, _DARK)
-    hub = yourdfpy.Sphere(1.15 * size.cylinder)
-    _add(link, "hub", hub, np.eye(4), _STEEL)
+    tube = Cylinder(size.cylinder, size.part - size.cylinder)
+    _add(link, "tube", tube, _at((size.part + size.cylinder) / 2, 0, 0) @ _TO_X, _DARK)
+    _add(link, "hub", Sphere(1.15 * size.cylinder), np.eye(4), _STEEL)
     rear, gland = 1.3 * size.cylinder, 1.6 * size.cylinder
     for name, at, length, paint in (
         ("rear", 1.4 * size.cylinder + rear / 2, rear, _STEEL),
         ("gland", size.part - gland / 2, gland, _LEGS[leg - 1]),
     ):
-        ring = yourdfpy.Cylinder(1.18 * size.cylinder, length)
+        ring = Cylinder(1.18 * size.cylinder, length)
         _decorate(link, name, ring, _at(at, 0, 0) @ _TO_X, paint)
     return link
 
@@ -195,9 +188,8 @@ def _rod_link(parameters: RPSParameters, size: _Sizes, leg: int) -> yourdfpy.Lin
     p = parameters
     inertial = _bar(p.rod_mass, -p.rod_com, p.rod_inertia, size.rod)
     link = yourdfpy.Link(f"leg_{leg}_rod", inertial=inertial)
-    rod = yourdfpy.Cylinder(size.rod, size.part)
-    _add(link, "rod", rod, _at(-size.part / 2, 0, 0) @ _TO_X, _BRIGHT)
-    nut = yourdfpy.Cylinder(1.35 * size.rod, 1.2 * size.ball)
+    _add(link, "rod", Cylinder(size.rod, size.part), _at(-size.part / 2, 0, 0) @ _TO_X, _BRIGHT)
+    nut = Cylinder(1.35 * size.rod, 1.2 * size.ball)
     _decorate(link, "nut", nut, _at(-1.5 * size.ball, 0, 0) @ _TO_X, _DARK)
     return link
 
@@ -216,10 +208,8 @@ def _bar(mass: float, com: float, across: float, radius: float) -> yourdfpy.Iner
 
 def _add(link: yourdfpy.Link, name: str, shape: Shape, origin: Array, paint: Paint) -> None:
     """Give a link a shape, to be seen and to be hit."""
-    visual = _decorate(link, name, shape, origin, paint)
-    link.collisions.append(
-        yourdfpy.Collision(name=visual.name, origin=origin, geometry=visual.geometry)
-    )
+    seen = _decorate(link, name, shape, origin, paint)
+    link.collisions.append(yourdfpy.Collision(seen.name, origin, seen.geometry))
 
 
 def _decorate(
@@ -228,9 +218,7 @@ def _decorate(
     """Give a link a shape that is only seen."""
     geometry = yourdfpy.Geometry(**{type(shape).__name__.lower(): shape})
     colour = yourdfpy.Material(name=paint[0], color=yourdfpy.Color(np.array(paint[1])))
-    visual = yourdfpy.Visual(
-        name=f"{link.name}_{name}", origin=origin, geometry=geometry, material=colour
-    )
+    visual = yourdfpy.Visual(f"{link.name}_{name}", origin, geometry, colour)
     link.visuals.append(visual)
     return visual
 
@@ -282,12 +270,8 @@ def _turn(axis_1: int, axis_2: int, angle: float) -> Array:
     return placement
 
 
-def _turn_x(angle: float) -> Array:
-    return _turn(1, 2, angle)
-
-
-#: URDF's cylinders lie along z; ours lie along x.
-_TO_X = _turn(2, 0, math.pi / 2)
+#: URDF's cylinders lie along z; ours lie along x, or along y.
+_TO_X, _TO_Y = _turn(2, 0, math.pi / 2), _turn(1, 2, math.pi / 2)
 
 
 def _leg_placement(parameters: RPSParameters, direction: float) -> Array:

@@ -270,11 +270,8 @@ def _columns(header: Sequence[str]) -> dict[str, int]:
     for more in (ACCELERATIONS, RATES):
         if len(needed) > 4 or any(quantity in found for quantity in more):
             needed.extend(more)
-    missing = []
-    for quantity in needed:
-        if quantity not in found:
-            first, *others = _names(quantity)
-            missing.append(f"{first} (or {', '.join(others)})")
+    absent = [_names(quantity) for quantity in needed if quantity not in found]
+    missing = [f"{first} (or {', '.join(others)})" for first, *others in absent]
     if missing:
         raise InputError(
             f"column{'s' if missing[1:] else ''} {', '.join(missing)} missing; the header has "
@@ -298,7 +295,7 @@ def _unknown(name: str, position: int) -> str:
         return f"column {shown(name)} is not known; did you mean {near[0]!r}?"
     for quantity in sorted(UNITS, key=len, reverse=True):
         if name.startswith(f"{quantity}_"):
-            unit = name[len(quantity) + 1 :]
+            unit = name.removeprefix(f"{quantity}_")
             return (
                 f"column {shown(name)}: {shown(unit)} is not a unit of {quantity}; it can be "
                 f"{', '.join(_names(quantity))}"
