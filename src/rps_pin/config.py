@@ -65,12 +65,7 @@ class YamlFile:
 
         The line is that of the innermost part of the path that the file holds.
         """
-        node, line = self._root, self._line
-        for part in path:
-            child = _child(node, part)
-            if child is None:
-                break
-            node, line = child
+        _, line = self._found(path)
         return f"{self.origin}, line {line + 1}" if line or path else self.origin
 
     def part(self, key: str) -> YamlFile:
@@ -111,7 +106,8 @@ class YamlFile:
             return schema.model_validate(dict(self.values))
         except ValidationError as error:
             problem = first_problem(error)
-        path, value = self._present(problem["loc"]), problem["input"]
+        depth, _ = self._found(problem["loc"])
+        path, value = problem["loc"][:depth], problem["input"]
         key = problem["loc"][-1] if problem["loc"] else ""
         if problem["type"] == "missing":
             where = self.place(path or root)
@@ -128,15 +124,15 @@ class YamlFile:
         rule = rule[0].lower() + rule[1:]
         raise InputError(f"{where}: {path_text(path) or what}{said}: {rule}")
 
-    def _present(self, path: Sequence[str | int]) -> tuple[str | int, ...]:
-        """Return the beginning of a path that the file holds."""
-        values: Any = self.values
+    def _found(self, path: Sequence[str | int]) -> tuple[int, int]:
+        """Return how many parts of a path the file holds, and the line (from 0) of the last."""
+        node, line = self._root, self._line
         for depth, part in enumerate(path):
-            in_list = isinstance(values, list) and isinstance(part, int) and part < len(values)
-            if not in_list and not (isinstance(values, Mapping) and part in values):
-                return tuple(path[:depth])
-            values = values[part]
-        return tuple(path)
+            child = _child(node, part)
+            if child is None:
+                return depth, line
+            node, line = child
+        return len(path), line
 
 
 def read_config(
@@ -218,10 +214,11 @@ def read_yaml(path: str | os.PathLike[str], what: str) -> YamlFile:
 
 def _parsed(text: str, origin: str) -> YamlFile:
     try:
-        root = _reader().compose(text)
+        reader = YAML(typ="safe", pure=True)
+        root, values = reader.compose(text), None
         if root is not None:
             _refuse_huge(root, origin)
-        values = _reader().load(text)
+            values = reader.constructor.construct_document(root)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f", line {mark.line + 1}" if mark else ""
@@ -239,10 +236,6 @@ def _parsed(text: str, origin: str) -> YamlFile:
         if key.tag not in ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge"):
             _refuse_key(key, origin)
     return YamlFile(values, origin, root)
-
-
-def _reader() -> YAML:
-    return YAML(typ="safe", pure=True)
 
 
 def _refuse_huge(root: Node, origin: str) -> None:

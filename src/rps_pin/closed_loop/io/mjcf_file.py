@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
@@ -77,7 +78,7 @@ class MjcfFile:
 
     def plain(self, element: Any) -> MjcfElement:
         """Return an element without defaults."""
-        return MjcfElement(self, element, element.attrib)
+        return MjcfElement(self, element, dict(element.attrib))
 
     def read(self, element: Any, tag: str = "") -> MjcfElement:
         """Return an element with the attributes of its default class.
@@ -107,23 +108,18 @@ class MjcfFile:
     def _read_compiler(self) -> None:
         """Merge the compiler elements; later ones replace the settings of earlier ones."""
         settings = MjcfElement(self, self.root, {})
-        for section in self.sections("compiler"):
+        for section in (settings, *self.sections("compiler")):
             for name, harmless in _UNREAD_SETTINGS.items():
                 if section.get(name, harmless[0]) not in harmless:
                     section.refuse(f"{name} = {section.get(name)!r} is not read")
-            settings = MjcfElement(self, section.xml, settings.attributes | section.attributes)
-            settings.choice("angle", "degree radian", "degree")
-            settings.choice("autolimits", "true false", "true")
-            settings.choice("inertiafromgeom", "true false auto", "auto")
-            sequence = settings.get("eulerseq", "xyz")
-            if len(sequence) != 3 or set(sequence) - set("xyzXYZ"):
-                section.refuse(f"eulerseq = {sequence!r} must be three letters of xyzXYZ")
-            settings.vector("inertiagrouprange", (0.0, 5.0))
-        self.degrees = settings.get("angle", "degree") == "degree"
-        self.eulerseq = settings.get("eulerseq", "xyz")
-        self.autolimits = settings.get("autolimits", "true") == "true"
-        self.inertia_from_geom = settings.get("inertiafromgeom", "auto")
-        self.inertia_groups = tuple(settings.vector("inertiagrouprange", (0.0, 5.0)))
+            settings = MjcfElement(self, section.xml, {**settings.attributes, **section.attributes})
+            self.degrees = settings.choice("angle", "degree radian", "degree") == "degree"
+            self.autolimits = settings.choice("autolimits", "true false", "true") == "true"
+            self.inertia_from_geom = settings.choice("inertiafromgeom", "true false auto", "auto")
+            self.eulerseq = settings.get("eulerseq", "xyz")
+            if len(self.eulerseq) != 3 or set(self.eulerseq) - set("xyzXYZ"):
+                section.refuse(f"eulerseq = {self.eulerseq!r} must be three letters of xyzXYZ")
+            self.inertia_groups = tuple(settings.vector("inertiagrouprange", (0.0, 5.0)))
 
     def _read_default(self, element: Any, name: str, above: dict[str, dict[str, str]]) -> None:
         """Store a default class and the classes in it, which inherit its attributes."""
@@ -141,6 +137,7 @@ class MjcfFile:
                 self._read_default(entry, entry.get("class"), own)
 
 
+@dataclass(frozen=True)
 class MjcfElement:
     """An element of an MJCF.
 
@@ -152,10 +149,9 @@ class MjcfElement:
         Its own and those of its default class.
     """
 
-    def __init__(self, file: MjcfFile, xml: Any, attributes: Mapping[str, str]) -> None:
-        self.file = file
-        self.xml = xml
-        self.attributes = dict(attributes)
+    file: MjcfFile
+    xml: Any
+    attributes: Mapping[str, str]
 
     @property
     def tag(self) -> str:
@@ -219,12 +215,11 @@ class MjcfElement:
 
     def rotation(self) -> Array:
         """Return its orientation, shape (3, 3)."""
-        given = [name for name in _ORIENTATIONS if name in self]
-        if not given:
+        name, *more = [name for name in _ORIENTATIONS if name in self] or [""]
+        if not name:
             return np.eye(3)
-        if len(given) > 1:
-            self.refuse(f"has more than one orientation: {', '.join(given)}")
-        name = given[0]
+        if more:
+            self.refuse(f"has more than one orientation: {', '.join([name, *more])}")
         values = self.vector(name, (0.0,) * _ORIENTATIONS[name])
         if name == "euler":
             return self._from_euler(values)

@@ -232,19 +232,17 @@ class MjcfTree:
         model = self.model
         for joint in self.joints:
             place = model.joints[model.getJointId(joint.name)]
+            q, v = place.idx_q, place.idx_v
             if joint.kind == "free":  # Pinocchio's parser bounds positions by 1.01 m
-                model.lowerPositionLimit[place.idx_q : place.idx_q + 3] = -math.inf
-                model.upperPositionLimit[place.idx_q : place.idx_q + 3] = math.inf
+                model.lowerPositionLimit[q : q + 3] = -math.inf
+                model.upperPositionLimit[q : q + 3] = math.inf
             if place.nq > 1:
                 continue
-            limits = self._limits(joint.element, "range", "limited")
-            if limits is not None:
-                lower, upper = map(joint.coordinate, limits)
-                model.lowerPositionLimit[place.idx_q] = lower
-                model.upperPositionLimit[place.idx_q] = upper
-            effort = self._limits(joint.element, "actuatorfrcrange", "actuatorfrclimited")
-            if effort is not None:
-                model.lowerEffortLimit[place.idx_v], model.upperEffortLimit[place.idx_v] = effort
+            if limits := self._limits(joint.element, "range", "limited"):
+                low, high = map(joint.coordinate, limits)
+                model.lowerPositionLimit[q], model.upperPositionLimit[q] = low, high
+            if effort := self._limits(joint.element, "actuatorfrcrange", "actuatorfrclimited"):
+                model.lowerEffortLimit[v], model.upperEffortLimit[v] = effort
 
     def _limits(self, joint: MjcfElement, name: str, flag: str) -> tuple[float, float] | None:
         """Return the limits that apply, or None."""
