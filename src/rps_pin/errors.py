@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools
 
 _LONGEST = 400
 _REPR = reprlib.Repr()
@@ -31,7 +31,15 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 
 
 class RPSPinError(Exception):
-    """Base class of the errors of rps_pin."""
+    """Base class of the errors of rps_pin.
+
+    Attributes
+    ----------
+    failed : array of bool or None
+        Of a batch in which samples fail one by one: which samples fail, shape (...).
+    """
+
+    failed: Bools | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle without calling the constructor, whose arguments differ."""

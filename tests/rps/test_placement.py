@@ -109,9 +109,9 @@ def test_tolerance_is_kept() -> None:
 @pytest.mark.parametrize("call", [constraint_residuals, pose_from_placement])
 def test_what_is_no_placement_is_refused(call: Callable[..., object]) -> None:
     for bad in (2 * np.eye(3), -np.eye(3), np.zeros((3, 3)), np.diag([1, 1, 1.001])):
-        with pytest.raises(InputError, match="rotation is none: R'R differs from I by"):
+        with pytest.raises(InputError, match="rotation is not a rotation: R'R differs from I by"):
             call(np.zeros(3), bad, H)
-    with pytest.raises(InputError, match=r"rotation \(1,\) is none"):
+    with pytest.raises(InputError, match=r"rotation \(entry \(1,\) of 2\) is not a rotation"):
         call(np.zeros(3), [np.eye(3), -np.eye(3)], H)
     for bad in (np.eye(4), np.zeros(3), np.full((3, 3), np.nan), "R"):
         with pytest.raises(InputError, match=r"^rotation "):

@@ -32,6 +32,7 @@ from rps_pin.paper.lagrange_terms import lagrange_terms
 from rps_pin.paper.lagrange_vectors import refuse_large_gain, times
 from rps_pin.rps.kinematics.legs import leg_motion
 from rps_pin.rps.kinematics.pose import checked_motion
+from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 
 
@@ -52,6 +53,7 @@ class LagrangeDynamics(NamedTuple):
     """A = df/dx, shape (..., 3, 6), m and m^2."""
 
 
+@maskable(pose=1, rate=1, acceleration=1)
 def lagrange_forces(
     parameters: RPSParameters,
     pose: ArrayLike,
@@ -60,6 +62,7 @@ def lagrange_forces(
     *,
     as_printed: Collection[str] = (),
     max_gain: float = MAX_CONDITION,
+    errors: Errors = "raise",
 ) -> LagrangeDynamics:
     """Return the actuators' forces by Lagrange's equations of the first kind: Eq. 8 to 25.
 
@@ -76,6 +79,9 @@ def lagrange_forces(
     max_gain
         Largest accepted 1 over the smallest singular value of A_phi, whose entries, made those of
         distances by arcs, are cosines.
+    errors
+        ``"raise"`` refuses the first sample with a leg of no length or at a singularity; with
+        ``"mask"`` the results of such samples are NaN.
 
     Raises
     ------

@@ -23,6 +23,7 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError
 from rps_pin.rps.kinematics.legs import RADIAL
+from rps_pin.rps.kinematics.samples import refuse
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -145,10 +146,9 @@ def refuse_large_gain(matrices: Array, limit: float, message: str) -> None:
     if not limit > 0:
         raise InputError(f"max_gain = {limit}: it must be positive")
     smallest = np.linalg.svd(matrices, compute_uv=False)[..., -1]
-    singular = ~(smallest * limit >= 1)
-    if not singular.any():
-        return
-    first = tuple(int(i) for i in np.argwhere(singular)[0])
-    where = f" (entry {first} of {singular.size})" if first else ""
-    gain = 1 / float(smallest[first]) if smallest[first] > 0 else math.inf
-    raise SingularityError(message.format(where=where, gain=gain, limit=limit), gain, limit)
+
+    def error(first: tuple[int, ...], where: str) -> SingularityError:
+        gain = 1 / float(smallest[first]) if smallest[first] > 0 else math.inf
+        return SingularityError(message.format(where=where, gain=gain, limit=limit), gain, limit)
+
+    refuse(~(smallest * limit >= 1), error)

@@ -35,6 +35,7 @@ from rps_pin.rps.kinematics.rates import (
     jacobian_rates_of_legs,
     leg_jacobians,
 )
+from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 
 
@@ -56,6 +57,7 @@ class PoseForces(NamedTuple):
         return self.platform + self.cylinders + self.rods
 
 
+@maskable(pose=1, rate=1, acceleration=1)
 def virtual_work_forces(
     parameters: RPSParameters,
     pose: ArrayLike,
@@ -63,6 +65,7 @@ def virtual_work_forces(
     acceleration: ArrayLike,
     *,
     max_gain: float = MAX_CONDITION,
+    errors: Errors = "raise",
 ) -> Array:
     """Return the actuators' forces, shape (..., 3), N; positive pushes the leg out.
 
@@ -76,6 +79,9 @@ def virtual_work_forces(
         Largest accepted speed of the platform for a unit of leg speed, tilt rates made speeds by h
         (see `rps_pin.rps.kinematics.rates.pose_rate`): as many times larger than the load can a
         force be.
+    errors
+        ``"raise"`` refuses the first sample with a leg of no length or at a singularity; with
+        ``"mask"`` the forces of such samples are NaN.
 
     Raises
     ------
@@ -86,8 +92,9 @@ def virtual_work_forces(
     SingularityError
         At a parallel singularity, where forces are infinite: says the gain and its limit.
     """
-    needed = pose_forces(parameters, pose, rate, acceleration).total
-    legs = leg_jacobians(parameters, np.asarray(pose, dtype=np.float64))
+    motion = checked_motion(pose, rate, acceleration)
+    needed = pose_forces(parameters, *motion).total
+    legs = leg_jacobians(parameters, motion[0])
     # Tilts made lengths by h, on both sides.
     units = np.array([1.0, *2 * [1 / parameters.platform_radius]])
     scaled = legs.length_jacobian * units

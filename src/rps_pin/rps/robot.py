@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -29,6 +29,7 @@ from rps_pin.rps.kinematics.pose import (
     quaternion,
     rotation,
 )
+from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.urdf import LEGS, ball_frames, build_urdf
 
@@ -136,9 +137,7 @@ class RPSRobot:
         x = checked_pose(pose)
         return position(x, self.parameters.platform_radius), rotation(x)
 
-    def inverse_kinematics(
-        self, pose: ArrayLike, *, errors: Literal["raise", "mask"] = "raise"
-    ) -> Legs:
+    def inverse_kinematics(self, pose: ArrayLike, *, errors: Errors = "raise") -> Legs:
         """Return leg lengths and angles in closed form: Eq. 1, 4 and 6.
 
         Parameters
@@ -187,7 +186,7 @@ class RPSRobot:
         return assembly_modes(length, p.base_radius, p.platform_radius)
 
     def forward_kinematics(
-        self, length: ArrayLike, near: ArrayLike, *, errors: Literal["raise", "mask"] = "raise"
+        self, length: ArrayLike, near: ArrayLike, *, errors: Errors = "raise"
     ) -> Array:
         """Return the pose of given leg lengths that continues a known one.
 
@@ -224,8 +223,14 @@ class RPSRobot:
             return found.pose
         return np.ma.MaskedArray(found.pose, np.repeat(~found.reached[..., None], 3, axis=-1))
 
+    @maskable(pose=1, rate=1, acceleration=1)
     def motion(
-        self, pose: ArrayLike, rate: ArrayLike, acceleration: ArrayLike
+        self,
+        pose: ArrayLike,
+        rate: ArrayLike,
+        acceleration: ArrayLike,
+        *,
+        errors: Errors = "raise",
     ) -> tuple[PlatformMotion, LegMotion]:
         """Return how the platform and the legs move, in closed form.
 
@@ -233,6 +238,8 @@ class RPSRobot:
         ----------
         pose, rate, acceleration
             Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
+        errors
+            ``"raise"`` refuses a pose that is out of reach; with ``"mask"`` its results are NaN.
 
         Raises
         ------
@@ -243,8 +250,14 @@ class RPSRobot:
         legs = reachable_motion(self.parameters, x, dx, ddx)
         return platform_motion(x, dx, ddx, self.parameters.platform_radius), legs
 
+    @maskable(pose=1, rate=1, acceleration=1)
     def state(
-        self, pose: ArrayLike, rate: ArrayLike, acceleration: ArrayLike
+        self,
+        pose: ArrayLike,
+        rate: ArrayLike,
+        acceleration: ArrayLike,
+        *,
+        errors: Errors = "raise",
     ) -> tuple[Array, Array, Array]:
         """Return the full Pinocchio state whose loops are closed, by formula.
 
@@ -252,6 +265,8 @@ class RPSRobot:
         ----------
         pose, rate, acceleration
             Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
+        errors
+            ``"raise"`` refuses a pose that is out of reach; with ``"mask"`` its results are NaN.
 
         Returns
         -------
@@ -337,7 +352,7 @@ class RPSRobot:
         acceleration: ArrayLike,
         *,
         wrench: ArrayLike | None = None,
-        errors: Literal["raise", "mask"] = "raise",
+        errors: Errors = "raise",
     ) -> Array:
         """Return the actuator forces of whole trajectories, in closed form.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from rps_pin.rps.kernels import legs, tips
 from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE
 from rps_pin.rps.kinematics.inverse_kinematics import inverse_kinematics
 from rps_pin.rps.kinematics.pose import checked_motion
-from rps_pin.rps.kinematics.rates import Errors, check_errors_option
+from rps_pin.rps.kinematics.samples import Errors, check_errors_option, refuse
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measures import passive_conditioning
 
@@ -60,8 +61,8 @@ def actuator_forces(
     refused = np.zeros(suspect.shape, dtype=bool)
     if suspect.any():
         refused[suspect] = _refused(parameters, x[suspect], max_condition)
-        if errors == "raise" and refused.any():
-            _refuse(parameters, x, refused, max_condition)
+        if errors == "raise":
+            refuse(refused, partial(_error, parameters, x, refused.size, max_condition))
     force[refused] = 0.0
     _refuse_overflow(force)
     if errors == "raise":
@@ -157,18 +158,24 @@ def _refused(parameters: RPSParameters, pose: Array, max_condition: float) -> Bo
     return refused
 
 
-def _refuse(parameters: RPSParameters, pose: Array, refused: Bools, max_condition: float) -> None:
-    """Raise the error of the first sample that is refused."""
-    first = tuple(int(i) for i in np.argwhere(refused)[0])
-    which = f"sample {first[0] if len(first) == 1 else first} of {refused.size}: " if first else ""
+def _error(
+    parameters: RPSParameters,
+    pose: Array,
+    count: int,
+    max_condition: float,
+    first: tuple[int, ...],
+    _: str,
+) -> UnreachableError | SingularityError:
+    """Return the error of a sample that is refused."""
+    which = f"sample {first[0] if len(first) == 1 else first} of {count}: " if first else ""
     try:
         inverse_kinematics(parameters, pose[first])
     except UnreachableError as error:
-        raise UnreachableError(f"{which}{error}", error.violations) from None
+        return UnreachableError(f"{which}{error}", error.violations)
     distance = float(passive_conditioning(parameters, pose[first]))
     condition = 1 / distance if distance > 0 else math.inf
     z, tilt_x, tilt_y = pose[first]
-    raise SingularityError(
+    return SingularityError(
         f"{which}pose z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad is singular: the "
         f"condition number of the passive joints' Jacobian is {condition:.3g}, and at most "
         f"{max_condition:.3g} is accepted",

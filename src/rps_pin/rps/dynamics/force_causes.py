@@ -18,6 +18,7 @@ from rps_pin.rps.dynamics.force_equations import ForceTerms, inertia_entries, ve
 from rps_pin.rps.dynamics.friction import has_friction
 from rps_pin.rps.dynamics.loads import Payload, checked_wrench
 from rps_pin.rps.kinematics.pose import checked_motion
+from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.robot import RPSRobot
 
 _NO_GRAVITY = (0.0, 0.0, 0.0)
@@ -51,6 +52,7 @@ class ForceCauses:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
+@maskable(pose=1, rate=1, acceleration=1, wrench=1)
 def force_causes(
     robot: RPSRobot,
     pose: ArrayLike,
@@ -58,6 +60,7 @@ def force_causes(
     acceleration: ArrayLike,
     *,
     wrench: ArrayLike | None = None,
+    errors: Errors = "raise",
 ) -> ForceCauses:
     """Return the parts of the actuator forces of samples.
 
@@ -67,6 +70,9 @@ def force_causes(
         The 3-RPS, with its payload and friction.
     pose, rate, acceleration, wrench
         As for `RPSRobot.actuator_forces`.
+    errors
+        ``"raise"`` refuses the first sample that is out of reach or singular; with ``"mask"`` the
+        parts of such samples are NaN.
 
     Raises
     ------

@@ -36,6 +36,7 @@ from rps_pin.rps.kinematics.pose import (
     stacked,
     tilt_of,
 )
+from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 
@@ -96,6 +97,7 @@ class JointReactions(NamedTuple):
         )
 
 
+@maskable(pose=1, rate=1, acceleration=1, wrench=1)
 def joint_reactions(
     robot: RPSRobot,
     pose: ArrayLike,
@@ -103,6 +105,7 @@ def joint_reactions(
     acceleration: ArrayLike,
     *,
     wrench: ArrayLike | None = None,
+    errors: Errors = "raise",
 ) -> JointReactions:
     """Return the reactions in all joints: forces at the tips, wrenches in the legs.
 
@@ -112,6 +115,9 @@ def joint_reactions(
         The 3-RPS, with its payload and friction.
     pose, rate, acceleration, wrench
         As for `RPSRobot.actuator_forces`.
+    errors
+        ``"raise"`` refuses the first sample that is out of reach or singular; with ``"mask"`` the
+        results of such samples are NaN.
 
     Raises
     ------

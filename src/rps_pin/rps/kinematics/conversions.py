@@ -21,6 +21,7 @@ from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.pose import checked_motion, checked_pose, platform_motion
+from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.kinematics.three_quantities import poses_from
 from rps_pin.validation import one_shape, positive_number, real_array
 
@@ -97,8 +98,13 @@ def angles_from_pose(pose: ArrayLike) -> PaperAngles:
 # The centre ---------------------------------------------------------------------------------------
 
 
+@maskable(position=1, branch=0)
 def pose_from_position(
-    position: ArrayLike, platform_radius: float, branch: ArrayLike = "+"
+    position: ArrayLike,
+    platform_radius: float,
+    branch: ArrayLike = "+",
+    *,
+    errors: Errors = "raise",
 ) -> Array:
     """Return the pose (..., 3) that holds the platform's centre at a position: Eq. 5 inverted.
 
@@ -106,8 +112,7 @@ def pose_from_position(
     ``"+"`` has alpha = pi/2 - phi/2, branch ``"-"`` the opposite tilt. phi is that of atan2, in
     (-pi, pi]: across the negative x axis the branches change places, as one turn round the centre
     leads from each to the other. A path that turns further follows one branch, as
-    `rps_pin.trajectories.helix` does. Where some positions may be out of reach, use `poses_from`,
-    which gives both branches and a mask.
+    `rps_pin.trajectories.helix` does. `poses_from` gives both branches.
 
     Parameters
     ----------
@@ -117,6 +122,8 @@ def pose_from_position(
         The paper's h, m.
     branch
         ``"+"`` or ``"-"``; one, or an array of them, shape (...).
+    errors
+        ``"raise"`` refuses a position out of reach; with ``"mask"`` its pose is NaN.
 
     Raises
     ------
@@ -132,15 +139,16 @@ def pose_from_position(
         signs = np.asarray("")
     if not np.isin(signs, ("+", "-")).all():
         raise InputError(f"branch = {shown(branch)}: it must be '+' or '-', or an array of them")
-    x, y, z = np.moveaxis(centre, -1, 0)
-    both = poses_from(platform_radius, x=x, y=y, z=z).pose
     try:
-        return np.where((signs == "+")[..., None], both[..., 0, :], both[..., 1, :])
+        batch = np.broadcast_shapes(centre.shape[:-1], signs.shape)
     except ValueError:
         raise InputError(
             f"position and branch have shapes {centre.shape} and {signs.shape}, which do not go "
             "together: (..., 3) and (...)"
         ) from None
+    x, y, z = np.moveaxis(np.broadcast_to(centre, (*batch, 3)), -1, 0)
+    both = poses_from(platform_radius, x=x, y=y, z=z).pose
+    return np.where((signs == "+")[..., None], both[..., 0, :], both[..., 1, :])
 
 
 def position_from_pose(pose: ArrayLike, platform_radius: float) -> Centre:

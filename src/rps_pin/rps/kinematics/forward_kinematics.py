@@ -10,7 +10,7 @@ or crosses to where the lengths no longer tell which way the platform goes. It i
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +28,7 @@ from rps_pin.rps.kinematics.leg_equations import (
 )
 from rps_pin.rps.kinematics.legs import geometry_of_pose, refuse_vanishing
 from rps_pin.rps.kinematics.pose import checked_pose
-from rps_pin.rps.kinematics.rates import check_errors_option
+from rps_pin.rps.kinematics.samples import Errors, maskable, refuse
 from rps_pin.rps.kinematics.tracking import LegDirections, Lengths, condition_of, follow, pose_of
 from rps_pin.validation import one_shape, positive_number, whole_number
 
@@ -56,13 +56,14 @@ class ForwardKinematics(NamedTuple):
     """Condition number of Eq. 8's Jacobian at the pose, shape (...)."""
 
 
+@maskable(length=1, near=1)
 def forward_kinematics(
     length: ArrayLike,
     near: ArrayLike,
     base_radius: float,
     platform_radius: float,
     *,
-    errors: Literal["raise", "mask"] = "raise",
+    errors: Errors = "raise",
     condition_limit: float = CONDITION_LIMIT,
 ) -> ForwardKinematics:
     """Return the poses with given leg lengths that continue known poses.
@@ -78,7 +79,8 @@ def forward_kinematics(
         The paper's g and h, m.
     errors
         ``"raise"`` refuses lengths that cannot be followed to their end; with ``"mask"``
-        `ForwardKinematics.reached` is false there.
+        `ForwardKinematics.reached` is false there; its other fields are NaN where a leg has no
+        length in `near`.
     condition_limit
         Largest condition number of Eq. 8's Jacobian (by leg angles, greatest row sums) that is
         followed through.
@@ -94,24 +96,25 @@ def forward_kinematics(
     UnreachableError
         If a leg has no length in a pose of `near`.
     """
-    check_errors_option(errors)
     g, h = checked_radii(base_radius, platform_radius)
     limit = positive_number(condition_limit, "condition_limit")
     wanted, start = one_shape(length=checked_lengths(length), near=checked_pose(near, "near"))
     shape = wanted.shape
-    goal, pose = wanted.reshape(-1, 3), start.reshape(-1, 3)
-    begin, *legs = _legs_of(pose, g, h)
+    goal = wanted.reshape(-1, 3)
+    begin, *legs = (array.reshape(-1, 3) for array in _legs_of(start, g, h))
     direction = np.concatenate(legs, axis=-1).T
     direction, fraction, condition = follow_many(begin.T, goal.T, direction, (g, h), limit)
     angle = np.arctan2(direction[3:], direction[:3]).T
-    reached = fraction == 1.0
-    if errors == "raise" and not reached.all():
-        first = int(np.argmin(reached))
-        where = tuple(int(i) for i in np.unravel_index(first, shape[:-1]))
-        _refuse(goal[first], angle[first], fraction[first], condition[first], limit, g, h, where)
+    reached, batch = fraction == 1.0, shape[:-1]
+
+    def error(first: tuple[int, ...], where: str) -> ClosureError | SingularityError:
+        i = int(np.argmin(reached))
+        return _error(goal[i], angle[i], fraction[i], condition[i], limit, g, h, where)
+
+    if errors == "raise":
+        refuse(~reached.reshape(batch), error)
     there = np.where(reached[:, None], goal, begin + fraction[:, None] * (goal - begin))
     found = placement_from_angles(there, angle, g, h).pose
-    batch = shape[:-1]
     return ForwardKinematics(
         found.reshape(shape),
         angle.reshape(shape),
@@ -308,7 +311,7 @@ def follow_many(
     return direction, done, condition
 
 
-def _refuse(
+def _error(
     goal: Array,
     angle: Array,
     fraction: float,
@@ -316,21 +319,19 @@ def _refuse(
     limit: float,
     g: float,
     h: float,
-    where: tuple[int, ...],
-) -> None:
-    """Raise the error that says why lengths cannot be reached."""
-    asked = f"leg lengths ({goal[0]:.6g}, {goal[1]:.6g}, {goal[2]:.6g}) m"
-    if where:
-        asked += f" (entry {where if len(where) > 1 else where[0]})"
+    where: str,
+) -> ClosureError | SingularityError:
+    """Return the error that says why lengths cannot be reached."""
+    asked = f"leg lengths ({goal[0]:.6g}, {goal[1]:.6g}, {goal[2]:.6g}) m{where}"
     if goal.max() <= longest_leg(g, h) and not len(assembly_modes(goal, g, h).angle):
         best = least_squares(_residuals_of, angle, args=(goal, g, h))
         gap = float(np.abs(best.fun).max())
-        raise ClosureError(
+        return ClosureError(
             f"{asked} cannot close: no pose of the platform has them; nearest to the one "
             f"continued, a distance between two tips is {gap:.3g} m off {_SQRT3 * h:.6g} m",
             gap,
         )
-    raise SingularityError(
+    return SingularityError(
         f"{asked} cannot be reached from the pose given: after {fraction:.4%} of the line a "
         f"parallel singularity is met (condition {condition:.3g}, limit {limit:.3g}). "
         "assembly_modes lists the poses that have such lengths",

@@ -22,7 +22,7 @@ from rps_pin.rps.kinematics.legs import (
     within_limits,
 )
 from rps_pin.rps.kinematics.pose import checked_pose, tilt_of
-from rps_pin.rps.kinematics.rates import Errors, check_errors_option
+from rps_pin.rps.kinematics.samples import Errors, check_errors_option, refuse
 from rps_pin.rps.parameters import RPSParameters
 
 
@@ -33,9 +33,7 @@ def inverse_kinematics(
     check_errors_option(errors)
     x = checked_pose(pose)
     legs = geometry_of_pose(x, parameters.base_radius, parameters.platform_radius)
-    if errors == "raise":
-        refuse_vanishing(legs.length, legs.vanishing)
-    reachable = _reachable(parameters, x, legs, refuse=errors == "raise")
+    reachable = _reachable(parameters, x, legs, errors)
     return Legs(legs.length, legs.angle, reachable & ~legs.vanishing.any(axis=-1))
 
 
@@ -45,8 +43,7 @@ def reachable_motion(
     """Return how the legs move, or refuse a pose beyond their limits."""
     g, h = parameters.base_radius, parameters.platform_radius
     legs = geometry_of_pose(pose, g, h)
-    refuse_vanishing(legs.length, legs.vanishing)
-    _reachable(parameters, pose, legs, refuse=True)
+    _reachable(parameters, pose, legs, "raise")
     return leg_motion(pose, rate, acceleration, h, g, legs)
 
 
@@ -64,18 +61,22 @@ def spherical_angles(parameters: RPSParameters, pose: Array, legs: LegGeometry) 
     return np.moveaxis(angles, 0, -1)
 
 
-def _reachable(parameters: RPSParameters, pose: Array, legs: LegGeometry, *, refuse: bool) -> Bools:
+def _reachable(parameters: RPSParameters, pose: Array, legs: LegGeometry, errors: Errors) -> Bools:
     """Return whether each pose keeps its limits, or refuse the first that does not."""
+    if errors == "raise":
+        refuse_vanishing(legs.length, legs.vanishing)
     length, angle, cone = legs.length, legs.angle, spherical_angles(parameters, pose, legs)
     reachable = within_limits(parameters, length, angle, cone)
-    if refuse and not reachable.all():
-        first = tuple(int(i) for i in np.argwhere(~reachable)[0])
+
+    def error(first: tuple[int, ...], where: str) -> UnreachableError:
         broken = violations(parameters, length[first], angle[first], cone[first])
-        where = f" (entry {first} of {reachable.size})" if first else ""
         z, tilt_x, tilt_y = pose[first]
-        raise UnreachableError(
+        return UnreachableError(
             f"pose z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad{where} is out of "
             f"reach: {'; '.join(map(str, broken))}",
             broken,
         )
+
+    if errors == "raise":
+        refuse(~reachable, error)
     return reachable

@@ -21,6 +21,7 @@ from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips as ring
 from rps_pin.rps.kernels.limits import within
 from rps_pin.rps.kinematics.pose import components, tilt_of
+from rps_pin.rps.kinematics.samples import refuse
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.urdf import LEG_DIRECTIONS
 
@@ -122,12 +123,15 @@ def leg_angles_and_lengths(tip: Array, base_radius: float) -> tuple[Array, Array
 
 def refuse_vanishing(length: Array, vanishing: Bools) -> None:
     """Raise `UnreachableError` if a leg, (..., 3 legs), has no length."""
-    if vanishing.any():
-        leg = int(np.argwhere(vanishing)[0][-1]) + 1
-        raise UnreachableError(
-            f"leg {leg} would have length {length[vanishing][0]:.3g} m: its tip lies on its "
+
+    def error(first: tuple[int, ...], _: str) -> UnreachableError:
+        leg = int(np.argmax(vanishing[first]))
+        return UnreachableError(
+            f"leg {leg + 1} would have length {length[first][leg]:.3g} m: its tip lies on its "
             "revolute joint, and it has no direction"
         )
+
+    refuse(vanishing.any(axis=-1), error)
 
 
 def leg_motion(

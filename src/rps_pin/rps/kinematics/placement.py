@@ -10,13 +10,17 @@ from rps_pin.arrays import Array
 from rps_pin.errors import ClosureError, InputError
 from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.legs import tips
+from rps_pin.rps.kinematics.samples import Errors, maskable, refuse
 from rps_pin.validation import positive_number, real_array
 
 #: Largest entry of R'R - I in what is still taken for a rotation.
 _ORTHONORMAL = 1e-6
 
 
-def constraint_residuals(position: ArrayLike, rotation: ArrayLike, platform_radius: float) -> Array:
+@maskable(position=1, rotation=2)
+def constraint_residuals(
+    position: ArrayLike, rotation: ArrayLike, platform_radius: float, *, errors: Errors = "raise"
+) -> Array:
     """Return the residuals of a placement in the constraints of Eq. 4, shape (..., 3), m.
 
     They are h (u_y - v_x), p_y + h u_y and p_x - h/2 (u_x - v_y). All vanish exactly if each
@@ -30,6 +34,8 @@ def constraint_residuals(position: ArrayLike, rotation: ArrayLike, platform_radi
         From platform to base axes, shape (..., 3, 3).
     platform_radius
         The paper's h, m.
+    errors
+        ``"raise"`` refuses a matrix that is not a rotation; with ``"mask"`` its results are NaN.
 
     Raises
     ------
@@ -42,12 +48,14 @@ def constraint_residuals(position: ArrayLike, rotation: ArrayLike, platform_radi
     )
 
 
+@maskable(position=1, rotation=2)
 def pose_from_placement(
     position: ArrayLike,
     rotation: ArrayLike,
     platform_radius: float,
     *,
     tolerance: float | None = None,
+    errors: Errors = "raise",
 ) -> Array:
     """Return the pose (..., 3) of a placement of the platform.
 
@@ -65,6 +73,8 @@ def pose_from_placement(
         The paper's h, m.
     tolerance
         In m; 1e-9 h if left out.
+    errors
+        ``"raise"`` refuses a placement without a pose; with ``"mask"`` its pose is NaN.
 
     Raises
     ------
@@ -86,23 +96,24 @@ def pose_from_placement(
 
     apart = tips(centre, turn, h) - tips(poses.position(pose, h), poses.rotation(pose), h)
     gap = np.linalg.norm(apart, axis=-1).max(axis=-1)
-    if (gap > allowed).any():
-        first = tuple(int(i) for i in np.argwhere(gap > allowed)[0])
-        where = f" (entry {first} of {gap.size})" if first else ""
+
+    def error(first: tuple[int, ...], where: str) -> InputError | ClosureError:
         residuals = _residuals(centre[first], turn[first], h)
         if np.abs(residuals).max() <= allowed:
-            raise InputError(
+            return InputError(
                 f"the placement{where} has no pose: it is a half turn about an axis "
                 f"{np.arcsin(min(1.0, abs(float(torsion[first])))):.6g} rad out of the base plane, "
                 f"the robot's other operation mode; a joint is {gap[first]:.3g} m from the nearest "
                 f"pose's, more than {allowed:.3g} m"
             )
-        raise ClosureError(
+        return ClosureError(
             f"the placement{where} breaks the constraints of Eq. 4: h (u_y - v_x), p_y + h u_y and "
             f"p_x - h/2 (u_x - v_y) are {', '.join(f'{r:.3g}' for r in residuals)} m; a joint is "
             f"{gap[first]:.3g} m from the nearest pose's, more than {allowed:.3g} m",
             float(gap[first]),
         )
+
+    refuse(gap > allowed, error)
     return pose
 
 
@@ -134,13 +145,15 @@ def _checked_placement(position: ArrayLike, rotation: ArrayLike) -> tuple[Array,
         raise InputError(
             f"position and rotation have shapes {p.shape} and {R.shape}, which do not go together"
         ) from None
-    error = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2), initial=0.0)
-    wrong = (error > _ORTHONORMAL) | (np.linalg.det(R) < 0)
-    if wrong.any():
-        first = tuple(int(i) for i in np.argwhere(wrong)[0])
-        raise InputError(
-            f"rotation{f' {first}' if first else ''} is none: R'R differs from I by "
-            f"{error[first]:.3g} (at most {_ORTHONORMAL}), det(R) = {np.linalg.det(R[first]):.6g} "
-            "(must be 1)"
+    p, R = np.broadcast_to(p, (*batch, 3)), np.broadcast_to(R, (*batch, 3, 3))
+    off = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2), initial=0.0)
+    determinant = np.linalg.det(R)
+
+    def error(first: tuple[int, ...], where: str) -> InputError:
+        return InputError(
+            f"rotation{where} is not a rotation: R'R differs from I by {off[first]:.3g} (at most "
+            f"{_ORTHONORMAL}), det(R) = {determinant[first]:.6g} (must be 1)"
         )
-    return np.broadcast_to(p, (*batch, 3)), np.broadcast_to(R, (*batch, 3, 3))
+
+    refuse((off > _ORTHONORMAL) | (determinant < 0), error)
+    return p, R

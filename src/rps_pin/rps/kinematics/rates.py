@@ -13,7 +13,7 @@ messages, 0 to 2 in arrays.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,10 +31,9 @@ from rps_pin.rps.kinematics.pose import (
     platform_motion,
     tilt_of,
 )
+from rps_pin.rps.kinematics.samples import Errors, check_errors_option, maskable, refuse
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.validation import choice, one_shape, real_array
-
-Errors = Literal["raise", "mask"]
+from rps_pin.validation import one_shape, real_array
 
 
 class TipJacobians(NamedTuple):
@@ -160,7 +159,10 @@ def tip_jacobian_rates(
     return _by_pose(slope_rates, parameters.platform_radius, by_z=0.0)
 
 
-def leg_jacobians(parameters: RPSParameters, pose: ArrayLike) -> LegJacobians:
+@maskable(pose=1)
+def leg_jacobians(
+    parameters: RPSParameters, pose: ArrayLike, *, errors: Errors = "raise"
+) -> LegJacobians:
     """Return leg lengths and angles with their 3x3 Jacobians, in closed form: Eq. 1, 4 and 7.
 
     Limits are not considered.
@@ -169,6 +171,8 @@ def leg_jacobians(parameters: RPSParameters, pose: ArrayLike) -> LegJacobians:
     ----------
     pose
         Shape (..., 3).
+    errors
+        ``"raise"`` refuses a pose with a leg of no length; with ``"mask"`` its results are NaN.
 
     Raises
     ------
@@ -182,8 +186,9 @@ def leg_jacobians(parameters: RPSParameters, pose: ArrayLike) -> LegJacobians:
     return legs
 
 
+@maskable(pose=1, rate=1)
 def leg_jacobian_rates(
-    parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike
+    parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike, *, errors: Errors = "raise"
 ) -> LegJacobianRates:
     """Return the time derivatives of the legs' Jacobians, in closed form.
 
@@ -193,6 +198,8 @@ def leg_jacobian_rates(
     ----------
     pose, rate
         Pose and its time derivative, shape (..., 3) each.
+    errors
+        As for `leg_jacobians`.
 
     Raises
     ------
@@ -383,7 +390,7 @@ def _solved(
     scaled = legs.length_jacobian * units
     values = np.linalg.svd(scaled, compute_uv=False)
     determined = (values[..., 2] * max_gain >= 1) & ~vanishing.any(axis=-1)
-    if errors == "raise" and not determined.all():
+    if errors == "raise":
         _refuse_singular(values, determined, max_gain)
     regular = np.where(determined[..., None, None], scaled, np.eye(3))
     right = np.where(determined[..., None], right_side(legs), 0.0)
@@ -391,21 +398,17 @@ def _solved(
 
 
 def _refuse_singular(values: Array, determined: Bools, limit: float) -> None:
-    first = tuple(int(i) for i in np.argwhere(~determined)[0])
-    smallest = float(values[first][2])
-    gain = 1 / smallest if smallest > 0 else float("inf")
-    where = f" (entry {first} of {determined.size})" if first else ""
-    raise SingularityError(
-        f"the legs do not determine how the platform moves here{where}: it could move {gain:.3g} "
-        f"times as fast as they, and at most {limit:.3g} times is accepted",
-        gain,
-        limit,
-    )
+    def error(first: tuple[int, ...], where: str) -> SingularityError:
+        smallest = float(values[first][2])
+        gain = 1 / smallest if smallest > 0 else float("inf")
+        return SingularityError(
+            f"the legs do not determine how the platform moves here{where}: it could move "
+            f"{gain:.3g} times as fast as they, and at most {limit:.3g} times is accepted",
+            gain,
+            limit,
+        )
 
-
-def check_errors_option(errors: str) -> None:
-    """Raise `InputError` unless errors is ``"raise"`` or ``"mask"``."""
-    choice(errors, "errors", ("raise", "mask"))
+    refuse(~determined, error)
 
 
 def _check_options(errors: str, max_gain: float) -> None:

@@ -16,14 +16,15 @@ which keeps all its digits near the level pose, where this robot makes its micro
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, UnreachableError
-from rps_pin.rps.kinematics.rates import check_errors_option
+from rps_pin.rps.kinematics.samples import Errors, check_errors_option, refuse
 from rps_pin.validation import one_shape, positive_number, real_array
 
 #: What is asked may miss what is possible by rounding, and no more: by this share of it, and by
@@ -57,7 +58,7 @@ def poses_from(
     z_1: ArrayLike | None = None,
     z_2: ArrayLike | None = None,
     z_3: ArrayLike | None = None,
-    errors: Literal["raise", "mask"] = "raise",
+    errors: Errors = "raise",
 ) -> PoseSolutions:
     """Return every pose that has three given quantities (Section 2.1 of the paper).
 
@@ -128,8 +129,8 @@ def poses_from(
     exists = reached[..., None] & found.isolated
     tilt = np.where(exists[..., None], found.tilt, 0.0)
     solutions = PoseSolutions(_pose(found.z[..., None], tilt), exists, found.continuum)
-    if errors == "raise" and not exists.any(axis=-1).all():
-        _refuse(q, found, tuple(int(i) for i in np.argwhere(~exists.any(axis=-1))[0]))
+    if errors == "raise":
+        refuse(~exists.any(axis=-1), partial(_error, q, found))
     return solutions
 
 
@@ -290,22 +291,23 @@ def _solver(given: dict[str, ArrayLike]) -> _Solver:
     return solver
 
 
-def _refuse(q: _Quantities, found: _Branches, first: tuple[int, ...]) -> None:
-    """Refuse the first entry that has no pose to list."""
+def _error(
+    q: _Quantities, found: _Branches, first: tuple[int, ...], where: str
+) -> InputError | UnreachableError:
+    """Return the error of an entry that has no pose to list."""
     units = {"alpha": "rad", "beta": "rad", "gamma": "rad", "u_z": "", "v_z": ""}
     asked = ", ".join(
         f"{name} = {values[first]:.6g} {units.get(name, 'm')}".rstrip()
         for name, values in q.items()
     )
-    where = f" (entry {first} of {found.value.size})" if first else ""
     if found.continuum[first]:
-        raise InputError(
+        return InputError(
             f"{asked}{where}: this holds for every beta, so it determines no pose; give another "
             f"quantity than {found.name} or alpha"
         )
     value, lower, upper = (float(x[first]) for x in (found.value, found.lower, found.upper))
     unit = f" {found.unit}" if found.unit else ""
-    raise UnreachableError(
+    return UnreachableError(
         f"no pose has {asked}{where}: {found.name} would be {value:.6g}{unit}; it can be "
         f"{lower:.6g} to {upper:.6g}{unit}, and misses that by "
         f"{max(lower - value, value - upper):.3g}{unit}"

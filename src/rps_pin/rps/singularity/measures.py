@@ -73,13 +73,12 @@ from rps_pin.errors import InputError
 from rps_pin.rps.kinematics.legs import RADIAL, refuse_vanishing
 from rps_pin.rps.kinematics.pose import checked_pose, rotation
 from rps_pin.rps.kinematics.rates import (
-    Errors,
     LegJacobians,
     TipJacobians,
-    check_errors_option,
     masked_leg_jacobians,
     tip_jacobians,
 )
+from rps_pin.rps.kinematics.samples import Errors, maskable, refuse
 from rps_pin.rps.parameters import RPSParameters
 
 #: `distance` below which a path grazes a singularity.
@@ -112,6 +111,7 @@ class SingularityMeasures(NamedTuple):
         return np.copysign(self.type_ii, self.determinant)
 
 
+@maskable(pose=1)
 def singularity_measures(
     parameters: RPSParameters, pose: ArrayLike, *, errors: Errors = "raise"
 ) -> SingularityMeasures:
@@ -123,7 +123,8 @@ def singularity_measures(
         Shape (..., 3), tilted by less than a whole turn.
     errors
         Where a leg has no length, its direction is not determined and neither is type II:
-        ``"raise"`` refuses such a pose, ``"mask"`` answers 0 for its `type_ii` and `determinant`.
+        ``"raise"`` refuses such a pose, ``"mask"`` answers 0 for its `type_ii` and `determinant`,
+        and NaN for a pose that is tilted by a whole turn or more.
 
     Raises
     ------
@@ -133,7 +134,6 @@ def singularity_measures(
     UnreachableError
         If a leg has no length.
     """
-    check_errors_option(errors)
     x = checked_tilt(pose)
     tip = tip_jacobians(parameters, x)
     legs, vanishing = masked_leg_jacobians(parameters, x)
@@ -187,12 +187,14 @@ def checked_tilt(pose: ArrayLike) -> Array:
     """Return poses as `checked_pose`; refuse tilts of a whole turn, where (tilt_x, tilt_y) fail."""
     x = checked_pose(pose)
     tilt = np.hypot(x[..., 1], x[..., 2])
-    beyond = tilt > 2 * math.pi * (1 - 1e-6)
-    if beyond.any():
-        raise InputError(
-            f"pose is tilted by {tilt[beyond].flat[0]:.6g} rad; here it must be below 2 pi, where "
+
+    def error(first: tuple[int, ...], where: str) -> InputError:
+        return InputError(
+            f"pose{where} is tilted by {tilt[first]:.6g} rad; here it must be below 2 pi, where "
             "(tilt_x, tilt_y) are singular coordinates. The same placement has a tilt up to pi"
         )
+
+    refuse(tilt > 2 * math.pi * (1 - 1e-6), error)
     return x
 
 
