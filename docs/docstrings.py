@@ -10,10 +10,12 @@ from pydantic import BaseModel
 from sphinx import addnodes
 from sphinx.application import Sphinx
 
+from rps_pin.rps.parameters import RPSParameters
+
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the steps before napoleon parses a docstring (priority 500), and after."""
-    app.connect("autodoc-process-docstring", fields_of_models, priority=300)
+    app.connect("autodoc-process-docstring", default_of_field, priority=300)
     app.connect("autodoc-process-docstring", formulas, priority=400)
     app.connect("autodoc-process-docstring", whole_sentences, priority=600)
     app.connect("autodoc-process-signature", short_signature)
@@ -21,16 +23,14 @@ def setup(app: Sphinx) -> dict[str, Any]:
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
-def fields_of_models(
-    app: Sphinx, what: str, name: str, obj: Any, options: object, lines: list[str]
+def default_of_field(
+    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
 ) -> None:
-    """Add the fields of a pydantic model with their descriptions to its docstring."""
-    if what == "class" and issubclass(obj, BaseModel):
-        lines += ["", "Attributes", "----------"]
-        for field, info in obj.model_fields.items():
-            default = "" if info.is_required() else f"; {info.default} if left out"
-            lines += [field, f"    {info.description}{default}"]
-        lines.append("")
+    """Add the default of a robot's parameter to its docstring."""
+    owner, _, field = name.rpartition(".")
+    info = RPSParameters.model_fields.get(field)
+    if owner.endswith(RPSParameters.__name__) and info and not info.is_required():
+        lines[:] = [f"{' '.join(lines).strip()}; {info.default} if left out", ""]
 
 
 def short_signature(

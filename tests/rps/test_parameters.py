@@ -446,7 +446,8 @@ def test_file_says_what_each_field_means(tmp_path: Path) -> None:
     lines = (tmp_path / "robot.yaml").read_text("utf-8").splitlines()
     for field, info in RPSParameters.model_fields.items():
         (place,) = [i for i, line in enumerate(lines) if line.startswith(f"{field}:")]
-        assert lines[place - 1] == f"# {info.description}"
+        meaning = " ".join(str(info.description).split())
+        assert lines[place - 1] == f"# {meaning}"
 
 
 def test_file_of_an_unlimited_robot_reads_back(tmp_path: Path) -> None:

@@ -72,81 +72,67 @@ class RPSParameters(pydantic.BaseModel):
     """
 
     model_config = pydantic.ConfigDict(
-        frozen=True, extra="forbid", arbitrary_types_allowed=True, validate_default=True
+        frozen=True,
+        extra="forbid",
+        arbitrary_types_allowed=True,
+        validate_default=True,
+        use_attribute_docstrings=True,
     )
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$")] = Field(
-        "rps", description="name of the robot; letters, digits, - and _"
-    )
+    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$")] = "rps"
+    """name of the robot; letters, digits, - and _"""
 
-    base_radius: Positive = Field(description="g: revolute joints' distance from base centre, m")
-    platform_radius: Positive = Field(
-        description="h: spherical joints' distance from the platform centre, m"
-    )
-    platform_mass: Positive = Field(description="m: mass of the platform, kg")
-    platform_inertia: Matrix3 = Field(
-        description="I: of the platform about its centre, in its own axes, kg m^2"
-    )
+    base_radius: Positive
+    """g: revolute joints' distance from base centre, m"""
+    platform_radius: Positive
+    """h: spherical joints' distance from the platform centre, m"""
+    platform_mass: Positive
+    """m: mass of the platform, kg"""
+    platform_inertia: Matrix3
+    """I: of the platform about its centre, in its own axes, kg m^2"""
 
-    leg_mass: NonNegative = Field(
-        description="m_leg: mass of a leg's cylinder (the part that only turns), kg"
-    )
-    leg_com: NonNegative = Field(
-        description="r: cylinder's centre of mass from its revolute joint, along the leg, m"
-    )
-    leg_inertia: NonNegative = Field(
-        description="I_leg: cylinder's moment of inertia, in the plane the leg moves in, kg m^2"
-    )
-    leg_inertia_about: Literal["joint", "com"] = Field(
-        "joint", description="point leg_inertia is about: the revolute 'joint' or the 'com'"
-    )
+    leg_mass: NonNegative
+    """m_leg: mass of a leg's cylinder (the part that only turns), kg"""
+    leg_com: NonNegative
+    """r: cylinder's centre of mass from its revolute joint, along the leg, m"""
+    leg_inertia: NonNegative
+    """I_leg: cylinder's moment of inertia, in the plane the leg moves in, kg m^2"""
+    leg_inertia_about: Literal["joint", "com"] = "joint"
+    """point leg_inertia is about: the revolute 'joint' or the 'com'"""
 
-    rod_mass: NonNegative = Field(
-        0.0, description="mass of a leg's rod (the part that also slides), kg"
-    )
-    rod_com: Finite = Field(
-        0.0, description="rod's centre of mass behind the spherical joint, along the leg, m"
-    )
-    rod_inertia: NonNegative = Field(
-        0.0, description="rod's moment of inertia about its centre of mass, kg m^2"
-    )
+    rod_mass: NonNegative = 0.0
+    """mass of a leg's rod (the part that also slides), kg"""
+    rod_com: Finite = 0.0
+    """rod's centre of mass behind the spherical joint, along the leg, m"""
+    rod_inertia: NonNegative = 0.0
+    """rod's moment of inertia about its centre of mass, kg m^2"""
 
-    leg_length_limits: tuple[float, float] = Field(
-        (0.0, math.inf), description="shortest and longest leg (the paper's d), m"
-    )
-    leg_angle_limits: tuple[float, float] = Field(
-        (-math.pi, math.pi), description="least and greatest leg angle (the paper's phi), rad"
-    )
-    spherical_cone_limit: Bound = Field(
-        math.pi, description="greatest angle between a leg and its ball's rest axis, rad"
-    )
-    spherical_rest_angle: Angle = Field(
-        0.0,
-        description="angle of a ball's rest axis from the platform's normal, rad; "
-        "pi/2 - phi for a leg at rest at phi under the level platform",
-    )
-    actuator_force_limit: Bound = Field(
-        math.inf, description="greatest force of an actuator, push or pull, N"
-    )
-    actuator_speed_limit: Bound = Field(
-        math.inf, description="greatest speed of an actuator, out or in, m/s"
-    )
-    gravity: Vector3 = Field(
-        np.array([0.0, 0.0, -9.81]), description="gravity's acceleration in base axes, m/s^2"
-    )
+    leg_length_limits: tuple[float, float] = (0.0, math.inf)
+    """shortest and longest leg (the paper's d), m"""
+    leg_angle_limits: tuple[float, float] = (-math.pi, math.pi)
+    """least and greatest leg angle (the paper's phi), rad"""
+    spherical_cone_limit: Bound = math.pi
+    """greatest angle between a leg and its ball's rest axis, rad"""
+    spherical_rest_angle: Angle = 0.0
+    """angle of a ball's rest axis from the platform's normal, rad; pi/2 - phi for a leg at rest at
+    phi under the level platform"""
+    actuator_force_limit: Bound = math.inf
+    """greatest force of an actuator, push or pull, N"""
+    actuator_speed_limit: Bound = math.inf
+    """greatest speed of an actuator, out or in, m/s"""
+    gravity: Vector3 = np.array([0.0, 0.0, -9.81])
+    """gravity's acceleration in base axes, m/s^2"""
 
-    prismatic_damping: NonNegative = Field(
-        0.0, description="viscous friction of an actuator, N s/m"
-    )
-    prismatic_friction: NonNegative = Field(0.0, description="dry friction of an actuator, N")
-    revolute_damping: NonNegative = Field(
-        0.0, description="viscous friction of a revolute joint, N m s/rad"
-    )
-    revolute_friction: NonNegative = Field(0.0, description="dry friction of a revolute joint, N m")
-    friction_speed: Positive = Field(
-        FRICTION_SPEED,
-        description="speed at which dry friction reaches 76 % of its value, m/s and rad/s",
-    )
+    prismatic_damping: NonNegative = 0.0
+    """viscous friction of an actuator, N s/m"""
+    prismatic_friction: NonNegative = 0.0
+    """dry friction of an actuator, N"""
+    revolute_damping: NonNegative = 0.0
+    """viscous friction of a revolute joint, N m s/rad"""
+    revolute_friction: NonNegative = 0.0
+    """dry friction of a revolute joint, N m"""
+    friction_speed: Positive = FRICTION_SPEED
+    """speed at which dry friction reaches 76 % of its value, m/s and rad/s"""
 
     def __init__(self, **values: Any) -> None:
         try:
@@ -289,7 +275,8 @@ class RPSParameters(pydantic.BaseModel):
         """Write the parameters to a YAML file, each with its meaning and unit as a comment."""
         document = CommentedMap(self.model_dump())
         for field, info in type(self).model_fields.items():
-            document.yaml_set_comment_before_after_key(field, before=info.description)
+            meaning = " ".join(str(info.description).split())
+            document.yaml_set_comment_before_after_key(field, before=meaning)
         yaml = YAML()
         yaml.width = 200
         yaml.default_flow_style = None
