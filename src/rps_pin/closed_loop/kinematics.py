@@ -12,12 +12,7 @@ import numpy as np
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError, SingularityError
-from rps_pin.numerics.linear_algebra import (
-    condition_number,
-    least_norm,
-    null_space,
-    solve_transposed,
-)
+from rps_pin.numerics import linear_algebra
 
 #: Opening rate that `velocity` and `acceleration` accept, relative to the rates given.
 _CONSISTENT = 1e-8
@@ -25,7 +20,7 @@ _CONSISTENT = 1e-8
 
 def allowed_motions(system: ConstraintSystem, jacobian: Array) -> Array:
     """Return N, shape (nv, m), a basis of the null space of J, orthonormal in one unit."""
-    return system.column_scale[:, None] * null_space(system.scaled(jacobian))
+    return system.column_scale[:, None] * linear_algebra.null_space(system.scaled(jacobian))
 
 
 def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
@@ -48,7 +43,8 @@ def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
     scale = system.column_scale[chosen]
     reason = "these joints do not determine the motion here"
     scaled = of_chosen / scale[:, None]
-    return solve_transposed(scaled, motions.T, system.max_condition, reason).T / scale
+    solved = linear_algebra.solve_transposed(scaled, motions.T, system.max_condition, reason)
+    return solved.T / scale
 
 
 def actuated_basis(system: ConstraintSystem, solved: Array) -> Array:
@@ -95,9 +91,9 @@ def _completed(
     else:
         rest = np.setdiff1d(np.arange(system.model.nv), given)
     left = system.scaled(jacobian)[:, rest]
-    system.refuse_singular(condition_number(left))
+    system.refuse_singular(linear_algebra.condition_number(left))
     right = -system.row_scale * right
-    scaled = least_norm(left, right)
+    scaled = linear_algebra.least_norm(left, right)
     opening = float(np.abs(left @ scaled - right).max(initial=0.0))
     size = float(np.abs(right).max(initial=0.0))
     if opening > _CONSISTENT * max(size, 1e-3):

@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 from pinocchio import coal
 
-from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import LoopClosure
 from rps_pin.closed_loop.io.mechanism_schema import Description
 from rps_pin.closed_loop.model import ClosedLoopModel
@@ -51,6 +50,11 @@ def visual_model(path: str | os.PathLike[str], model: pin.Model) -> pin.Geometry
         raise MechanismError(f"{urdf}: its shapes cannot be read: {error}") from None
 
 
+_JOINT = np.array([0.83, 0.62, 0.22, 1.0])
+_BAR = np.array([0.16, 0.39, 0.68, 1.0])
+_BASE = np.array([0.45, 0.48, 0.52, 1.0])
+
+
 def skeleton(mechanism: ClosedLoopModel) -> pin.GeometryModel:
     """Return bars for a mechanism that has no shapes of its own.
 
@@ -59,45 +63,31 @@ def skeleton(mechanism: ClosedLoopModel) -> pin.GeometryModel:
     of any length.
     """
     model = mechanism.model
-    ends: list[tuple[int, Array]] = []
-    for joint in range(1, model.njoints):
-        ends.append((int(model.parents[joint]), np.array(model.jointPlacements[joint].translation)))
+    ends = [
+        (int(model.parents[joint]), np.array(model.jointPlacements[joint].translation))
+        for joint in range(1, model.njoints)
+    ]
     for closure in mechanism.closures:
         if isinstance(closure, LoopClosure):
-            for index in closure.frame_ids(model):
-                frame = model.frames[index]
+            for frame in (model.frames[index] for index in closure.frame_ids(model)):
                 ends.append((int(frame.parentJoint), np.array(frame.placement.translation)))
     longest = max((float(np.linalg.norm(end)) for _, end in ends), default=0.0)
     radius = longest / 50.0 or 0.01
-    shapes = pin.GeometryModel()
-    for joint in range(1, model.njoints):
-        ball = coal.Sphere(1.6 * radius)
-        _add(shapes, f"joint_{joint}", joint, pin.SE3.Identity(), ball, _JOINT)
+    ball, here = coal.Sphere(1.6 * radius), pin.SE3.Identity()
+    items = [
+        (_JOINT, pin.GeometryObject(f"joint_{joint}", joint, here, ball))
+        for joint in range(1, model.njoints)
+    ]
     for count, (joint, end) in enumerate(ends):
         length = float(np.linalg.norm(end))
         if length > 2.0 * radius:
             turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end / length)
             middle = pin.SE3(turn.matrix(), end / 2.0)
             bar = coal.Cylinder(radius, length)
-            _add(shapes, f"bar_{count + 1}", joint, middle, bar, _BAR if joint else _BASE)
+            item = pin.GeometryObject(f"bar_{count + 1}", joint, middle, bar)
+            items.append((_BAR if joint else _BASE, item))
+    shapes = pin.GeometryModel()
+    for colour, item in items:
+        item.meshColor = colour
+        shapes.addGeometryObject(item)
     return shapes
-
-
-_JOINT, _BAR, _BASE = (
-    np.array([0.83, 0.62, 0.22, 1.0]),
-    np.array([0.16, 0.39, 0.68, 1.0]),
-    np.array([0.45, 0.48, 0.52, 1.0]),
-)
-
-
-def _add(
-    shapes: pin.GeometryModel,
-    name: str,
-    joint: int,
-    placement: pin.SE3,
-    shape: coal.CollisionGeometry,
-    colour: Array,
-) -> None:
-    item = pin.GeometryObject(name, joint, placement, shape)
-    item.meshColor = colour
-    shapes.addGeometryObject(item)

@@ -7,6 +7,7 @@ numbers, comparisons read the real part: the imaginary part carries a derivative
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any, TypeAlias
 
@@ -19,52 +20,22 @@ _NUMERIC = (np.ndarray, np.number, complex, int)
 Number: TypeAlias = Any
 
 
-def _sqrt(x: float) -> float:
-    return math.sqrt(x)
+def _function(name: str) -> Callable[[Number], Number]:
+    """Return the function of one number that has a name in `math`, NumPy and CasADi."""
+    on_float, on_array = getattr(math, name), getattr(np, name)
+
+    def function(x: Number) -> Number:
+        if type(x) is float:
+            return on_float(x)
+        return on_array(x) if isinstance(x, _NUMERIC) else getattr(x, name)()
+
+    def of_float(x: float) -> float:
+        return float(on_float(x))
+
+    return kernel_for_floats(of_float)(function)
 
 
-@kernel_for_floats(_sqrt)
-def sqrt(x: Number) -> Number:
-    """Return the square root."""
-    if type(x) is float:
-        return math.sqrt(x)
-    return np.sqrt(x) if isinstance(x, _NUMERIC) else x.sqrt()
-
-
-def _cos(x: float) -> float:
-    return math.cos(x)
-
-
-@kernel_for_floats(_cos)
-def cos(x: Number) -> Number:
-    """Return the cosine."""
-    if type(x) is float:
-        return math.cos(x)
-    return np.cos(x) if isinstance(x, _NUMERIC) else x.cos()
-
-
-def _sin(x: float) -> float:
-    return math.sin(x)
-
-
-@kernel_for_floats(_sin)
-def sin(x: Number) -> Number:
-    """Return the sine."""
-    if type(x) is float:
-        return math.sin(x)
-    return np.sin(x) if isinstance(x, _NUMERIC) else x.sin()
-
-
-def _tanh(x: float) -> float:
-    return math.tanh(x)
-
-
-@kernel_for_floats(_tanh)
-def tanh(x: Number) -> Number:
-    """Return the hyperbolic tangent."""
-    if type(x) is float:
-        return math.tanh(x)
-    return np.tanh(x) if isinstance(x, _NUMERIC) else x.tanh()
+sqrt, cos, sin, tanh = _function("sqrt"), _function("cos"), _function("sin"), _function("tanh")
 
 
 def _atan2(y: float, x: float) -> float:

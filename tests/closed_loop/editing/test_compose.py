@@ -220,7 +220,7 @@ def test_wholes_can_be_parts() -> None:
         ({"a": pin.Model()}, "part 'a' must be a Part, not a Model"),
         (
             {"a": Part(sample(), parent="b/tool")},
-            "part 'a': no frame 'b/tool' before it; there are: universe",
+            "parent of part 'a': no frame 'b/tool'; there are: universe",
         ),
     ],
 )

@@ -19,11 +19,7 @@ from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 from rps_pin.closed_loop.constraints.closures import Closure, frame_id
 from rps_pin.closed_loop.constraints.equations import OPEN, ClosureEquations, refuse_twice
 from rps_pin.closed_loop.constraints.factorisation import PassiveFactorisation
-from rps_pin.closed_loop.dynamics.passive_joint_forces import (
-    JointEffects,
-    coordinate_indices,
-    refuse_springs,
-)
+from rps_pin.closed_loop.dynamics import passive_joint_forces
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.errors import ClosureError, InputError, MechanismError
 from rps_pin.numerics.linear_algebra import refuse_condition
@@ -62,7 +58,7 @@ class ConstraintSystem:
         closures: Sequence[Closure],
         actuated: Sequence[str],
         *,
-        effects: JointEffects | None = None,
+        effects: passive_joint_forces.JointEffects | None = None,
         characteristic_length: float | None = None,
         max_condition: float = MAX_CONDITION,
     ) -> None:
@@ -77,7 +73,7 @@ class ConstraintSystem:
         if effects is not None and effects.damping.size != model.nv:
             raise InputError(f"effects are of {effects.damping.size} velocities, not {model.nv}")
         if effects is not None:
-            refuse_springs(model, effects)
+            passive_joint_forces.refuse_springs(model, effects)
         self.data = equations.data
         self.actuated = self.velocity_indices(self.actuated_names, "to actuate")
         self.passive = np.setdiff1d(np.arange(model.nv), self.actuated)
@@ -90,7 +86,7 @@ class ConstraintSystem:
         self.factorisation = PassiveFactorisation(
             self.passive, self.actuated, self.row_scale, self.column_scale, max_condition
         )
-        self.effects, self.coordinates = effects, coordinate_indices(model)
+        self.effects, self.coordinates = effects, passive_joint_forces.coordinate_indices(model)
         self.limits = JointLimits(model)
         self._frame_ids: dict[str, int] = {}
 

@@ -26,13 +26,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array, Indices
-from rps_pin.closed_loop.constraints.derivatives import (
-    ClosureDerivatives,
-    FrameMotions,
-    closure_derivatives,
-    closure_force_slope,
-    external_force_slope,
-)
+from rps_pin.closed_loop.constraints import derivatives
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.forward_dynamics import forward_dynamics
@@ -159,15 +153,15 @@ class DynamicsDerivatives:
 
     def _force_derivatives(
         self, motion: tuple[Array, Array, Array], multipliers: Array, wrenches: Wrenches | None
-    ) -> tuple[tuple[Array, Array, Array], ClosureDerivatives]:
+    ) -> tuple[tuple[Array, Array, Array], derivatives.ClosureDerivatives]:
         """Return F_q, F_v and M (nv, nv), lambda held, and the closures' derivatives."""
         system, equations = self._system, self._equations
         model, on_frames = equations.model, system.by_frame(wrenches)
         on_closures = closure_wrenches(equations, motion[0], multipliers)
-        motions = FrameMotions(equations, motion)
-        rows = closure_derivatives(motions)
-        beyond = closure_force_slope(motions, multipliers)
-        beyond += external_force_slope(motions, on_frames)
+        motions = derivatives.FrameMotions(equations, motion)
+        rows = derivatives.closure_derivatives(motions)
+        beyond = derivatives.closure_force_slope(motions, multipliers)
+        beyond += derivatives.external_force_slope(motions, on_frames)
         forces = forces_on_joints(equations, on_closures, on_frames)
         by_q, by_v, mass = (
             np.array(part).reshape(model.nv, model.nv)
@@ -201,7 +195,7 @@ class DynamicsDerivatives:
 
 
 def following(
-    basis: Array, chosen: Indices, solved: Solved, rows: ClosureDerivatives
+    basis: Array, chosen: Indices, solved: Solved, rows: derivatives.ClosureDerivatives
 ) -> tuple[Array, Array, Array]:
     """Return V_y, A_y and A_y': how the whole mechanism follows independent coordinates.
 

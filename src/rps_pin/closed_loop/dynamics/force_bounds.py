@@ -135,9 +135,7 @@ def friction_pyramid(
     first /= np.linalg.norm(first)
     second = np.cross(up, first)
     name = f"closure {closure!r}"
-    bounds = [
-        ForceBound(closure, direction=tuple(up), lower=least, name=f"{name} (normal force)"),
-    ]
+    bounds = [ForceBound(closure, direction=tuple(up), lower=least, name=f"{name} (normal force)")]
     for face in range(sides):
         angle = 2 * math.pi * (face + 0.5) / sides
         across = math.cos(angle) * first + math.sin(angle) * second

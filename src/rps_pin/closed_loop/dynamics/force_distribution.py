@@ -29,13 +29,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.column_names import column_names
+from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.dynamics.force_bounds import ForceBound
-from rps_pin.closed_loop.dynamics.least_effort import (
-    RESIDUAL,
-    least_effort,
-    refuse_nearly_singular,
-    residual_force,
-)
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.errors import InfeasibleError, InputError, LimitExcess
@@ -215,11 +210,13 @@ class ForceDistribution:
         rest[self._actuated] -= self._actuated_columns * aim
         reduced = motions @ rest
         of_actuators = (motions.take(self._actuated, axis=1) * self._levers).T  # W^-1 S N
-        best = least_effort(of_actuators, reduced, size=self._largest_lever)
-        refuse_nearly_singular(best.values, self.mechanism.max_condition, self._largest_lever)
-        if best.missing @ best.missing > RESIDUAL**2 * (reduced @ reduced):
+        best = least_effort.least_effort(of_actuators, reduced, size=self._largest_lever)
+        limit = self.mechanism.max_condition
+        least_effort.refuse_nearly_singular(best.values, limit, self._largest_lever)
+        if best.missing @ best.missing > least_effort.RESIDUAL**2 * (reduced @ reduced):
             motions = self._columns[:, None] * motions.T
-            raise self._infeasible_motion(residual_force(motions, best.missing, self._columns))
+            force = least_effort.residual_force(motions, best.missing, self._columns)
+            raise self._infeasible_motion(force)
         return best.tau, best.free
 
     def _multipliers(self, factors: Decomposition, force: Array, tau: Array) -> Array:

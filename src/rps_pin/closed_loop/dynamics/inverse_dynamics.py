@@ -25,21 +25,11 @@ from scipy.linalg.blas import dgemv, dnrm2
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.factorisation import HUGE
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.dynamics.generalised_forces import required_force, resisting_force
-from rps_pin.closed_loop.dynamics.least_effort import (
-    RESIDUAL,
-    least_effort,
-    refuse_nearly_singular,
-    residual_force,
-)
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.errors import InputError
-from rps_pin.numerics.linear_algebra import (
-    RANK_TOLERANCE,
-    Decomposition,
-    condition_number,
-    solve_transposed,
-)
+from rps_pin.numerics import linear_algebra
 
 _INFINITY = math.inf
 
@@ -96,7 +86,7 @@ class InverseDynamics:
 
         Computed when asked for.
         """
-        return condition_number(self._scaled_jacobian())
+        return linear_algebra.condition_number(self._scaled_jacobian())
 
     @property
     def orientation(self) -> int:
@@ -184,7 +174,7 @@ def constraint_forces(
     """Return lambda (nc,) of a motion under given actuator forces, of least norm."""
     rest = required_force(system, q, v, a, wrenches)
     rest[system.actuated] -= tau
-    factors = Decomposition(system.scaled(system.equations.jacobian(q)))
+    factors = linear_algebra.Decomposition(system.scaled(system.equations.jacobian(q)))
     return system.row_scale * factors.transposed_least_norm(system.column_scale * rest)
 
 
@@ -192,7 +182,7 @@ def _by_null_space(system: ConstraintSystem, jacobian: Array, force: Array) -> I
     if not np.isfinite(force).all():
         raise InputError("q, v and a must be finite")
     jacobian = jacobian.reshape(system.equations.size, system.model.nv)
-    factors = Decomposition(system.scaled(jacobian))
+    factors = linear_algebra.Decomposition(system.scaled(jacobian))
     if system.model.nv - factors.rank == system.actuated.size:
         system.refuse_singular(system.condition(jacobian))
     tau, scaled, unproduced = null_space_solution(
@@ -225,11 +215,11 @@ class NullSpaceSolution(NamedTuple):
 
 
 def null_space_solution(
-    factors: Decomposition,
+    factors: linear_algebra.Decomposition,
     actuated: Indices,
     force: Array,
     scale: Array,
-    max_condition: float = 1 / RANK_TOLERANCE,
+    max_condition: float = 1 / linear_algebra.RANK_TOLERANCE,
 ) -> NullSpaceSolution:
     """Return tau and lambda for any number of closure rows and actuators.
 
@@ -257,13 +247,14 @@ def null_space_solution(
     if of_actuators.shape[0] == of_actuators.shape[1]:
         scaled = of_actuators / scale[actuated][:, None]
         reason = "the actuated joints do not move all of the mechanism here"
-        tau = solve_transposed(scaled, reduced, max_condition, reason) / scale[actuated]
+        solved = linear_algebra.solve_transposed(scaled, reduced, max_condition, reason)
+        tau = solved / scale[actuated]
     else:
-        effort = least_effort(of_actuators, reduced, weights=scale[actuated])
-        refuse_nearly_singular(effort.values, max_condition)
+        effort = least_effort.least_effort(of_actuators, reduced, weights=scale[actuated])
+        least_effort.refuse_nearly_singular(effort.values, max_condition)
         tau = effort.tau
-        if np.linalg.norm(effort.missing) > RESIDUAL * np.linalg.norm(reduced):
-            remaining = residual_force(motions, effort.missing, scale)
+        if np.linalg.norm(effort.missing) > least_effort.RESIDUAL * np.linalg.norm(reduced):
+            remaining = least_effort.residual_force(motions, effort.missing, scale)
     rest = force.copy() if remaining is None else force - remaining
     rest[actuated] -= tau
     return NullSpaceSolution(tau, factors.transposed_least_norm(scale * rest), remaining)

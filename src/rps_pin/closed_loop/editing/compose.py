@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from rps_pin.closed_loop.constraints.closures import frame_id
 from rps_pin.closed_loop.editing.rebuild import copy_joint_properties
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.validation import fixed_array, inertia_fault, positive_number, real_vector
@@ -67,7 +68,7 @@ def compose(parts: Mapping[str, Part], *, name: str = "") -> pin.Model:
     _check(parts)
     whole = pin.Model()
     for key, part in parts.items():
-        parent = _parent_frame(whole, key, part)
+        parent = frame_id(whole, part.parent, f"parent of part {key!r}")
         own = _prefixed(part.model, key)
         before = whole
         try:
@@ -152,17 +153,6 @@ def _check(parts: Mapping[str, Part]) -> None:
                 f"parts in one world are in one gravity: that of {first!r} is {gravity} m/s^2, "
                 f"that of {key!r} is {other} m/s^2"
             )
-
-
-def _parent_frame(whole: pin.Model, key: str, part: Part) -> int:
-    names = [frame.name for frame in whole.frames]
-    if names.count(part.parent) == 1:
-        return names.index(part.parent)
-    if part.parent in names:
-        raise MechanismError(f"part {key!r}: several frames are called {part.parent!r}")
-    raise MechanismError(
-        f"part {key!r}: no frame {part.parent!r} before it; there are: {', '.join(names)}"
-    )
 
 
 def _prefixed(model: pin.Model, key: str) -> pin.Model:

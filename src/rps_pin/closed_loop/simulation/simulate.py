@@ -21,12 +21,7 @@ from rps_pin.closed_loop.constraints.system import Mechanism
 from rps_pin.closed_loop.dynamics.generalised_forces import energy
 from rps_pin.closed_loop.dynamics.inverse_dynamics import constraint_forces
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
-from rps_pin.closed_loop.simulation.integrators import (
-    RK4_WEIGHTS,
-    AdaptiveStepper,
-    rk4_step,
-    times,
-)
+from rps_pin.closed_loop.simulation import integrators
 from rps_pin.closed_loop.simulation.motion import (
     Controller,
     Drive,
@@ -136,13 +131,13 @@ def simulate(
     motion = Motion(system, start, drive, baumgarte_gain if closing == "baumgarte" else 0.0)
     advance = _fixed(motion)
     if method == "adaptive":
-        stepper = AdaptiveStepper(system.model, tolerance, min(step, duration))
+        stepper = integrators.AdaptiveStepper(system.model, tolerance, min(step, duration))
         advance = _Adaptive(motion, stepper, start, None if controller else duration)
     recorder = Recorder(system.model, system.actuated)
     time, shown, work = 0.0, 0.0, 0.0
     try:
         state, gap = start, motion.gap(start[0])
-        grid = list(times(duration, step))
+        grid = list(integrators.times(duration, step))
         followers = [*(t for _, t in grid[1:]), None]
         for (k, time), following in zip(grid, followers, strict=True):
             drive.command(time, *state)
@@ -197,9 +192,9 @@ def _fixed(motion: Motion) -> _Advance:
             powers.append(motion.power)
             return a
 
-        moved = rk4_step(motion.model, acceleration, time, state, following - time, a)
-        work = (following - time) * sum(w * p for w, p in zip(RK4_WEIGHTS, powers, strict=True))
-        return *motion.finish(moved), work
+        step = following - time
+        moved = integrators.rk4_step(motion.model, acceleration, time, state, step, a)
+        return *motion.finish(moved), step * float(np.dot(integrators.RK4_WEIGHTS, powers))
 
     return advance
 
@@ -212,7 +207,11 @@ class _Adaptive:
     """
 
     def __init__(
-        self, motion: Motion, stepper: AdaptiveStepper, start: State, horizon: float | None
+        self,
+        motion: Motion,
+        stepper: integrators.AdaptiveStepper,
+        start: State,
+        horizon: float | None,
     ) -> None:
         self._motion, self._stepper, self._horizon = motion, stepper, horizon
         self._time, self._state, self._gap = 0.0, start, 0.0
