@@ -7,11 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin.numerics.linear_algebra import (
+    Decomposition,
     condition_number,
     full_svd,
-    least_norm,
     null_space,
-    pseudo_inverse,
     rank,
     singular_values,
 )
@@ -72,15 +71,22 @@ def test_a_matrix_of_rounding_errors_has_no_rank() -> None:
     assert rank(np.array([1e6, 1.0, 1e-5])) == 2
     assert null_space(np.full((2, 3), 1e-15)).shape == (3, 3)
     assert condition_number(np.full((2, 1), 1e-15)) == np.inf
-    np.testing.assert_array_equal(pseudo_inverse(np.full((2, 3), 1e-15)), np.zeros((3, 2)))
+    nothing = Decomposition(np.full((2, 3), 1e-15))
+    np.testing.assert_array_equal(nothing.least_norm(np.eye(2)), np.zeros((3, 2)))
 
 
 @pytest.mark.parametrize(("r", "rows", "columns"), [(3, 3, 5), (2, 6, 5), (5, 6, 5), (1, 1, 1)])
 def test_least_norm_solution_is_numpy_s(r: int, rows: int, columns: int) -> None:
     a, b = matrix(r, rows, columns), np.random.default_rng(1).normal(size=(rows, 2))
     expected, *_ = np.linalg.lstsq(a, b, rcond=1e-9)
-    np.testing.assert_allclose(least_norm(a, b), expected, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(pseudo_inverse(a), np.linalg.pinv(a, 1e-9), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(Decomposition(a).least_norm(b), expected, rtol=0, atol=1e-12)
+    inverse = np.linalg.pinv(a, 1e-9)
+    found = Decomposition(a)
+    np.testing.assert_allclose(found.least_norm(np.eye(len(a))), inverse, rtol=0, atol=1e-12)
+    transposed = found.transposed_least_norm(np.eye(a.shape[1]))
+    np.testing.assert_allclose(transposed, inverse.T, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(a @ found.null_space(), 0, rtol=0, atol=1e-12)
+    assert found.null_space().shape == (a.shape[1], a.shape[1] - np.linalg.matrix_rank(a, 1e-9))
 
 
 @pytest.mark.parametrize("shape", [(3, 5), (5, 3), (4, 4), (0, 3), (3, 0)])

@@ -239,21 +239,13 @@ def _rank_at(system: ConstraintSystem, q: Array) -> int:
 def _joint(model: pin.Model, index: int, actuated: tuple[str, ...]) -> JointDescription:
     joint = model.joints[index]
     name, short = model.names[index], joint.shortname()
-    span = slice(joint.idx_q, joint.idx_q + joint.nq)
+    bounds = np.array([model.lowerPositionLimit, model.upperPositionLimit])
     kind = _JOINT_KINDS.get(short) or _JOINT_KINDS.get(short[:11], short)
-    huge = 0.5 * np.finfo(np.float64).max
+    bounds = bounds[:, joint.idx_q : joint.idx_q + joint.nq]
     bounded = joint.nq == joint.nv  # quaternions and full turns have none
-    lower = [x if bounded and x > -huge else -np.inf for x in model.lowerPositionLimit[span]]
-    upper = [x if bounded and x < huge else np.inf for x in model.upperPositionLimit[span]]
-    return JointDescription(
-        name,
-        kind,
-        joint.nq,
-        joint.nv,
-        name in actuated,
-        tuple(map(float, lower)),
-        tuple(map(float, upper)),
-    )
+    bounded = bounded & (np.abs(bounds) < 0.5 * np.finfo(np.float64).max)
+    limits = np.where(bounded, bounds, [[-np.inf], [np.inf]]).tolist()
+    return JointDescription(name, kind, joint.nq, joint.nv, name in actuated, *map(tuple, limits))
 
 
 def _closure(

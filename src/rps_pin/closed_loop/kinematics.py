@@ -93,7 +93,7 @@ def _completed(
     left = system.scaled(jacobian)[:, rest]
     system.refuse_singular(linear_algebra.condition_number(left))
     right = -system.row_scale * right
-    scaled = linear_algebra.least_norm(left, right)
+    scaled = linear_algebra.Decomposition(left).least_norm(right)
     opening = float(np.abs(left @ scaled - right).max(initial=0.0))
     size = float(np.abs(right).max(initial=0.0))
     if opening > _CONSISTENT * max(size, 1e-3):

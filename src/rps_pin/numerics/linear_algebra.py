@@ -107,18 +107,6 @@ def null_space(matrix: Array) -> Array:
     return right[rank(values) :].T
 
 
-def pseudo_inverse(matrix: Array) -> Array:
-    """Return the pseudo-inverse, singular values that do not count taken as zero."""
-    left, values, right = np.linalg.svd(matrix, full_matrices=False)
-    count = rank(values)
-    return np.asarray((right[:count].T / values[:count]) @ left[:, :count].T)
-
-
-def least_norm(matrix: Array, right: Array) -> Array:
-    """Return the least-squares solution x of A x = b of least norm, shape (n,) or (n, k)."""
-    return pseudo_inverse(matrix) @ right
-
-
 def condition_number(matrix: Array) -> float:
     """Return the largest singular value over the smallest of a matrix that must not lose a column.
 

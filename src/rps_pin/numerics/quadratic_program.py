@@ -104,10 +104,19 @@ class LeastDistance:
             return NearestPoint(np.zeros(rows.shape[1]), NONE_ACTIVE.limits, np.zeros(0), 0)
         if not rows.shape[1]:
             return None
-        scaled = _scaled(rows, lower, upper, size)
-        if scaled is None:
-            return None
-        problem, (of_limits, of_x) = scaled
+        # Made of rows of length one, and an x of the order of one.
+        norms = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+        constant = norms <= _CONSTANT * norms.max()
+        beyond = np.maximum(lower, -upper)
+        if beyond.max(where=constant, initial=0.0) > EXACT * size:
+            return None  # a limit on which x has no influence
+        norms[constant] = 1.0
+        size = size + float((beyond / norms).max(where=~constant, initial=0.0))
+        problem = (
+            np.where(constant[:, None], 0.0, rows / norms[:, None]),
+            np.where(constant, -np.inf, lower / (norms * size)),
+            np.where(constant, np.inf, upper / (norms * size)),
+        )
         x, iterations = self._by_proxqp(*problem)
         active = active_limits(x, *problem)
         point = nearest_with(active, *problem, EXACT)
@@ -119,8 +128,8 @@ class LeastDistance:
         self._active = active
         self._multipliers[:] = 0
         self._multipliers[active.limits] = point.multipliers
-        multipliers = point.multipliers * of_limits[active.limits]
-        return NearestPoint(of_x * point.x, active.limits, multipliers, iterations)
+        multipliers = point.multipliers * (size / norms[active.limits])
+        return NearestPoint(size * point.x, active.limits, multipliers, iterations)
 
     def _by_proxqp(self, rows: Array, lower: Array, upper: Array) -> tuple[Array, int]:
         n = rows.shape[1]
@@ -168,29 +177,6 @@ def nearest_with(
         if (pulls > 0) == is_upper and lower[limit] < upper[limit]:
             return None
     return NearestPoint(x, limits, -pull, 0)
-
-
-def _scaled(
-    rows: Array, lower: Array, upper: Array, size: float
-) -> tuple[tuple[Array, Array, Array], tuple[Array, float]] | None:
-    """Return the problem with rows of length one and x of the order of one, and the units.
-
-    None if a limit is broken on which x has no influence. The units are what the scaled multipliers
-    and the scaled x are to be multiplied with.
-    """
-    norms = np.sqrt(np.einsum("ij,ij->i", rows, rows))
-    constant = norms <= _CONSTANT * norms.max()
-    beyond = np.maximum(lower, -upper)
-    if beyond.max(where=constant, initial=0.0) > EXACT * size:
-        return None
-    norms[constant] = 1.0
-    size = size + float((beyond / norms).max(where=~constant, initial=0.0))
-    problem = (
-        np.where(constant[:, None], 0.0, rows / norms[:, None]),
-        np.where(constant, -np.inf, lower / (norms * size)),
-        np.where(constant, np.inf, upper / (norms * size)),
-    )
-    return problem, (size / norms, size)
 
 
 def active_limits(x: Array, rows: Array, lower: Array, upper: Array) -> ActiveSet:

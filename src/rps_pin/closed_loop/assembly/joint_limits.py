@@ -22,12 +22,10 @@ class JointLimits:
 
     def __init__(self, model: pin.Model) -> None:
         joints = [joint for joint in list(model.joints)[1:] if joint.nq == joint.nv]
-        spans = [np.arange(joint.nv) for joint in joints]
-        none = [np.zeros(0, np.intp)]
-        pairs = list(zip(joints, spans, strict=True))
-        self.q = np.concatenate(none + [joint.idx_q + span for joint, span in pairs])
-        self.v = np.concatenate(none + [joint.idx_v + span for joint, span in pairs])
-        self.names = [model.names[joint.id] for joint, span in pairs for _ in span]
+        pairs = [(joint, k) for joint in joints for k in range(joint.nv)]
+        self.q = np.array([joint.idx_q + k for joint, k in pairs], dtype=np.intp)
+        self.v = np.array([joint.idx_v + k for joint, k in pairs], dtype=np.intp)
+        self.names = [model.names[joint.id] for joint, _ in pairs]
         self.lower = model.lowerPositionLimit[self.q]
         self.upper = model.upperPositionLimit[self.q]
         self._nv = model.nv

@@ -105,7 +105,17 @@ class LoopClosure:
         object.__setattr__(self, "axis", None if self.kind in _WITHOUT_AXIS else axis)
         axis_b = self._direction("axis_b", (0.0, 1.0, 0.0) if universal else axis)
         object.__setattr__(self, "axis_b", axis_b if self.kind in _WITH_AXIS_OF_B else None)
-        self._check_distance()
+        given, is_rod = self.distance, self.kind == "distance"
+        if not is_rod and given is not None:
+            raise MechanismError(
+                f"closure {self.name!r}: a distance belongs to kind 'distance' only, not to "
+                f"{self.kind!r}"
+            )
+        if is_rod and not (isinstance(given, (int, float)) and 0 < given < math.inf):
+            raise MechanismError(
+                f"closure {self.name!r}: distance = {given!r}; it must be a positive length in m"
+            )
+        object.__setattr__(self, "distance", given and float(given))
 
     def _direction(self, option: str, default: Vector) -> Vector:
         """Return an axis as a unit vector, or say what is wrong with it."""
@@ -129,21 +139,6 @@ class LoopClosure:
         if not 0 < length < math.inf:
             raise MechanismError(f"closure {self.name!r}: {option} = {given!r} has no direction")
         return x / length, y / length, z / length
-
-    def _check_distance(self) -> None:
-        given = self.distance
-        if self.kind != "distance":
-            if given is not None:
-                raise MechanismError(
-                    f"closure {self.name!r}: a distance belongs to kind 'distance' only, not to "
-                    f"{self.kind!r}"
-                )
-            return
-        if not isinstance(given, (int, float)) or not 0 < given < math.inf:
-            raise MechanismError(
-                f"closure {self.name!r}: distance = {given!r}; it must be a positive length in m"
-            )
-        object.__setattr__(self, "distance", float(given))
 
     @property
     def size(self) -> int:
@@ -251,6 +246,14 @@ class JointCoupling:
 
 
 Closure = LoopClosure | JointCoupling
+
+
+def joint_id(model: pin.Model, name: str, asked_by: str) -> int:
+    """Return the index of a joint, or say which joints there are."""
+    names = list(model.names)[1:]  # not the world's
+    if name not in names:
+        raise MechanismError(f"{asked_by}: no joint {name!r}; there are: {', '.join(names)}")
+    return names.index(name) + 1
 
 
 def frame_id(model: pin.Model, name: str, asked_by: str = "") -> int:

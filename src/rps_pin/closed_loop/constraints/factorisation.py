@@ -55,7 +55,14 @@ class PassiveFactorisation:
         # eigenpy takes a vector of one number for a matrix: one row is not counted as square.
         self._square = rows.size == passive.size > 1
         self._lu = eigenpy.PartialPivLU(passive.size)
-        self._harmless_rcond = self._least_harmless_rcond()
+        # Above this estimate of the reciprocal condition no closer look is needed. The estimate is
+        # in the 1-norm, without scaling, and rarely off by more than a factor of 3 (Higham). The
+        # norms differ by at most a factor of the size, the scaling by at most the ratios of its
+        # factors; one of 100 is for the estimate.
+        self._harmless_rcond = 0.0
+        if self._square:
+            spread = math.exp(sum(float(np.ptp(np.log(scale))) for scale in self.scales))
+            self._harmless_rcond = min(100 * passive.size * spread / max_condition, 1.0)
 
     def condition(self, passive_jacobian: Array) -> float:
         """Return the condition number of J_p, shape (nc, np), in one unit."""
@@ -118,18 +125,6 @@ class PassiveFactorisation:
         if not well or factors.passive_motion(jacobian[:, self._actuated])[1] > RANK_TOLERANCE:
             return None
         return factors
-
-    def _least_harmless_rcond(self) -> float:
-        """Return the estimate of the reciprocal condition above which no closer look is needed.
-
-        The estimate is in the 1-norm, without scaling, and rarely off by more than a factor of 3
-        (Higham). The norms differ by at most a factor of the size, the scaling by at most the
-        ratios of its factors; one of 100 is for the estimate.
-        """
-        if not self._square:
-            return 0.0
-        spread = sum(float(np.ptp(np.log(scale))) for scale in self.scales)
-        return min(100 * self._passive.size * math.exp(spread) / self._max_condition, 1.0)
 
 
 class _TallFactors:

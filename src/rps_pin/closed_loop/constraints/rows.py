@@ -301,19 +301,13 @@ class Stack(Rows):
         return np.concatenate([part.slope_rate(placement, twist) for part in self.parts])
 
 
-class WholeRows(Rows):
+class WholeRows(Stack):
     """The frames coincide. Of all six rows any basis will do: W = 1, Pinocchio's own rows."""
 
-    angular = np.arange(6) >= 3
-    _parts = (PointRows(np.eye(3)), FrameRows())
+    bias, slope, slope_rate = Rows.bias, Rows.slope, Rows.slope_rate
 
-    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
-        """Return the sum of both parts."""
-        return sum([part.squared_gap(lever, p, R) for part in self._parts])
-
-    def gap(self, placement: pin.SE3) -> Array:
-        """Return the distance and the rotation vector from b to a."""
-        return np.concatenate([part.gap(placement) for part in self._parts])
+    def __init__(self) -> None:
+        super().__init__([PointRows(np.eye(3)), FrameRows()])
 
     def wrenches(self, placement: pin.SE3) -> Array:
         """Return 1."""

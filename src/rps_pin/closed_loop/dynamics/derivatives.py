@@ -34,7 +34,7 @@ from rps_pin.closed_loop.dynamics.inverse_dynamics import constraint_forces, inv
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
 from rps_pin.closed_loop.editing.split import split
 from rps_pin.closed_loop.kinematics import motion_basis
-from rps_pin.numerics.linear_algebra import pseudo_inverse
+from rps_pin.numerics.linear_algebra import Decomposition
 
 Solved = Callable[[Array], Array]
 
@@ -180,9 +180,9 @@ class DynamicsDerivatives:
         jacobian = system.equations.jacobian(q).copy()
         solve = system.factorisation.passive_motion
         if solve(jacobian, np.zeros((system.equations.size, 1))) is None:
-            inverse = pseudo_inverse(system.scaled(jacobian))
-            unscaled = system.column_scale[:, None] * inverse * system.row_scale
-            return lambda right: unscaled @ right
+            factors = Decomposition(system.scaled(jacobian))
+            rows, columns = system.row_scale[:, None], system.column_scale[:, None]
+            return lambda right: columns * factors.least_norm(rows * right)
 
         def solved(right: Array) -> Array:
             x = np.zeros((system.model.nv, right.shape[1]))

@@ -121,12 +121,9 @@ class ForceDistribution:
             rows = mechanism.rows(bound.closure)
             direction[rows] = bound.combination(rows.stop - rows.start)
         self._bounded = self._directions * self._rows
-        self._lower = np.concatenate(
-            [self.weights * self.lower, [bound.lower for bound in self.bounds]]
-        )
-        self._upper = np.concatenate(
-            [self.weights * self.upper, [bound.upper for bound in self.bounds]]
-        )
+        limits = np.reshape([(bound.lower, bound.upper) for bound in self.bounds], (-1, 2))
+        self._lower = np.concatenate([self.weights * self.lower, limits[:, 0]])
+        self._upper = np.concatenate([self.weights * self.upper, limits[:, 1]])
         self._limited = bool(np.isfinite([self._lower, self._upper]).any())
         self._names = [*self._actuator_names(), *(bound.name for bound in self.bounds)]
         self._nearest = LeastDistance(self._lower.size)
@@ -188,14 +185,8 @@ class ForceDistribution:
             multipliers += self._rows * (self._redundant(factors) @ redundant)
         rest = force - multipliers @ jacobian
         rest[self._actuated] -= tau
-        return DistributedForces(
-            tau,
-            multipliers,
-            math.sqrt(rest @ rest),
-            math.sqrt(effort @ effort),
-            names,
-            iterations,
-        )
+        residual, size = math.sqrt(rest @ rest), math.sqrt(effort @ effort)
+        return DistributedForces(tau, multipliers, residual, size, names, iterations)
 
     def _unlimited(self, factors: Decomposition, force: Array, aim: Array) -> tuple[Array, Array]:
         """Return W (tau_l - tau_0), shape (na,), and W F, shape (na, na - rank).

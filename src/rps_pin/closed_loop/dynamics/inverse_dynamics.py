@@ -193,14 +193,8 @@ def _by_null_space(system: ConstraintSystem, jacobian: Array, force: Array) -> I
     if unproduced is not None:
         error -= unproduced
     residual = float(np.linalg.norm(error[system.passive]))
-    return InverseDynamics(
-        tau,
-        multipliers,
-        residual,
-        system.factorisation.scales,
-        jacobian.take(system.passive, axis=1),
-        unproduced,
-    )
+    scales, passive_jacobian = system.factorisation.scales, jacobian.take(system.passive, axis=1)
+    return InverseDynamics(tau, multipliers, residual, scales, passive_jacobian, unproduced)
 
 
 class NullSpaceSolution(NamedTuple):

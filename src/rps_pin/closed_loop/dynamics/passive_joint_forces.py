@@ -19,6 +19,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.constraints.closures import joint_id
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number, tanh
@@ -159,11 +160,8 @@ def refuse_springs(model: pin.Model, effects: JointEffects) -> None:
 def by_joint(model: pin.Model, values: Mapping[str, ArrayLike], what: str) -> Array:
     """Return values given by joint names as an array of shape (nv,), zero where none is given."""
     array = np.zeros(model.nv)
-    names = list(model.names)[1:]
     for name, value in values.items():
-        if name not in names:
-            raise MechanismError(f"{what}: no joint {name!r}; there are: {', '.join(names)}")
-        joint = model.joints[model.getJointId(name)]
+        joint = model.joints[joint_id(model, name, what)]
         if what in ("stiffness", "rest") and not joint.nq == joint.nv == 1:
             raise MechanismError(f"{what}: joint {name!r} has {joint.nq} coordinates, not one")
         try:

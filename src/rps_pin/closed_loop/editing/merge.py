@@ -23,6 +23,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.closures import joint_id
 from rps_pin.closed_loop.editing.rebuild import JointRow, NewJoint, rebuilt
 from rps_pin.errors import MechanismError
 from rps_pin.validation import real_vector
@@ -165,11 +166,7 @@ def _merged_joint(model: pin.Model, merge: JointMerge, row: list[int]) -> JointR
 def _row(model: pin.Model, merge: JointMerge) -> list[int]:
     """Return the indices of the joints to merge, which are in a row and meet in a point."""
     what = f"merge {merge.name!r}"
-    names = list(model.names)[1:]
-    for name in merge.joints:
-        if name not in names:
-            raise MechanismError(f"{what}: no joint {name!r}; there are: {', '.join(names)}")
-    row = [int(model.getJointId(name)) for name in merge.joints]
+    row = [joint_id(model, name, what) for name in merge.joints]
     for joint in row:
         _axis(model, joint, what)
     for first, second in pairwise(row):

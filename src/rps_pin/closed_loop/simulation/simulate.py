@@ -216,7 +216,6 @@ class _Adaptive:
         self._motion, self._stepper, self._horizon = motion, stepper, horizon
         self._time, self._state, self._gap = 0.0, start, 0.0
         self._at: Callable[[float], State] = lambda _: start
-        self._power: Callable[[], float] = lambda: motion.power
 
     def __call__(
         self, time: float, state: State, following: float, a: Array
@@ -228,11 +227,11 @@ class _Adaptive:
         while self._time < following:
             if self._time > time:
                 work += self._stepper.work(self._time)
-            end, self._at = self._stepper.step(
-                self._motion.acceleration, self._time, self._state, until, self._power
+            motion = self._motion
+            self._time, self._at = self._stepper.step(
+                motion.acceleration, self._time, self._state, until, lambda: motion.power
             )
-            self._time = end
-            self._state, self._gap = self._motion.finish(self._at(end))
+            self._state, self._gap = motion.finish(self._at(self._time))
         work += self._stepper.work(following)
         if following == self._time:
             return self._state, self._gap, work
