@@ -224,10 +224,10 @@ class _Adaptive:
             self._time, self._state = time, state
         until = following if self._horizon is None else self._horizon
         work = -self._stepper.work(time) if self._time > time else 0.0
+        motion = self._motion
         while self._time < following:
             if self._time > time:
                 work += self._stepper.work(self._time)
-            motion = self._motion
             self._time, self._at = self._stepper.step(
                 motion.acceleration, self._time, self._state, until, lambda: motion.power
             )
@@ -235,4 +235,4 @@ class _Adaptive:
         work += self._stepper.work(following)
         if following == self._time:
             return self._state, self._gap, work
-        return *self._motion.finish(self._at(following)), work
+        return *motion.finish(self._at(following)), work
