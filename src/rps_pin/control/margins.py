@@ -104,9 +104,8 @@ def loop_margins(
     value = axis.response(t)
     nyquist = 0.5 / period
     crossings = _unit_gain(axis.response, t, value)
-    if crossings.size == 0:  # the whole curve is inside the unit circle: all gains are zero
-        return LoopMargins(False, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    crossover = float(nyquist * crossings[-1] / np.pi)
+    # Without a crossing the whole curve is inside the unit circle: all gains are zero.
+    crossover = float(nyquist * crossings[-1] / np.pi) if crossings.size else 0.0
     if axis.kp == 0 or np.abs(np.linalg.eigvals(axis.matrix())).max() >= 1:
         return LoopMargins(False, 1.0, 1.0, 0.0, 0.0, 0.0, crossover, 0.0)
     factors = _critical_factors(axis.response, t, value)

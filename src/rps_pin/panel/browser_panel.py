@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any, Self
 
 from rps_pin.errors import RPSPinError
-from rps_pin.panel.panel import Panel
+from rps_pin.panel.panel import Panel, Slider
 from rps_pin.viewer import Layer, View
 from rps_pin.viewer.writers.viser_writer import ViserWriter
 
@@ -72,7 +72,10 @@ class BrowserPanel:
             self.url = f"http://{HOST}:{self._server.get_port()}"
             self._server.gui.add_markdown(f"## {title}")
             self._sliders = {
-                group: [self._slider(group, k) for k in range(len(sliders))]
+                group: [
+                    (slider, self._handle(group, slider, value))
+                    for slider, value in zip(sliders, panel.values(group).tolist(), strict=True)
+                ]
                 for group, sliders in panel.groups.items()
             }
             self._text = self._server.gui.add_html("")
@@ -107,16 +110,15 @@ class BrowserPanel:
 
     def move(self, group: str, shown: Sequence[float]) -> None:
         """Set the sliders of a group, in the units they show, as a user of the page does."""
-        for slider, value in zip(self._sliders[group], shown, strict=True):
-            slider.value = value
+        for (_, handle), value in zip(self._sliders[group], shown, strict=True):
+            handle.value = value
 
     def shown(self, group: str) -> list[float]:
         """Return where the sliders of a group are, in the units they show."""
-        return [float(slider.value) for slider in self._sliders[group]]
+        return [float(handle.value) for _, handle in self._sliders[group]]
 
-    def _slider(self, group: str, number: int) -> Any:
-        slider = self._panel.groups[group][number]
-        now = slider.scale * float(self._panel.values(group)[number])
+    def _handle(self, group: str, slider: Slider, value: float) -> Any:
+        now = slider.scale * value
         handle = self._server.gui.add_slider(
             slider.name,
             min=min(slider.low, now),
@@ -132,8 +134,8 @@ class BrowserPanel:
         with self._lock:
             if self._following:  # set here, not by a user
                 return
-            pairs = zip(self._sliders[group], self._panel.groups[group], strict=True)
-            self._panel.move(group, [handle.value / slider.scale for handle, slider in pairs])
+            values = [handle.value / slider.scale for slider, handle in self._sliders[group]]
+            self._panel.move(group, values)
             self.view.display(self._panel.configuration)
             self._update(moved=group)
 
@@ -143,10 +145,8 @@ class BrowserPanel:
         self._following = True
         try:
             for group in self._panel.groups.keys() - {moved}:
-                sliders, values = self._panel.groups[group], self._panel.values(group).tolist()
-                for handle, slider, value in zip(
-                    self._sliders[group], sliders, values, strict=True
-                ):
+                values = self._panel.values(group).tolist()
+                for (slider, handle), value in zip(self._sliders[group], values, strict=True):
                     handle.value = min(max(slider.scale * value, handle.min), handle.max)
         finally:
             self._following = False

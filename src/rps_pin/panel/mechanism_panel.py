@@ -57,7 +57,10 @@ class MechanismPanel:
                 )
         self._limits = JointLimits(model)
         self._q: Array = mechanism.close(mechanism.home if q is None else q)
-        self._angular = ["P" not in joint.shortname()[10:11] for joint in self._joints]
+        self._units = [
+            (_MM, "mm", "N") if "P" in joint.shortname()[10:11] else (_DEGREE, "degrees", "N m")
+            for joint in self._joints
+        ]
         self.groups = {"joints": tuple(map(self._slider, range(len(self._joints))))}
         self._take(self._q)
 
@@ -79,20 +82,17 @@ class MechanismPanel:
 
     def readings(self) -> list[tuple[str, str]]:
         """Return the joints, the forces that hold the weight, the conditioning and the loop gap."""
+        names, units = self.mechanism.actuated, self._units
         rows = [
-            (name, quantity(value, _DEGREE, "degrees") if angular else quantity(value, _MM, "mm"))
-            for name, value, angular in zip(
-                self.mechanism.actuated, self.values(), self._angular, strict=True
-            )
+            (name, quantity(value, scale, unit))
+            for name, value, (scale, unit, _) in zip(names, self.values(), units, strict=True)
         ]
         if isinstance(self._held, str):
             rows.append(("holds", self._held))
         else:
             rows += [
-                (f"holds: {name}", quantity(tau, 1.0, "N m" if angular else "N"))
-                for name, tau, angular in zip(
-                    self.mechanism.actuated, self._held, self._angular, strict=True
-                )
+                (f"holds: {name}", quantity(tau, 1.0, unit))
+                for name, tau, (_, _, unit) in zip(names, self._held, units, strict=True)
             ]
         conditioning = 1.0 / self.mechanism.condition(self._q)
         words = f"{conditioning:.4f} (0 singular, 1 best)"
@@ -126,25 +126,19 @@ class MechanismPanel:
         if isinstance(self._held, str):
             return words
         model = self.mechanism.model
-        for name, joint, tau, angular in zip(
-            self.mechanism.actuated, self._joints, self._held.tolist(), self._angular, strict=True
-        ):
+        joints = zip(self.mechanism.actuated, self._joints, self._units, strict=True)
+        for (name, joint, (*_, unit)), tau in zip(joints, self._held.tolist(), strict=True):
             low, high = model.lowerEffortLimit[joint.idx_v], model.upperEffortLimit[joint.idx_v]
             if not low <= tau <= high:
-                unit = "N m" if angular else "N"
-                words.append(
-                    f"joint {name!r} would need {tau:.6g} {unit} ({low:.6g} to {high:.6g})"
-                )
+                need = f"would need {tau:.6g} {unit} ({low:.6g} to {high:.6g})"
+                words.append(f"joint {name!r} {need}")
         return words
 
     def _slider(self, number: int) -> Slider:
-        joint, angular = self._joints[number], self._angular[number]
-        model = self.mechanism.model
-        low = float(model.lowerPositionLimit[joint.idx_q])
-        high = float(model.upperPositionLimit[joint.idx_q])
-        scale, unit = (_DEGREE, "degrees") if angular else (_MM, "mm")
-        here = float(self._q[joint.idx_q])
+        index, (scale, unit, _) = self._joints[number].idx_q, self._units[number]
+        model, here = self.mechanism.model, float(self._q[index])
+        low, high = float(model.lowerPositionLimit[index]), float(model.upperPositionLimit[index])
         if not high - low < 1e3:  # no limits
-            low, high = (-math.pi, math.pi) if angular else (here - 1.0, here + 1.0)
+            low, high = (-math.pi, math.pi) if unit == "degrees" else (here - 1.0, here + 1.0)
         name = f"{self.mechanism.actuated[number]} ({unit})"
         return Slider(name, scale * low, scale * high, scale * (high - low) / 1000, scale)

@@ -97,9 +97,9 @@ class RPSPanel:
         q = self._free.state(pose, _STILL, _STILL)[0]
         legs = self._free.inverse_kinematics(pose)
         force = self._free.actuator_forces(pose, _STILL, _STILL)
-        position, self._rotation = self._free.platform_placement(pose)
+        self.position, self._rotation = self._free.platform_placement(pose)
         self.pose, self._q, self.force = pose.copy(), q, force
-        self.position, self.length, self.angle = position, legs.length, legs.angle
+        self.length, self.angle = legs.length, legs.angle
         self.trouble = self._limits()
 
     def _limits(self) -> list[str]:
@@ -108,12 +108,11 @@ class RPSPanel:
         cone = cone_angles(self.angle, self._rotation, p.spherical_rest_angle)
         words = [str(one) for one in violations(p, self.length, self.angle, cone)]
         limit = p.actuator_force_limit
-        words += [
+        return words + [
             f"leg {leg}: force would be {force:.6g} N; its limit is {limit:.6g} N"
             for leg, force in enumerate(self.force.tolist(), start=1)
             if abs(force) > limit
         ]
-        return words
 
 
 def _middle(parameters: RPSParameters) -> Array:
@@ -136,13 +135,9 @@ def _groups(parameters: RPSParameters, height: float) -> dict[str, tuple[Slider,
     lowest, highest = max(low - room, 0.01 * high), high + room
     tilt = _DEGREE * _LARGEST_TILT
     step = round(_MM * (highest - lowest) / 2000, 3) or 0.001
-    return {
-        "pose": (
-            Slider("height (mm)", _MM * lowest, _MM * highest, step, _MM),
-            Slider("tilt about x (degrees)", -tilt, tilt, 0.05, _DEGREE),
-            Slider("tilt about y (degrees)", -tilt, tilt, 0.05, _DEGREE),
-        ),
-        "lengths": tuple(
-            Slider(f"leg {leg} (mm)", _MM * lowest, _MM * highest, step, _MM) for leg in (1, 2, 3)
-        ),
-    }
+    height_slider, *legs = (
+        Slider(f"{name} (mm)", _MM * lowest, _MM * highest, step, _MM)
+        for name in ("height", "leg 1", "leg 2", "leg 3")
+    )
+    tilts = [Slider(f"tilt about {axis} (degrees)", -tilt, tilt, 0.05, _DEGREE) for axis in "xy"]
+    return {"pose": (height_slider, *tilts), "lengths": tuple(legs)}

@@ -92,15 +92,8 @@ def motion_of(subject: DisplayedMechanism, given: Any = None) -> Motion:
     if isinstance(given, Motion):
         return given
     if isinstance(given, Simulation):
-        return Motion(
-            model,
-            given.time,
-            given.q,
-            given.v,
-            given.a,
-            forces=given.tau,
-            constraint_forces=given.constraint_forces,
-        )
+        states, reactions = (given.q, given.v, given.a), given.constraint_forces
+        return Motion(model, given.time, *states, forces=given.tau, constraint_forces=reactions)
     if robot is None:
         return Motion(model, [0.0], _one(subject.mechanism.home if given is None else given, model))
     if isinstance(given, MotionRun):
@@ -119,8 +112,7 @@ def configuration_of(subject: DisplayedMechanism, given: Any) -> Array:
     """Return a configuration (nq,), given as such or as a pose (3,) of a 3-RPS."""
     if subject.robot is not None and np.shape(given) == (3,):
         still = np.zeros(3)
-        q: Array = subject.robot.state(given, still, still)[0]
-        return q
+        return subject.robot.state(given, still, still)[0]
     return _one(given, subject.model).ravel()
 
 

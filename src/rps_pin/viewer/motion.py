@@ -99,14 +99,10 @@ class Motion:
 
         Before the start and after the end it is the first and the last configuration.
         """
-        before, fraction = self._locate(elapsed)
+        (before, fraction), q = self._locate(elapsed), self.configurations
         if fraction == 0.0:
-            given: Array = self.configurations[before]
-            return given
-        between: Array = pin.interpolate(
-            self._model, self.configurations[before], self.configurations[before + 1], fraction
-        )
-        return between
+            return np.asarray(q[before])
+        return np.asarray(pin.interpolate(self._model, q[before], q[before + 1], fraction))
 
     def state_at(self, elapsed: float) -> MotionState:
         """Return configuration, velocity and acceleration `elapsed` seconds after the first."""
@@ -114,8 +110,7 @@ class Motion:
         after = before + (fraction > 0.0)
 
         def between(rows: Array) -> Array:
-            row: Array = (1.0 - fraction) * rows[before] + fraction * rows[after]
-            return row
+            return np.asarray((1.0 - fraction) * rows[before] + fraction * rows[after])
 
         known = (self.forces, self.constraint_forces)
         tau, constraint = (None if rows is None else between(rows) for rows in known)

@@ -46,21 +46,21 @@ def play(
     """
     positive_number(frame_rate, "frame_rate")
     motion = Motion(scene.model, times, configurations)
-    stop = threading.Event() if stop is None else stop
-    if motion.duration == 0.0:
-        scene.display(motion.configurations[0])
-        stop.wait()
-        return
-    follow_clock(
-        motion.duration, lambda elapsed: scene.display(motion.at(elapsed)), stop, frame_rate
-    )
+    follow_clock(motion, lambda elapsed: scene.display(motion.at(elapsed)), stop, frame_rate)
 
 
 def follow_clock(
-    duration: float, show: Callable[[float], None], stop: threading.Event, frame_rate: float
+    motion: Motion,
+    show: Callable[[float], None],
+    stop: threading.Event | None,
+    frame_rate: float,
 ) -> None:
-    """Call `show` with the time since now modulo the duration, s, until `stop` is set."""
-    start = time.monotonic()
+    """Call `show` with the time since now modulo the duration, s, until `stop` is set.
+
+    A motion without a duration is shown once.
+    """
+    duration, start = motion.duration, time.monotonic()
+    stop = threading.Event() if stop is None else stop
     while not stop.is_set():
-        show((time.monotonic() - start) % duration)
-        stop.wait(1.0 / frame_rate)
+        show((time.monotonic() - start) % duration if duration else 0.0)
+        stop.wait(1.0 / frame_rate if duration else None)

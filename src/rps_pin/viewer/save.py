@@ -61,7 +61,7 @@ def save_html(
         If something cannot be shown, or the file cannot be written there.
     """
     target = checked_target(path)
-    text, _ = _page(what, motion, visual, layers, hidden, title, frame_rate)
+    text, _ = _page(what, motion, title, frame_rate, visual=visual, layers=layers, hidden=hidden)
     with whole_file(target) as scratch:
         scratch.write_text(text, encoding="utf-8")
 
@@ -112,7 +112,7 @@ def save_png(
     if target.suffix.lower() != ".png":
         raise InputError(f"{target.name}: a picture is written as .png")
     style = picture_style(size, scale, background, captions)
-    text, view = _page(what, motion, visual, layers, (), title, FRAME_RATE)
+    text, view = _page(what, motion, title, visual=visual, layers=layers)
     if not 0.0 <= time <= view.motion.duration:
         raise InputError(f"time = {time} s; the motion lasts from 0 to {view.motion.duration:g} s")
     [picture] = in_own_thread(lambda stop: list(take_pictures(text, [time], stop, style)))
@@ -163,7 +163,7 @@ def save_video(
     style = picture_style(size, scale, background, captions)
     if background == "transparent":
         raise InputError("a film has no transparent background: give a colour, or none")
-    text, view = _page(what, motion, visual, layers, (), title, FRAME_RATE)
+    text, view = _page(what, motion, title, visual=visual, layers=layers)
     duration = view.motion.duration
     if duration <= 0.0:
         raise InputError("a single pose makes no film: give a motion, or write a picture")
@@ -181,16 +181,13 @@ def save_video(
 def _page(
     what: RPSRobot | ClosedLoopModel,
     motion: Any,
-    visual: pin.GeometryModel | None,
-    layers: Sequence[str | Layer],
-    hidden: Sequence[str | Layer],
     title: str | None,
-    frame_rate: float,
+    frame_rate: float = FRAME_RATE,
+    **shown: Any,
 ) -> tuple[str, View]:
-    """Return a page and the view that it was recorded from."""
+    """Return the page and the view that was recorded on it."""
     recorder = Recorder()
-    view = View(recorder, what, motion, visual=visual, layers=layers, hidden=hidden)
+    view = View(recorder, what, motion, **shown)
     if view.motion.duration > 0.0:
         view.animate(frame_rate=frame_rate)
-    text = recorded_page(recorder, view.scene, view.motion, title or view.subject.title)
-    return text, view
+    return recorded_page(recorder, view.scene, view.motion, title or view.subject.title), view

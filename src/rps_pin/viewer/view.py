@@ -84,11 +84,9 @@ class View:
         self.subject = displayed(what, visual)
         self.motion = motion_of(self.subject, motion)
         on, off = layers_of(layers), layers_of(hidden)
-        framed = [
-            self.motion.configurations,
-            *(layer.configurations(self.subject, self.motion) for layer in on),
-        ]
-        self.scene = Scene(self.subject.model, self.subject.visual, window, np.concatenate(framed))
+        more = [layer.configurations(self.subject, self.motion) for layer in on]
+        framed = np.concatenate([self.motion.configurations, *more])
+        self.scene = Scene(self.subject.model, self.subject.visual, window, framed)
         self._writer = self.scene.writer
         context = LayerContext(self.subject, self.motion, self.scene.box)
         self.drawings: dict[str, DrawnLayer] = {}
@@ -98,7 +96,13 @@ class View:
             name = node_name(drawn.legend.name, self.drawings)
             self.drawings[name] = drawn._replace(legend=replace(drawn.legend, name=name))
             self._visible[name] = len(self._visible) < len(on)
-        self._add_layers()
+            path = f"{LAYERS_NODE}/{name}"
+            for part in drawn.parts:
+                self._writer.add_part(_part_path(path, part), part, casts_shadow=False)
+            if not self._visible[name]:
+                self._writer.set_visible(path, False)
+        if self.drawings:
+            self._send_legend()
         self._update_layers(self.motion.state_at(0.0))
 
     def display(self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None) -> None:
@@ -146,11 +150,7 @@ class View:
 
     def play(self, stop: threading.Event | None = None, *, frame_rate: float = FRAME_RATE) -> None:
         """Show the motion at the speed of its times, in a loop, until `stop` is set or Ctrl-C."""
-        stop = threading.Event() if stop is None else stop
-        if self.motion.duration == 0.0:
-            stop.wait()
-            return
-        follow_clock(self.motion.duration, self.show_moment, stop, frame_rate)
+        follow_clock(self.motion, self.show_moment, stop, frame_rate)
 
     def animate(self, *, frame_rate: float = FRAME_RATE) -> None:
         """Let the window play the motion in a loop, layers included.
@@ -161,26 +161,14 @@ class View:
             If the motion has no duration, or the frame rate is not positive.
         """
         states = list(self.motion.states(frame_rate))
-        keyframes = [
-            node
-            for name, drawn in self.drawings.items()
-            for node in _keyframes(f"{LAYERS_NODE}/{name}", drawn, states)
-        ]
+        keyframes: list[NodeKeyframes] = []
+        for name, drawn in self.drawings.items():
+            keyframes += _keyframes(f"{LAYERS_NODE}/{name}", drawn, states)
         self.scene.animate(self.motion, frame_rate=frame_rate, more=keyframes)
 
     def _show(self, state: MotionState) -> None:
         self.scene.display(state.q)
         self._update_layers(state)
-
-    def _add_layers(self) -> None:
-        for name, drawn in self.drawings.items():
-            path = f"{LAYERS_NODE}/{name}"
-            for part in drawn.parts:
-                self._writer.add_part(_part_path(path, part), part, casts_shadow=False)
-            if not self._visible[name]:
-                self._writer.set_visible(path, False)
-        if self.drawings:
-            self._send_legend()
 
     def _send_legend(self) -> None:
         entries = [drawn.legend for drawn in self.drawings.values()]

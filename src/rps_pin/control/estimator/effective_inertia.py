@@ -96,12 +96,9 @@ def effective_inertia(robot: RPSRobot, pose: ArrayLike, *, space: str = "actuato
     if space == "task":
         return mass.diagonal().copy()
     jacobian = leg_jacobian(geometry, p.platform_radius)
-    if abs(jacobian.determinant) < 1e-8:
-        raise SingularityError(
-            f"the pose is singular: determinant {jacobian.determinant:.3g}",
-            1 / max(abs(jacobian.determinant), 1e-300),
-            1e8,
-        )
+    determinant = jacobian.determinant
+    if abs(determinant) < 1e-8:
+        message = f"the pose is singular: determinant {determinant:.3g}"
+        raise SingularityError(message, 1 / max(abs(determinant), 1e-300), 1e8)
     inverse = np.linalg.inv(np.array(jacobian.K))
-    diagonal: Array = np.einsum("ji,jk,ki->i", inverse, mass, inverse)
-    return diagonal
+    return np.asarray(np.einsum("ji,jk,ki->i", inverse, mass, inverse))

@@ -9,14 +9,7 @@ from rps_pin.control.estimator.leg_geometry import LegGeometry
 from rps_pin.numerics.compiled import compiled
 from rps_pin.rps.kernels import platform
 from rps_pin.rps.kernels.legs import across_leg, along_leg, leg_acceleration
-from rps_pin.rps.kernels.tips import (
-    Ring,
-    at_legs,
-    tip_accelerations,
-    tip_rates,
-    tip_slopes,
-    tips,
-)
+from rps_pin.rps.kernels.tips import Ring, at_legs, tip_accelerations, tip_rates, tip_slopes, tips
 from rps_pin.rps.kinematics.tracking import Triple
 
 #: q (13), v (12), a (12): of legs 1, 2, 3 revolute and prismatic joint, then of the platform

@@ -16,7 +16,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from rich.table import Table
+import numpy as np
+from rich.table import Column, Table
 
 from rps_pin.errors import InputError
 from rps_pin.validation import non_negative_number, positive_number, whole_number
@@ -88,9 +89,8 @@ class ClockReport:
             f"{self.overruns} overruns, the longest by {1e6 * self.longest_overrun:.0f} us, "
             f"{self.skipped} deadlines skipped"
         )
-        table = Table("us", "median", "p99", "p99.9", "maximum", title=title)
-        for column in table.columns[1:]:
-            column.justify = "right"
+        figures = (Column(name, justify="right") for name in ("median", "p99", "p99.9", "maximum"))
+        table = Table("us", *figures, title=title)
         for name in ("interval", "late", "busy"):
             row = [getattr(self, f"{name}_{which}") for which in ("median", "p99", "p999", "max")]
             table.add_row(name, *(f"{1e6 * value:.0f}" for value in row))
@@ -229,16 +229,10 @@ class _Histogram:
         self.count += 1
         self.largest = max(self.largest, value)
 
-    def figures(self) -> tuple[float, float, float, float]:
-        """Return median, p99, p99.9 and maximum, s."""
-        p = self._percentile
-        return p(0.5), p(0.99), p(0.999), self.largest
-
-    def _percentile(self, share: float) -> float:
-        """Return a time that is not exceeded by this share, to the resolution, s."""
-        wanted, found = share * self.count, 0
-        for index, count in enumerate(self._bins[:_BINS]):
-            found += count
-            if found >= wanted and found:
-                return min((index + 1) * self._resolution, self.largest)
-        return self.largest  # in the last bin, which has no upper end
+    def figures(self) -> tuple[float, ...]:
+        """Return median, percentiles 99 and 99.9, and the largest value."""
+        reached = np.cumsum(self._bins[:_BINS])
+        wanted = np.maximum(np.multiply((0.5, 0.99, 0.999), self.count), 1)
+        index = np.searchsorted(reached, wanted)  # _BINS: in the last bin, which has no upper end
+        ends = np.where(index < _BINS, (index + 1) * self._resolution, self.largest)
+        return *np.minimum(ends, self.largest).tolist(), self.largest

@@ -20,18 +20,12 @@ delay limit it), damping 1, and as much integral action as the uncertainty of th
 
 from __future__ import annotations
 
-from typing import Any
-
-from numpy.typing import ArrayLike
-
 from rps_pin.control.estimator.leg_jacobian import leg_speed, pose_rate
 from rps_pin.control.estimator.robot_state import leg_motion
 from rps_pin.control.estimator.state_estimate import StateEstimate
-from rps_pin.control.loop.controller import Controller, Space
-from rps_pin.control.loop.gains import Gains
+from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.setpoints import Setpoint, difference
 from rps_pin.rps.kinematics.tracking import Triple
-from rps_pin.rps.robot import RPSRobot
 
 _ZERO = (0.0, 0.0, 0.0)
 
@@ -44,22 +38,13 @@ class ComputedTorque(Controller):
     robot, near, gains
         As for `Controller`.
     space
-        ``"task"``: errors of the pose, one per coordinate. ``"actuator"``: errors of the leg
-        lengths.
+        ``"task"`` (the default): errors of the pose, one per coordinate. ``"actuator"``: errors of
+        the leg lengths.
     **settings
         As for `Controller`.
     """
 
-    def __init__(
-        self,
-        robot: RPSRobot,
-        near: ArrayLike,
-        gains: Gains,
-        *,
-        space: Space = "task",
-        **settings: Any,
-    ) -> None:
-        super().__init__(robot, near, gains, space=space, **settings)
+    _default_space = "task"
 
     def _law(self, state: StateEstimate, setpoint: Setpoint, elapsed: float) -> Triple | None:
         geometry, rate, speed, jacobian = state

@@ -28,11 +28,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.control.estimator.effective_inertia import TaskSpaceInertia
-from rps_pin.control.estimator.leg_geometry import (
-    LegGeometry,
-    closure_determinant,
-    leg_geometry,
-)
+from rps_pin.control.estimator.leg_geometry import LegGeometry, closure_determinant, leg_geometry
 from rps_pin.control.estimator.leg_jacobian import leg_jacobian
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time
 from rps_pin.control.estimator.real_time_robot import RealTimeRobot
@@ -116,13 +112,15 @@ class Controller(ABC):
         If the pose is nearer to a singularity than `near_singular`.
     """
 
+    _default_space: Space = "actuator"
+
     def __init__(
         self,
         robot: RPSRobot,
         near: ArrayLike,
         gains: Gains,
         *,
-        space: Space,
+        space: Space | None = None,
         period: float = 1e-3,
         cut_off: float = 100.0,
         force_limit: ArrayLike | None = None,
@@ -139,8 +137,8 @@ class Controller(ABC):
                 f"stop_singular = {stop_singular}: it must be positive and less than "
                 f"near_singular = {near_singular}"
             )
-        self.space = choice(space, "space", get_args(Space))
-        self._in_task_space = space == "task"
+        self.space = choice(space or self._default_space, "space", get_args(Space))
+        self._in_task_space = self.space == "task"
         self._most_lost = whole_number(most_lost, "most_lost", 0)
         jump = 1.2 * p.actuator_speed_limit * period if largest_jump is None else largest_jump
         self.robot = robot
@@ -176,12 +174,11 @@ class Controller(ABC):
         determinant = closure_determinant(geometry, self._g, self._h)
         nearest = min(abs(determinant), self.estimate.type_ii)
         if nearest < self._near:
-            raise SingularityError(
+            message = (
                 f"the pose to start from is too near a singularity: type_ii {nearest:.3g}, at "
-                f"least {self._near:.3g} is required",
-                1 / max(nearest, 1e-300),
-                1 / self._near,
+                f"least {self._near:.3g} is required"
             )
+            raise SingularityError(message, 1 / max(nearest, 1e-300), 1 / self._near)
         self._setpoints.reset(geometry)
         self._integral: Triple = _ZERO
         self._rate_filter.reset()

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from rps_pin.control.estimator.leg_jacobian import force_of_wrench, wrench_of_force
 from rps_pin.control.estimator.robot_state import leg_motion
 from rps_pin.control.estimator.state_estimate import StateEstimate
-from rps_pin.control.loop.controller import Controller, Space
+from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.gains import Gains
 from rps_pin.control.loop.setpoints import Setpoint, difference
 from rps_pin.rps.kinematics.tracking import Triple
@@ -50,7 +50,7 @@ class PDControl(Controller):
         In actuator space N/m, N s/m and N/(m s). In task space likewise for z, and N m, N m s and
         N m/s (per radian) for the tilts.
     space
-        ``"actuator"``: errors of the leg lengths. ``"task"``: errors of the pose.
+        ``"actuator"`` (the default): errors of the leg lengths. ``"task"``: errors of the pose.
     compensation
         f_0: ``"gravity"``, ``"feed_forward"`` or ``"none"``.
     **settings
@@ -63,12 +63,11 @@ class PDControl(Controller):
         near: ArrayLike,
         gains: Gains,
         *,
-        space: Space = "actuator",
         compensation: Compensation = "gravity",
         **settings: Any,
     ) -> None:
         self.compensation = choice(compensation, "compensation", get_args(Compensation))
-        super().__init__(robot, near, gains, space=space, **settings)
+        super().__init__(robot, near, gains, **settings)
 
     def _law(self, state: StateEstimate, setpoint: Setpoint, elapsed: float) -> Triple | None:
         geometry, rate, speed, jacobian = state

@@ -102,7 +102,14 @@ class Setpoints:
         """Advance from the held setpoint towards a valid target."""
         self._target = target
         if self._held or self._rejoining is None:
-            self._held, self._rejoining = False, self._rejoining_to(target)
+            held, self._held = self.current, False
+            legs = difference(held.geometry.length, target.geometry.length)
+            self._rejoining = Rejoining(
+                difference(held.geometry.pose, target.geometry.pose),
+                difference(held.rate, target.rate),
+                difference(held.acceleration, target.acceleration),
+                rejoining_time(max(map(abs, legs)), self._speed_limit),
+            )
         offset = self._rejoining.after(elapsed if 0.0 < elapsed < math.inf else 0.0)
         if offset is None:
             self._rejoining, self.current = None, target
@@ -116,16 +123,6 @@ class Setpoints:
         rate, acceleration = _sum(target.rate, offset[1]), _sum(target.acceleration, offset[2])
         self.current = Setpoint(geometry, rate, acceleration)
         return False
-
-    def _rejoining_to(self, target: Setpoint) -> Rejoining:
-        held = self.current
-        distance = max(map(abs, difference(held.geometry.length, target.geometry.length)))
-        return Rejoining(
-            difference(held.geometry.pose, target.geometry.pose),
-            difference(held.rate, target.rate),
-            difference(held.acceleration, target.acceleration),
-            rejoining_time(distance, self._speed_limit),
-        )
 
     def _allowed(self, pose: Triple) -> LegGeometry | None:
         """Return the leg geometry of a pose, None if the pose is not allowed."""

@@ -9,16 +9,9 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from rps_pin import validation
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.validation import (
-    choice,
-    finite_number,
-    non_negative_number,
-    positive_number,
-    real_array,
-    whole_number,
-)
 
 Kind = Literal["lost", "nan", "jump", "stuck", "target", "target_nan"]
 _LEG_KINDS = ("nan", "jump", "stuck")
@@ -62,19 +55,19 @@ class Fault:
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        choice(self.kind, "fault kind", get_args(Kind))
-        non_negative_number(self.start, "fault start", "s")
-        positive_number(self.duration, "fault duration", "s", infinite=True)
-        if self.leg is not None and (whole_number(self.leg, "fault leg") > 3):
+        validation.choice(self.kind, "fault kind", get_args(Kind))
+        validation.non_negative_number(self.start, "fault start", "s")
+        validation.positive_number(self.duration, "fault duration", "s", infinite=True)
+        if self.leg is not None and (validation.whole_number(self.leg, "fault leg") > 3):
             raise InputError(f"fault leg = {self.leg}: legs are 1, 2 and 3")
         if self.leg is not None and self.kind not in _LEG_KINDS:
             raise InputError(
                 f"fault leg = {self.leg}: a fault {self.kind!r} has no leg; faults of one leg are: "
                 f"{', '.join(_LEG_KINDS)}"
             )
-        if (self.kind == "jump") != (finite_number(self.size, "fault size", "m") != 0.0):
+        if (self.kind == "jump") != (validation.finite_number(self.size, "fault size", "m") != 0.0):
             raise InputError(f"fault size = {self.size}: a size, in m, is for a jump only")
-        offset = real_array(self.offset, "fault offset", (3,))
+        offset = validation.real_array(self.offset, "fault offset", (3,))
         object.__setattr__(self, "offset", tuple(offset.tolist()))
         if (self.kind == "target") != offset.any():
             raise InputError(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rps_pin.arrays import Array
 from rps_pin.control.loop.controller import Controller
@@ -26,10 +26,6 @@ Speeds = Literal["filtered", "measured"]
 #: Approximate number of calls of `progress`.
 _PROGRESS_CALLS = 200
 _MOST_EVENTS = 1000
-_ROWS = (
-    *("target", "target_rate", "pose", "rate", "reading", "length", "estimate", "command"),
-    "applied",
-)
 
 
 class LoopEvent(NamedTuple):
@@ -160,7 +156,7 @@ def run_loop(
     total = settle + trajectory.duration if duration is None else duration
     ticks = max(1, round(positive_number(total, "duration", "s") / plant.period))
     targets = PacedTrajectory(trajectory, plant.period, settle=settle)
-    record = _Record(controller, ticks)
+    record = _Record(controller, plant, targets.target(), ticks)
     injected, done = Faults(faults), 0
     try:
         for k in range(ticks):
@@ -169,7 +165,7 @@ def run_loop(
             target = targets.target()
             speed = plant.speed if speeds == "measured" and reading is not None else None
             controller.tick(reading, injected.target(time, target), speed)
-            record.add(k, time, target, reading, plant)
+            record.add(k, time, target, reading)
             plant.step(controller.forces)
             record.rows["applied"][k] = plant.applied
             targets.advance(controller.pace if paced else 1.0)
@@ -185,50 +181,50 @@ def run_loop(
 class _Record:
     """Arrays of a run, allocated before it."""
 
-    def __init__(self, controller: Controller, ticks: int) -> None:
-        self._controller = controller
-        self.rows: dict[str, Array] = {name: np.zeros((ticks, 3)) for name in _ROWS}
-        self.rows["configuration"] = np.zeros((ticks, 13))
-        self.rows |= {name: np.zeros(ticks) for name in ("time", "type_ii", "pace", "gap")}
-        self._status = np.zeros(ticks, dtype=np.int64)
+    def __init__(self, controller: Controller, plant: Plant, first: PathSample, ticks: int) -> None:
+        self._controller, self._plant = controller, plant
+        self.rows = {
+            name: np.zeros((ticks, *np.shape(value)), np.asarray(value).dtype)
+            for name, value in self._values(0.0, first, None).items()
+        }
         self._events: list[tuple[int, LoopEvent]] = []
         self._last = 0
 
-    def add(
-        self, k: int, time: float, target: PathSample, reading: Array | None, plant: Plant
-    ) -> None:
+    def add(self, k: int, time: float, target: PathSample, reading: Array | None) -> None:
         """Record a tick before the plant moves on."""
-        controller, estimate = self._controller, self._controller.estimate
-        values: dict[str, ArrayLike] = {
+        for name, value in self._values(time, target, reading).items():
+            self.rows[name][k] = value
+        status = int(self._controller.status)
+        if status != self._last and len(self._events) < _MOST_EVENTS:
+            self._events.append((k, LoopEvent(time, status, self._controller.status_text)))
+        self._last = status
+
+    def _values(self, time: float, target: PathSample, reading: Array | None) -> dict[str, Any]:
+        """Return the fields of `LoopRun` in one tick."""
+        controller, plant = self._controller, self._plant
+        return {
             "time": time,
             "target": target.pose,
             "target_rate": target.rate,
             "pose": plant.pose,
             "rate": plant.rate,
             "configuration": plant.configuration,
-            "reading": np.nan if reading is None else reading,
+            "reading": np.full(3, np.nan) if reading is None else reading,
             "length": plant.length,
-            "estimate": estimate.answers.pose,
+            "estimate": controller.estimate.answers.pose,
             "command": controller.forces,
-            "type_ii": estimate.type_ii,
+            "applied": plant.applied,
+            "status": int(controller.status),
+            "type_ii": controller.estimate.type_ii,
             "pace": controller.pace,
             "gap": plant.gap,
         }
-        for name, value in values.items():
-            self.rows[name][k] = value
-        self._status[k] = status = int(controller.status)
-        if status != self._last and len(self._events) < _MOST_EVENTS:
-            self._events.append((k, LoopEvent(time, status, controller.status_text)))
-        self._last = status
 
     def run(self, ticks: int) -> LoopRun:
         """Return the first ticks."""
-        return LoopRun(
-            parameters=self._controller.robot.parameters,
-            status=self._status[:ticks],
-            events=tuple(event for k, event in self._events if k < ticks),
-            **{name: rows[:ticks] for name, rows in self.rows.items()},
-        )
+        events = tuple(event for k, event in self._events if k < ticks)
+        rows: dict[str, Any] = {name: rows[:ticks] for name, rows in self.rows.items()}
+        return LoopRun(self._controller.robot.parameters, events=events, **rows)
 
 
 def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
@@ -241,15 +237,14 @@ def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
     run
         The run.
     """
-    names, rows = ["time_s"], [run.time[:, None]]
+    columns = {"time_s": run.time}
     for name in ("target", "pose", "estimate"):
-        names += [f"{name}_{axis}" for axis in ("z_m", "tilt_x_rad", "tilt_y_rad")]
-        rows.append(getattr(run, name))
+        axes = (f"{name}_{axis}" for axis in ("z_m", "tilt_x_rad", "tilt_y_rad"))
+        columns |= zip(axes, getattr(run, name).T, strict=True)
     for name, unit in (("reading", "m"), ("length", "m"), ("command", "N"), ("applied", "N")):
-        names += [f"{name}_{leg}_{unit}" for leg in (1, 2, 3)]
-        rows.append(getattr(run, name))
-    names += ["type_ii", "status"]
-    table = np.hstack([*rows, np.column_stack([run.type_ii, run.status])])
+        legs = (f"{name}_{leg}_{unit}" for leg in (1, 2, 3))
+        columns |= zip(legs, getattr(run, name).T, strict=True)
+    table = np.column_stack([*columns.values(), run.type_ii, run.status])
     with whole_file(path) as scratch:
-        header = ",".join(names)
+        header = ",".join([*columns, "type_ii", "status"])
         np.savetxt(scratch, table, fmt="%.12g", delimiter=",", header=header, comments="")

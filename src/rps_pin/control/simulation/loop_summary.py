@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from rich.table import Table
+from rich.table import Column, Table
 
 from rps_pin.arrays import Array
 from rps_pin.control.loop.status import STATUSES, Status
@@ -156,9 +156,8 @@ class LoopSummary:
 
     def table(self) -> Table:
         """Return the figures for a terminal."""
-        table = Table("", "RMS", "largest", "at the end", "unit")
-        for column in table.columns[1:4]:
-            column.justify = "right"
+        figures = (Column(name, justify="right") for name in ("RMS", "largest", "at the end"))
+        table = Table("", *figures, "unit")
         for row in self.rows():
             table.add_row(*row)
         table.add_section()

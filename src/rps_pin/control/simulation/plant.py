@@ -124,14 +124,12 @@ class Plant:
     @property
     def length(self) -> Array:
         """Leg lengths, shape (3,), m."""
-        length: Array = self._stepper.q[_LENGTHS]
-        return length
+        return np.asarray(self._stepper.q[_LENGTHS])
 
     @property
     def speed(self) -> Array:
         """Leg speeds, shape (3,), m/s."""
-        speed: Array = self._stepper.v[_LENGTHS]
-        return speed
+        return np.asarray(self._stepper.v[_LENGTHS])
 
     @property
     def pose(self) -> Array:

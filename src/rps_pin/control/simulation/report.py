@@ -29,15 +29,22 @@ def report(
         Captions by file name.
     """
     entry = scenario.entry
-    lines = [f"# {title}", ""]
-    lines += [
+    lines = [
+        *(f"# {title}", ""),
         f"Robot {scenario.model.parameters.name}; {run.time.size} ticks of "
         f"{1e3 * entry.period:g} ms, the first {entry.settle:g} s at rest.",
         "",
     ]
-    lines += _rows("controller", entry.controller.model_dump(exclude_none=True))
-    lines += _rows("plant", entry.plant.model_dump(exclude_none=True))
-    lines += ["", "## Gains and margins", "", *_gains(scenario), "", _margins(scenario), ""]
+    same = "the same as the controller's model"
+    for name, described in (("controller", entry.controller), ("plant", entry.plant)):
+        given = described.model_dump(exclude_none=True).items()
+        settings = ", ".join(f"{key} {_plain(value)}" for key, value in given if value != {})
+        lines.append(f"- {name}: {settings or same}")
+    lines += ["", "## Gains and margins", ""]
+    names = ("proportional", "derivative", "integral")
+    for name, row in zip(names, scenario.gains.rows, strict=True):
+        lines.append(f"- {name}: {', '.join(f'{value:.6g}' for value in row)}")
+    lines += ["", _margins(scenario), ""]
     lines += [f"## Errors, over {summary.ticks} ticks", ""]
     lines += ["| | RMS | largest | at the end | |", "|---|---:|---:|---:|---|"]
     lines += [f"| {' | '.join(row)} |" for row in summary.rows()]
@@ -55,24 +62,10 @@ def report(
     return "\n".join(lines)
 
 
-def _rows(name: str, values: Mapping[str, Any]) -> list[str]:
-    shown = ", ".join(f"{key} {_plain(value)}" for key, value in values.items() if value != {})
-    shown = shown or "the same as the controller's model"
-    return [f"- {name}: {shown}"]
-
-
 def _plain(value: Any) -> str:
     if isinstance(value, dict):
         return "(" + ", ".join(f"{key} {_plain(one)}" for key, one in value.items()) + ")"
     return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def _gains(scenario: Scenario) -> list[str]:
-    names = ("proportional", "derivative", "integral")
-    return [
-        f"- {name}: {', '.join(f'{value:.6g}' for value in row)}"
-        for name, row in zip(names, scenario.gains.rows, strict=True)
-    ]
 
 
 def _margins(scenario: Scenario) -> str:

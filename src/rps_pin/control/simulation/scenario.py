@@ -92,17 +92,10 @@ class Scenario:
 
     def run(self, progress: Callable[[float], object] | None = None) -> LoopRun:
         """Return a run of the controller with the plant; see `run_loop`."""
-        return run_loop(
-            self.controller(),
-            self.plant(),
-            self.trajectory,
-            faults=self.faults,
-            duration=self.entry.duration,
-            settle=self.entry.settle,
-            speeds=self.entry.controller.speeds,
-            paced=self.entry.controller.paced,
-            progress=progress,
-        )
+        settings = self.entry.model_dump(include={"duration", "settle"})
+        settings |= self.entry.controller.model_dump(include={"speeds", "paced"})
+        loop = self.controller(), self.plant(), self.trajectory
+        return run_loop(*loop, faults=self.faults, progress=progress, **settings)
 
     def margins(self) -> LoopMargins:
         """Return the margins of an axis with the inertia of the controller's model.
@@ -122,14 +115,9 @@ class Scenario:
         (kp, *_), (kd, *_), (ki, *_) = rows = (gains or self.gains).rows
         if any(len(set(row)) > 1 for row in rows):
             raise InputError("the margins of one axis need gains that are equal for all three")
-        return loop_margins(
-            kp,
-            kd,
-            ki,
-            period=self.entry.period,
-            delay=self.entry.plant.delay or 0,
-            cut_off=None if entry.speeds == "measured" else entry.cut_off or 100.0,
-        )
+        period, delay = self.entry.period, self.entry.plant.delay or 0
+        cut_off = None if entry.speeds == "measured" else entry.cut_off or 100.0
+        return loop_margins(kp, kd, ki, period=period, delay=delay, cut_off=cut_off)
 
 
 def load_scenario(path: str | os.PathLike[str]) -> Scenario:

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, TypeVar
 from rps_pin.errors import RPSPinError
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Page, ViewportSize
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 """Programs that are searched for, after the one in ``RPS_PIN_CHROMIUM``."""
-ARGUMENTS = (
+ARGUMENTS = [
     "--no-sandbox",
     # WebGL without a graphics card: Chromium's own software renderer, the same everywhere.
     "--use-gl=angle",
@@ -25,7 +25,7 @@ ARGUMENTS = (
     "--enable-unsafe-swiftshader",
     "--hide-scrollbars",
     "--force-color-profile=srgb",
-)
+]
 _LOAD_SECONDS = 60.0
 _Answer = TypeVar("_Answer")
 
@@ -72,9 +72,7 @@ def opened_page(text: str, size: tuple[int, int], scale: float) -> Iterator[Page
         ) from None
     with sync_playwright() as playwright:
         try:
-            browser = playwright.chromium.launch(
-                executable_path=find_browser(), args=list(ARGUMENTS)
-            )
+            browser = playwright.chromium.launch(executable_path=find_browser(), args=ARGUMENTS)
         except Error as error:
             raise RPSPinError(
                 "pictures need a Chromium that runs: apt-get install chromium, or playwright "
@@ -82,10 +80,8 @@ def opened_page(text: str, size: tuple[int, int], scale: float) -> Iterator[Page
                 f"{str(error).strip().splitlines()[0]}"
             ) from None
         try:
-            width, height = size
-            page = browser.new_page(
-                viewport={"width": width, "height": height}, device_scale_factor=scale
-            )
+            viewport: ViewportSize = {"width": size[0], "height": size[1]}
+            page = browser.new_page(viewport=viewport, device_scale_factor=scale)
             page.set_default_timeout(1e3 * _LOAD_SECONDS)
             wrong: list[str] = []
             page.on("pageerror", lambda error: wrong.append(str(error)))

@@ -26,12 +26,9 @@ def page(*, title: str, note: str, policy: str, scripts: str) -> str:
     scripts
         The ``<script>`` elements, as HTML.
     """
-    return Template(own_file("page.html")).substitute(
-        title=html.escape(title),
-        note=html.escape(note),
-        policy=html.escape(policy),
-        scripts=scripts,
-    )
+    text = {"title": title, "note": note, "policy": policy}
+    escaped = {name: html.escape(one) for name, one in text.items()}
+    return Template(own_file("page.html")).substitute(escaped, scripts=scripts)
 
 
 def inline_script(source: str, attributes: str = "") -> str:

@@ -13,11 +13,10 @@ from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
 from rps_pin.errors import InputError, shown
 from rps_pin.viewer.layers.base import Layer
 from rps_pin.viewer.layers.closures import Closures
-from rps_pin.viewer.layers.forces import Forces
+from rps_pin.viewer.layers.forces import Forces, Reactions
 from rps_pin.viewer.layers.frames import Frames
 from rps_pin.viewer.layers.ghosts import Ghosts
 from rps_pin.viewer.layers.limits import Limits
-from rps_pin.viewer.layers.reactions import Reactions
 from rps_pin.viewer.layers.singularity import Singularity
 from rps_pin.viewer.layers.trail import Trail
 from rps_pin.viewer.layers.workspace import WorkspaceSurface

@@ -10,12 +10,7 @@ import pinocchio as pin
 
 from rps_pin.closed_loop import JointCoupling, LoopClosure
 from rps_pin.errors import InputError
-from rps_pin.viewer.layers.base import (
-    DrawnLayer,
-    LayerContext,
-    NodeState,
-    RobotSizedLayer,
-)
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.colours import BLUE, YELLOW, css
 from rps_pin.viewer.layers.parts import ball, between
 from rps_pin.viewer.motion import MotionState
@@ -43,9 +38,7 @@ class Closures(RobotSizedLayer):
         """Return the marks and lines; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
         data = model.createData()
-        ends = {
-            node_name(closure.name): _ends(closure, model, data) for closure in mechanism.closures
-        }
+        ends = {node_name(one.name): _ends(one, model, data) for one in mechanism.closures}
         if not ends:
             raise InputError("layer 'closures': the mechanism has no closures")
         size = context.radius / 60.0 if self.size is None else self.size

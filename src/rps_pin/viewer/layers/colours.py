@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.colors import Colormap, LinearSegmentedColormap, to_hex
-from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array
 from rps_pin.viewer.layers.base import Colour
 from rps_pin.viewer.scene.legend import ColourBar
 
@@ -35,11 +33,6 @@ def warning(share: float) -> Colour:
     """Return the colour of a share of what is allowed: 0 safe, 1 (and more) at the limit."""
     red, green, blue, _ = WARNING(float(np.clip(share, 0.0, 1.0)))
     return float(red), float(green), float(blue)
-
-
-def field_colours(share: ArrayLike) -> Array:
-    """Return colours (n, 3) of a field's values, 0 lowest and 1 highest."""
-    return np.asarray(FIELD(np.asarray(share)))[:, :3]
 
 
 def colour_bar(colours: Colormap, low: str, high: str) -> ColourBar:

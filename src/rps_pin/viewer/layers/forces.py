@@ -1,11 +1,14 @@
-"""Layer ``forces``: actuator forces, as arrows along their joints' axes.
+"""Layers ``forces`` and ``reactions``: arrows of forces and moments, in one scale for each unit.
 
-An arrow begins at its joint and points, for a positive force, where the joint's coordinate grows. A
-torque has two heads, and its own scale.
+An arrow of an actuator begins at its joint and points, for a positive force, where the joint's
+coordinate grows. A torque has two heads, and its own scale. Reactions are the forces in the closed
+joints, on the first frame's side. Where constraint rows are redundant the reactions are not unique;
+those of least norm are shown.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,13 +16,25 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.viewer.layers.arrows import NO_FORCES, ArrowKind, Vectors, closed_state, draw_arrows
-from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, RobotSizedLayer
-from rps_pin.viewer.layers.colours import ORANGE
-from rps_pin.viewer.layers.parts import arrow, double_arrow
+from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
+from rps_pin.errors import ClosureError, InfeasibleError, InputError, SingularityError
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
+from rps_pin.viewer.layers.colours import ORANGE, SKY, css
+from rps_pin.viewer.layers.parts import SMALLEST, arrow, double_arrow, pointing
 from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.links import node_name
+from rps_pin.viewer.scene.shapes import Part, translated
+from rps_pin.viewer.scene.stage import length_text, round_number
+
+Vectors = Mapping[str, tuple[Array, Array]]
+"""Origin of each arrow, m, and the force or moment that it shows, by node."""
+_UNSEEN_GAP = 1e-2
+"""Gap of the closures between samples of a motion that is closed here, in radii of the picture."""
+
+_LONGEST = 0.7
+"""Length of the longest arrow, at most, in radii of the picture."""
+_MOST_STATES = 50
 
 
 @dataclass(frozen=True)
@@ -44,25 +59,145 @@ class Forces(RobotSizedLayer):
         actuators = _actuators(mechanism)
 
         def vectors(state: MotionState) -> Vectors:
-            try:
-                tau = state.tau
-                if tau is None:
-                    q, v, a = closed_state(context, state)[:3]
-                    tau = mechanism.inverse_dynamics(q, v, a, wrenches=outside).tau
-            except NO_FORCES:
-                return {}
+            tau = state.tau
+            if tau is None:
+                q, v, a = _closed_state(context, state)[:3]
+                tau = mechanism.inverse_dynamics(q, v, a, wrenches=outside).tau
             pin.computeJointJacobians(model, data, state.q)
             return {
                 one.node: (np.array(data.oMi[one.joint].translation), force * one.axis(model, data))
                 for one, force in zip(actuators, tau, strict=True)
             }
 
-        kinds = {
-            one.node: ArrowKind(double_arrow, "N m") if one.turns else ArrowKind(arrow, "N")
-            for one in actuators
-        }
+        units = {one.node: "N m" if one.turns else "N" for one in actuators}
         scales = {"N": self.newtons_per_metre, "N m": self.newton_metres_per_metre}
-        return draw_arrows("forces", "actuators' forces", ORANGE, context, kinds, vectors, scales)
+        title = LegendEntry("forces", "actuators' forces", css(ORANGE))
+        return _arrows(title, ORANGE, context, units, vectors, scales)
+
+
+@dataclass(frozen=True)
+class Reactions(RobotSizedLayer):
+    """Forces (not moments) in the closures; of a 3-RPS, of each leg on the platform.
+
+    Parameters
+    ----------
+    newtons_per_metre
+        Force of an arrow of 1 m, N. Default: a round number.
+    """
+
+    newtons_per_metre: float | None = None
+
+    def draw(self, context: LayerContext) -> DrawnLayer:
+        """Return the arrows; see `Layer`."""
+        mechanism, model = context.subject.mechanism, context.subject.model
+        data, outside = model.createData(), context.motion.wrenches
+        closures = [one for one in mechanism.closures if isinstance(one, LoopClosure)]
+        if not closures:
+            raise InputError("layer 'reactions': the mechanism has no loop closures")
+
+        def vectors(state: MotionState) -> Vectors:
+            forces = state.constraint_forces
+            if forces is None:
+                q, v, a, tau, _ = _closed_state(context, state)
+                if tau is None:
+                    forces = mechanism.inverse_dynamics(q, v, a, wrenches=outside).constraint_forces
+                else:
+                    forces = mechanism.constraint_forces(q, v, a, tau, wrenches=outside)
+            wrenches = mechanism.closure_wrenches(state.q, forces)
+            pin.framesForwardKinematics(model, data, state.q)
+            return {
+                node_name(one.name): (
+                    np.array(data.oMf[one.frame_ids(model)[0]].translation),
+                    wrenches[one.name][:3],
+                )
+                for one in closures
+            }
+
+        units = {node_name(one.name): "N" for one in closures}
+        title = LegendEntry("reactions", "forces in the closed joints", css(SKY))
+        return _arrows(title, SKY, context, units, vectors, {"N": self.newtons_per_metre})
+
+
+def _arrows(
+    title: LegendEntry,
+    colour: int,
+    context: LayerContext,
+    units: Mapping[str, str],
+    vectors_in: Callable[[MotionState], Vectors],
+    scales: Mapping[str, float | None],
+) -> DrawnLayer:
+    """Return a layer of arrows.
+
+    Parameters
+    ----------
+    title, colour
+        The begin of the layer's entry in the legend; colour of the arrows.
+    context
+        The mechanism and motion.
+    units
+        ``N`` or ``N m`` of each arrow, by node.
+    vectors_in
+        Returns the vectors in a state. Arrows without one are not seen, and none are where it
+        raises an error of forces that are not determined.
+    scales
+        By unit, the force or moment of an arrow of 1 m; None for a round number.
+    """
+    motion, radius = context.motion, context.radius
+
+    def vectors(state: MotionState) -> Vectors:
+        try:
+            return vectors_in(state)
+        except (ClosureError, InfeasibleError, SingularityError):
+            return {}
+
+    greatest = dict.fromkeys(units.values(), 0.0)
+    for elapsed in np.linspace(0.0, motion.duration, min(_MOST_STATES, len(motion.times))):
+        for node, (_, vector) in vectors(motion.state_at(float(elapsed))).items():
+            greatest[units[node]] = max(greatest[units[node]], float(np.linalg.norm(vector)))
+    per_metre: dict[str, float] = {}
+    for unit in sorted(greatest):
+        given = scales[unit]
+        if given is None:
+            longest = _LONGEST * radius
+            given = 1.0 / (round_number(longest / greatest[unit]) if greatest[unit] else radius)
+        elif not 0.0 < given < np.inf:
+            raise InputError(f"layer {title.name!r}: a scale of {given}; it must be positive")
+        per_metre[unit] = given
+    hidden = translated(context.box.centre)
+    hidden[:3, :3] *= SMALLEST
+
+    def update(state: MotionState) -> dict[str, NodeState]:
+        found = vectors(state)
+        states = dict.fromkeys(units, NodeState(hidden))
+        for node, (origin, vector) in found.items():
+            states[node] = NodeState(pointing(origin, vector / per_metre[units[node]]))
+        return states
+
+    parts: list[Part] = []
+    for node, unit in units.items():
+        parts += (arrow if unit == "N" else double_arrow)(node, colour)
+    lengths = ", ".join(_scale_text(unit, one, radius) for unit, one in per_metre.items())
+    at_rest = ", at rest" if motion.at_rest else ""
+    most = ", ".join(f"at most {greatest[unit]:.3g} {unit}" for unit in per_metre)
+    text = f"{title.text}{at_rest}: {lengths}; {most}"
+    return DrawnLayer(LegendEntry(title.name, text, title.colour), parts, update)
+
+
+def _closed_state(context: LayerContext, state: MotionState) -> MotionState:
+    """Return a state with closed loops: interpolation between samples opens them a little.
+
+    A state with a gap that can be seen is returned as it is.
+    """
+    mechanism = context.subject.mechanism
+    if mechanism.loop_gap(state.q) > _UNSEEN_GAP * context.radius:
+        return state
+    return state._replace(q=mechanism.close(state.q, within_limits=False, restarts=0))
+
+
+def _scale_text(unit: str, scale: float, radius: float) -> str:
+    """Return a scale in words: the length of the arrow of a round force."""
+    force = round_number(0.5 * radius * scale)
+    return f"{length_text(force / scale)} for {force:g} {unit}"
 
 
 class _Actuator(NamedTuple):

@@ -7,13 +7,8 @@ from dataclasses import dataclass
 import pinocchio as pin
 
 from rps_pin.closed_loop import LoopClosure
-from rps_pin.viewer.layers.base import (
-    DrawnLayer,
-    LayerContext,
-    NodeState,
-    RobotSizedLayer,
-    frame_id,
-)
+from rps_pin.viewer.layers import base
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.parts import axes
 from rps_pin.viewer.motion import MotionState
 from rps_pin.viewer.scene.legend import LegendEntry
@@ -40,13 +35,15 @@ class Frames(RobotSizedLayer):
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the axes; see `Layer`."""
         model, data = context.subject.model, context.subject.model.createData()
-        names = self._names(context) if self.names is None else list(self.names)
+        closures = context.subject.mechanism.closures
+        closed = [one.frame_b for one in closures if isinstance(one, LoopClosure)]
+        names = dict.fromkeys([*model.names, *closed]) if self.names is None else self.names
         size = context.radius / 8.0 if self.size is None else self.size
         nodes: dict[str, int] = {}
         parts: list[Part] = []
         for name in names:
             node = node_name(name, set(nodes))
-            nodes[node] = frame_id(model, name, "frames")
+            nodes[node] = base.frame_id(model, name, "frames")
             parts += axes(node, size)
 
         def update(state: MotionState) -> dict[str, NodeState]:
@@ -55,8 +52,3 @@ class Frames(RobotSizedLayer):
 
         text = f"frames: x red, y green, z blue, {length_text(size)} long"
         return DrawnLayer(LegendEntry("frames", text, "#2ca02c"), parts, update)
-
-    def _names(self, context: LayerContext) -> list[str]:
-        closures = context.subject.mechanism.closures
-        closed = [one.frame_b for one in closures if isinstance(one, LoopClosure)]
-        return list(dict.fromkeys([*context.subject.model.names, *closed]))

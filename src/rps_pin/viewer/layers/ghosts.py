@@ -11,7 +11,6 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.rps.urdf import LEGS
 from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext
 from rps_pin.viewer.layers.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, css
@@ -51,46 +50,28 @@ class Ghosts:
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the copies; see `Layer`."""
         subject = context.subject
-        model = subject.model
-        links = [link for link in links_of(model, subject.visual) if link.moves]
+        links = [link for link in links_of(subject.model, subject.visual) if link.moves]
         copies = self.configurations(subject, context.motion)
-        poses = link_poses(model, links, copies)
         parts: list[Part] = []
-        for copy in range(len(copies)):
-            colour = _COLOURS[copy % len(_COLOURS)]
-            for index, link in enumerate(links):
-                parts += [
-                    part._replace(
-                        node=f"{copy + 1}",
-                        name=f"{link.name}_{part.name}",
-                        placement=poses[copy, index] @ part.placement,
-                    )
-                    for part in link.parts(Material(colour, _OPACITY))
-                ]
+        for copy, poses in enumerate(link_poses(subject.model, links, copies)):
+            material = Material(_COLOURS[copy % len(_COLOURS)], _OPACITY)
+            for link, pose in zip(links, poses, strict=True):
+                for part in link.parts(material):
+                    name, placement = f"{link.name}_{part.name}", pose @ part.placement
+                    parts.append(part._replace(node=f"{copy + 1}", name=name, placement=placement))
         other = "other assembly modes of these leg lengths" if self.at is None else "other poses"
         return DrawnLayer(LegendEntry("ghosts", f"{len(copies)} {other}", css(_COLOURS[0])), parts)
 
 
 def mode_configurations(robot: RPSRobot, q: Array, *, above: bool = False) -> Array:
     """Return the configurations of the other assembly modes with the leg lengths of q, (k, nq)."""
-    model = robot.mechanism.model
-    index = model.getJointId
-    lengths = [model.joints[index(f"leg_{leg}_prismatic")].idx_q for leg in LEGS]
-    angles = [model.joints[index(f"leg_{leg}_revolute")].idx_q for leg in LEGS]
-    free = model.joints[index("platform_free")].idx_q
+    angles, lengths, position = slice(0, 6, 2), slice(1, 6, 2), slice(6, 9)
     modes = robot.assembly_modes(q[lengths])
-    found = []
-    for angle, position, rotation, is_above in zip(
-        modes.angle, modes.position, modes.rotation, modes.above, strict=True
-    ):
-        if np.allclose(position, q[free : free + 3], rtol=0, atol=1e-6) and np.allclose(
-            angle, q[angles], rtol=0, atol=1e-6
-        ):
-            continue  # the mode that is shown already
-        if above and not is_above:
-            continue
-        other = q.copy()
-        other[angles] = angle
-        other[free : free + 7] = [*position, *pin.Quaternion(rotation).coeffs()]
-        found.append(other)
-    return np.array(found).reshape(-1, model.nq)
+    same = np.isclose(modes.position, q[position], rtol=0, atol=1e-6).all(axis=1)
+    same &= np.isclose(modes.angle, q[angles], rtol=0, atol=1e-6).all(axis=1)  # shown already
+    wanted = ~same & modes.above if above else ~same
+    found = np.tile(q, (int(wanted.sum()), 1))
+    found[:, angles], found[:, position] = modes.angle[wanted], modes.position[wanted]
+    for row, rotation in zip(found, modes.rotation[wanted], strict=True):
+        row[9:13] = pin.Quaternion(rotation).coeffs()
+    return found

@@ -11,12 +11,7 @@ from rps_pin.arrays import Array
 from rps_pin.rps.kinematics.legs import cone_angles
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.urdf import LEGS
-from rps_pin.viewer.layers.base import (
-    DrawnLayer,
-    LayerContext,
-    NodeState,
-    RobotSizedLayer,
-)
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.colours import BLUE, WARNING, colour_bar, css, warning
 from rps_pin.viewer.layers.parts import ball
 from rps_pin.viewer.motion import MotionState
@@ -48,21 +43,19 @@ class Limits(RobotSizedLayer):
         robot = context.subject.robot
         joints = _limited_joints(model, robot)
 
-        def uses(state: MotionState) -> dict[str, Use]:
-            pin.framesForwardKinematics(model, data, state.q)
-            found = {
-                node: _joint_use(model, data, joint, state.q) for node, joint in joints.items()
-            }
-            return found if robot is None else found | _spherical_uses(robot, data, state.q)
+        def uses(q: Array) -> dict[str, Use]:
+            pin.framesForwardKinematics(model, data, q)
+            found = {node: _joint_use(model, data, joint, q) for node, joint in joints.items()}
+            return found if robot is None else found | _spherical_uses(robot, data, q)
 
         def update(state: MotionState) -> dict[str, NodeState]:
             return {
                 node: NodeState(translated(point), warning(share))
-                for node, (point, share) in uses(state).items()
+                for node, (point, share) in uses(state.q).items()
             }
 
         size = context.radius / 16.0 if self.size is None else self.size
-        shares = uses(context.motion.state_at(0.0))
+        shares = uses(context.motion.at(0.0))
         parts = [ball(node, size, Material(0xFFFFFF, 0.6)) for node in shares]
         text = "range of the joints in use" if shares else "no joint has limits"
         bar = colour_bar(WARNING, "middle", "at a limit") if shares else None
@@ -101,9 +94,8 @@ def _spherical_uses(robot: RPSRobot, data: pin.Data, q: Array) -> dict[str, Use]
     p, model = robot.parameters, robot.mechanism.model
     if p.spherical_cone_limit >= np.pi:
         return {}
-    angles = [model.joints[model.getJointId(f"leg_{leg}_revolute")].idx_q for leg in LEGS]
     rotation = np.array(data.oMi[model.getJointId("platform_free")].rotation)
-    shares = cone_angles(q[angles], rotation, p.spherical_rest_angle) / p.spherical_cone_limit
+    shares = cone_angles(q[0:6:2], rotation, p.spherical_rest_angle) / p.spherical_cone_limit
     frames = [model.getFrameId(f"platform_ball_{leg}") for leg in LEGS]
     return {
         f"ball_{leg}": (np.array(data.oMf[frame].translation), float(share))

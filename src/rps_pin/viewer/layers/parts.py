@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rps_pin.arrays import Array
-from rps_pin.viewer.scene.shapes import (
-    Cylinder,
-    Material,
-    Part,
-    Sphere,
-    TriangleMesh,
-    translated,
-)
+from rps_pin.viewer.scene.shapes import Cylinder, Material, Part, Sphere, TriangleMesh, translated
 
 SMALLEST = 1e-6
 """Scale of a node whose size is zero: with a scale of zero it would have no direction."""
@@ -43,14 +36,9 @@ def _head(node: str, name: str, colour: int, height: float) -> Part:
 def axes(node: str, length: float) -> list[Part]:
     """Return the axes of a frame: x red, y green, z blue."""
     radius = 0.022 * length
+    bar, middle = Cylinder(length, radius, radius), _above(length / 2)
     return [
-        Part(
-            node,
-            name,
-            Cylinder(length, radius, radius),
-            Material(colour),
-            rotation_to(axis) @ _above(length / 2),
-        )
+        Part(node, name, bar, Material(colour), rotation_to(axis) @ middle)
         for name, colour, axis in zip("xyz", (0xD62728, 0x2CA02C, 0x1F5FD0), np.eye(3), strict=True)
     ]
 
@@ -76,13 +64,8 @@ def tube(points: Array, radius: float, sides: int = 6) -> TriangleMesh:
     vertices = (points[:, None] + radius * ring).reshape(-1, 3)
     row, column = np.arange(len(points) - 1)[:, None] * sides, np.arange(sides)[None]
     first, beside = (row + column).ravel(), (row + (column + 1) % sides).ravel()
-    faces = np.concatenate(
-        [
-            np.stack([first, beside, beside + sides], axis=1),
-            np.stack([first, beside + sides, first + sides], axis=1),
-        ]
-    )
-    return TriangleMesh(vertices, faces)
+    one, two = (first, beside, beside + sides), (first, beside + sides, first + sides)
+    return TriangleMesh(vertices, np.hstack([one, two]).T)
 
 
 def rotation_to(direction: Array) -> Array:

@@ -7,12 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from rps_pin.viewer.layers.base import (
-    DrawnLayer,
-    LayerContext,
-    NodeState,
-    RobotSizedLayer,
-)
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.colours import BLUE, WARNING, colour_bar, css, warning
 from rps_pin.viewer.motion import MotionState
 from rps_pin.viewer.scene.legend import LegendEntry

@@ -12,14 +12,8 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop import LoopClosure
 from rps_pin.errors import InputError
 from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
-from rps_pin.viewer.layers.base import (
-    DrawnLayer,
-    LayerContext,
-    NodeState,
-    RobotSizedLayer,
-    check_magnification,
-    frame_id,
-)
+from rps_pin.viewer.layers import base
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.colours import PURPLE, css
 from rps_pin.viewer.layers.parts import ball, tube
 from rps_pin.viewer.motion import MotionState
@@ -52,8 +46,8 @@ class Trail(RobotSizedLayer):
         """Return a tube and a ball that runs along it; see `Layer`."""
         model, data = context.subject.model, context.subject.model.createData()
         name = self.frame or _default_frame(context.subject)
-        frame = frame_id(model, name, "trail")
-        check_magnification(self.factor, "trail")
+        frame = base.frame_id(model, name, "trail")
+        base.check_magnification(self.factor, "trail")
 
         def position(q: Array) -> Array:
             pin.framesForwardKinematics(model, data, q)
@@ -63,12 +57,11 @@ class Trail(RobotSizedLayer):
         stride = max(1, math.ceil(len(chosen) / _MOST_POINTS))
         points = np.array([position(q) for q in [*chosen[:-1:stride], chosen[-1]]])
         size = float(np.linalg.norm(np.ptp(points, axis=0)))
-        factor = self._factor(size, context.radius)
-        start = points[0]
+        largest = _SIZE * context.radius / size if size > 1e-12 * context.radius else 1.0
+        factor, start = self.factor or max(1.0, round_number(largest)), points[0]
 
         def magnified(point: Array) -> Array:
-            moved: Array = start + factor * (point - start)
-            return moved
+            return np.asarray(start + factor * (point - start))
 
         thickness = context.radius / 160.0
         # On top: the platform would hide half of most trails.
@@ -81,17 +74,10 @@ class Trail(RobotSizedLayer):
         def update(state: MotionState) -> dict[str, NodeState]:
             return {"point": NodeState(translated(magnified(position(state.q))))}
 
-        how = f", magnified {factor:g} times about its start" if factor != 1 else ", to scale"
-        text = (
-            f"path of {name}{how}: {length_text(size)} across" if size > 0.0 else f"{name}, at rest"
-        )
+        how = f"magnified {factor:g} times about its start" if factor != 1 else "to scale"
+        path = f"path of {name}, {how}: {length_text(size)} across"
+        text = path if size > 0.0 else f"{name}, at rest"
         return DrawnLayer(LegendEntry("trail", text, css(PURPLE)), parts, update)
-
-    def _factor(self, size: float, radius: float) -> float:
-        if self.factor is not None:
-            return self.factor
-        wanted = _SIZE * radius / size if size > 1e-12 * radius else 1.0
-        return max(1.0, round_number(wanted))
 
 
 def _default_frame(subject: DisplayedMechanism) -> str:

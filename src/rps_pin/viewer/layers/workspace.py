@@ -10,13 +10,9 @@ from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.rps.workspace import Workspace, boundary, leg_grid, workspace
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
-from rps_pin.viewer.layers.base import (
-    DrawnLayer,
-    LayerContext,
-    RobotSizedLayer,
-    check_magnification,
-)
-from rps_pin.viewer.layers.colours import FIELD, colour_bar, field_colours
+from rps_pin.viewer.layers import base
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, RobotSizedLayer
+from rps_pin.viewer.layers.colours import FIELD, colour_bar
 from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.shapes import Material, Part, TriangleMesh
 from rps_pin.viewer.scene.stage import round_number
@@ -48,7 +44,7 @@ class WorkspaceSurface(RobotSizedLayer):
         robot = context.subject.robot
         if robot is None:
             raise InputError("layer 'workspace': only a 3-RPS has one")
-        check_magnification(self.factor, "workspace")
+        base.check_magnification(self.factor, "workspace")
         found = self.workspace
         if found is None:
             found = workspace(robot, leg_grid(robot.parameters, 25))
@@ -71,4 +67,4 @@ def _colours(found: Workspace, poses: Array) -> tuple[Array, float, float]:
     side = side_of_singularity(found.parameters, found.start)
     value = evaluate(found.parameters, poses, side).conditioning
     low, high = float(value.min()), float(value.max())
-    return field_colours((value - low) / max(high - low, 1e-12)), low, high
+    return np.asarray(FIELD((value - low) / max(high - low, 1e-12)))[:, :3], low, high

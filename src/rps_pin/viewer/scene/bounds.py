@@ -58,15 +58,16 @@ def bounding_box(model: pin.Model, links: Sequence[Link], configurations: Array)
     if not links:
         raise InputError("the robot has no visual geometry: there is nothing to show")
     poses = link_poses(model, links, configurations)
-    corners = np.concatenate(
-        [_in_world(poses[:, index], _corners(link)) for index, link in enumerate(links)]
-    )
+    in_world = []
+    for index, link in enumerate(links):
+        turned = np.einsum("nij,mj->nmi", poses[:, index, :3, :3], _corners(link))
+        in_world.append((turned + poses[:, index, None, :3, 3]).reshape(-1, 3))
+    corners = np.concatenate(in_world)
     lower, upper = corners.min(axis=0), corners.max(axis=0)
     radius = float(np.linalg.norm(corners - (lower + upper) / 2.0, axis=1).max())
-    box = BoundingBox(lower, upper, radius)
-    if not np.isfinite(box.radius) or box.radius <= 0.0:
-        raise InputError(f"the robot's bounding box has radius {box.radius} m: it cannot be shown")
-    return box
+    if not 0.0 < radius < np.inf:
+        raise InputError(f"the robot's bounding box has radius {radius} m: it cannot be shown")
+    return BoundingBox(lower, upper, radius)
 
 
 def _corners(link: Link) -> Array:
@@ -81,17 +82,10 @@ def _corners(link: Link) -> Array:
 def _own_corners(shape: coal.CollisionGeometry) -> Array:
     """Return corners around one shape in its own frame, shape (m, 3)."""
     if isinstance(shape, coal.Cylinder):
-        turn = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
+        turn = np.tile(np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False), 2)
         reach = shape.radius / np.cos(np.pi / _SIDES)
-        ring = np.stack([reach * np.cos(turn), reach * np.sin(turn)], axis=1)
-        ends = [np.full((_SIDES, 1), side * shape.halfLength) for side in (-1.0, 1.0)]
-        return np.concatenate([np.hstack([ring, end]) for end in ends])
+        ends = np.repeat([-shape.halfLength, shape.halfLength], _SIDES)
+        return np.stack([reach * np.cos(turn), reach * np.sin(turn), ends], axis=1)
     shape.computeLocalAABB()
     box = shape.aabb_local
     return np.array(list(product(*zip(box.min_, box.max_, strict=True))))
-
-
-def _in_world(poses: Array, points: Array) -> Array:
-    """Move points of shape (m, 3) by every pose of shape (n, 4, 4); the result has n m rows."""
-    turned: Array = np.einsum("nij,mj->nmi", poses[:, :3, :3], points)
-    return (turned + poses[:, None, :3, 3]).reshape(-1, 3)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.viewer.scene.links import Link, link_poses
 
 
 class NodeKeyframes(NamedTuple):
@@ -23,27 +22,6 @@ class NodeKeyframes(NamedTuple):
     """Paths of the parts below it whose colour changes."""
     colours: Array | None = None
     """Red, green and blue of these, 0 to 1, shape (n, 3)."""
-
-
-def link_keyframes(
-    model: pin.Model, links: Sequence[Link], paths: Mapping[str, str], configurations: Array
-) -> list[NodeKeyframes]:
-    """Return the motion of a robot's links.
-
-    Parameters
-    ----------
-    model
-        The robot.
-    links
-        Its links; those fixed to the world have no keyframes.
-    paths
-        The scene-tree path of each link, by the link's name.
-    configurations : ndarray, shape (n, nq)
-        The configurations at the keyframes.
-    """
-    moving = [link for link in links if link.moves]
-    poses = link_poses(model, moving, configurations)
-    return [NodeKeyframes(paths[link.name], poses[:, k]) for k, link in enumerate(moving)]
 
 
 def continuous_quaternions(rotations: Array) -> Array:
@@ -63,5 +41,4 @@ def continuous_quaternions(rotations: Array) -> Array:
     quaternions = np.array([pin.Quaternion(rotation).coeffs() for rotation in rotations])
     turns = np.einsum("ij,ij->i", quaternions[1:], quaternions[:-1]) < 0.0
     signs = np.where(np.cumsum(np.concatenate([[False], turns])) % 2, -1.0, 1.0)
-    continuous: Array = quaternions * signs[:, None]
-    return continuous
+    return np.asarray(quaternions * signs[:, None])

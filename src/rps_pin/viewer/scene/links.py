@@ -62,11 +62,9 @@ def links_of(model: pin.Model, visual: pin.GeometryModel) -> list[Link]:
 
     links: list[Link] = []
     for (joint, frame_index), items in carried.items():
-        if frame_index is None:
-            label, placement = model.names[joint], pin.SE3.Identity()
-        else:
-            label = model.frames[frame_index].name
-            placement = model.frames[frame_index].placement
+        label, placement = model.names[joint], pin.SE3.Identity()
+        if frame_index is not None:
+            label, placement = model.frames[frame_index].name, model.frames[frame_index].placement
         name = node_name(label, [link.name for link in links])
         links.append(Link(name, joint, placement.copy(), tuple(items)))
     return links

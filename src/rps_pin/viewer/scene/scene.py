@@ -11,8 +11,8 @@ from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.viewer.motion import FRAME_RATE, Motion, checked_configurations
 from rps_pin.viewer.scene.bounds import bounding_box
-from rps_pin.viewer.scene.keyframes import NodeKeyframes, link_keyframes
-from rps_pin.viewer.scene.links import Link, links_of
+from rps_pin.viewer.scene.keyframes import NodeKeyframes
+from rps_pin.viewer.scene.links import Link, link_poses, links_of
 from rps_pin.viewer.scene.stage import WORLD, grid_spacing, stage_around
 from rps_pin.viewer.writers.meshcat_writer import MeshcatWriter
 from rps_pin.viewer.writers.scene_writer import SceneWriter
@@ -125,7 +125,11 @@ class Scene:
         if motion.duration <= 0.0:
             raise InputError("a single configuration cannot be animated")
         elapsed, configurations = motion.sampled(frame_rate)
-        keyframes = link_keyframes(self.model, self._links, self.paths, configurations)
+        moving = [link for link in self._links if link.moves]
+        poses = link_poses(self.model, moving, configurations)
+        keyframes = [
+            NodeKeyframes(self.paths[link.name], poses[:, k]) for k, link in enumerate(moving)
+        ]
         self.writer.animate(elapsed, [*keyframes, *more])
 
     def _place(self, q: Array, links: Sequence[Link]) -> None:

@@ -110,34 +110,29 @@ def drawn_shapes(item: pin.GeometryObject) -> list[tuple[Shape, Array]]:
     InputError
         If the geometry is of another kind.
     """
-    shape = item.geometry
-    if isinstance(shape, coal.Capsule):
-        half, radius = float(shape.halfLength), float(shape.radius)
-        ends = [(Sphere(radius), translated([0.0, 0.0, height])) for height in (-half, half)]
-        return [(Cylinder(2.0 * half, radius, radius), np.eye(4)), *ends]
-    return [(_single_shape(item), np.eye(4))]
-
-
-def _single_shape(item: pin.GeometryObject) -> Shape:
-    shape = item.geometry
+    shape, here = item.geometry, np.eye(4)
     match shape:
+        case coal.Capsule():
+            half, radius = float(shape.halfLength), float(shape.radius)
+            ends = [(Sphere(radius), translated([0.0, 0.0, height])) for height in (-half, half)]
+            return [(Cylinder(2.0 * half, radius, radius), here), *ends]
         case coal.Box():
             x, y, z = (2.0 * float(half) for half in shape.halfSide)
-            return Box((x, y, z))
+            return [(Box((x, y, z)), here)]
         case coal.Sphere():
-            return Sphere(float(shape.radius))
+            return [(Sphere(float(shape.radius)), here)]
         case coal.Ellipsoid():
             a, b, c = (float(radius) for radius in shape.radii)
-            return Ellipsoid((a, b, c))
-        case coal.Cylinder():
-            return Cylinder(2.0 * float(shape.halfLength), float(shape.radius), float(shape.radius))
-        case coal.Cone():
-            return Cylinder(2.0 * float(shape.halfLength), float(shape.radius), 0.0)
+            return [(Ellipsoid((a, b, c)), here)]
+        case coal.Cylinder() | coal.Cone():
+            radius = float(shape.radius)
+            upper = radius if isinstance(shape, coal.Cylinder) else 0.0
+            return [(Cylinder(2.0 * float(shape.halfLength), radius, upper), here)]
         case coal.BVHModelBase() if shape.num_tris > 0:
             # coal has applied the URDF's scale to the vertices already.
             triangles = (shape.tri_indices(index) for index in range(shape.num_tris))
             faces = np.array([[triangle[0], triangle[1], triangle[2]] for triangle in triangles])
-            return TriangleMesh(shape.vertices(), faces)
+            return [(TriangleMesh(shape.vertices(), faces), here)]
     raise InputError(
         f"the geometry {item.name!r} is a {type(shape).__name__}; the viewer draws boxes, "
         "cylinders, spheres, capsules, cones, ellipsoids and triangle meshes"

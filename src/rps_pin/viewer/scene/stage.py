@@ -26,72 +26,50 @@ _GRID_RADIUS = 2.6
 """Of the grid's disc, in radii of the robot."""
 
 
-class Camera(NamedTuple):
-    """A camera that looks at the robot's centre."""
-
-    field_of_view: float
-    """Vertical angle, in degrees."""
-    position: tuple[float, float, float]
-    """In radii of the robot, from its centre, world axes."""
-
-
-class Lights(NamedTuple):
-    """One lamp that casts the shadows, and weak light from elsewhere; intensities from 0 to 1."""
-
-    lamp_position: tuple[float, float, float]
-    """In radii of the robot, from its centre, world axes."""
-    lamp: float
-    ambient: float
-    fill: float
-    """From the camera's side."""
-    sides: float
-    """From -x and from +x each."""
-
-
 class Stage(NamedTuple):
-    """Everything around a robot."""
+    """Everything around a robot: camera, lights, background, floor, grid and axes.
+
+    One lamp casts the shadows; weak light comes from elsewhere. Intensities are from 0 to 1.
+    Positions are in radii of the robot, from its centre, world axes. Colours are red, green and
+    blue, 0 to 1.
+    """
 
     box: BoundingBox
     """The box that the robot fills over its whole motion."""
-    camera: Camera
-    lights: Lights
-    top_colour: tuple[float, float, float]
-    """Red, green, blue of the background's upper edge, 0 to 1."""
-    bottom_colour: tuple[float, float, float]
-    shadow_opacity: float
-    """Of shadows on the floor."""
+    camera_position: tuple[float, float, float]
+    """Position of the camera, which looks at the robot's centre."""
     floor_height: float
     """z of the floor, m."""
     floor_size: float
     """Length of the floor's sides, m."""
     parts: tuple[Part, ...]
     """The grid and the world's axes, in `WORLD`."""
+    field_of_view: float = _FIELD_OF_VIEW
+    """Vertical angle of the camera, in degrees."""
+    lamp_position: tuple[float, float, float] = (1.5, -2.5, 5.0)
+    lamp: float = 0.5
+    ambient: float = 0.5
+    fill: float = 0.15
+    """From the camera's side."""
+    sides: float = 0.25
+    """From -x and from +x each."""
+    top_colour: tuple[float, float, float] = (0.86, 0.90, 0.94)
+    """Of the background's upper edge."""
+    bottom_colour: tuple[float, float, float] = (0.99, 0.99, 1.0)
+    shadow_opacity: float = 0.16
+    """Of shadows on the floor."""
 
 
 def stage_around(box: BoundingBox) -> Stage:
     """Return the stage for a robot that fills `box`."""
-    flat = _DISTANCE * math.cos(_ELEVATION)
-    position = (
-        flat * math.cos(_AZIMUTH),
-        flat * math.sin(_AZIMUTH),
-        _DISTANCE * math.sin(_ELEVATION),
-    )
+    flat, height = _DISTANCE * math.cos(_ELEVATION), _DISTANCE * math.sin(_ELEVATION)
     # Just below the robot, so that the two do not flicker through each other.
     floor_height = float(box.lower[2]) - 0.002 * box.radius
     lines = LineSegments(_grid_points(box, floor_height))
     grid = Part("", "grid", lines, Material(0xB4BDC8), np.eye(4))
     axes = Part("", "axes", _axes(0.25 * box.radius), Material(0xFFFFFF), np.eye(4))
-    return Stage(
-        box=box,
-        camera=Camera(_FIELD_OF_VIEW, position),
-        lights=Lights((1.5, -2.5, 5.0), lamp=0.5, ambient=0.5, fill=0.15, sides=0.25),
-        top_colour=(0.86, 0.90, 0.94),
-        bottom_colour=(0.99, 0.99, 1.0),
-        shadow_opacity=0.16,
-        floor_height=floor_height,
-        floor_size=2.0 * _GRID_RADIUS * box.radius,
-        parts=(grid, axes),
-    )
+    position = (flat * math.cos(_AZIMUTH), flat * math.sin(_AZIMUTH), height)
+    return Stage(box, position, floor_height, 2.0 * _GRID_RADIUS * box.radius, (grid, axes))
 
 
 def grid_spacing(radius: float) -> float:
@@ -124,16 +102,13 @@ def _axes(length: float) -> LineSegments:
 def _grid_points(box: BoundingBox, height: float) -> Array:
     """Return a disc of lines at whole multiples of the spacing, two rows each, shape (2 n, 3)."""
     spacing, reach = grid_spacing(box.radius), _GRID_RADIUS * box.radius
-    points: list[Array] = []
+    points = []
     for across, along in ((0, 1), (1, 0)):
-        first = math.ceil((box.centre[across] - reach) / spacing)
-        last = math.floor((box.centre[across] + reach) / spacing)
-        for index in range(first, last + 1):
-            offset = index * spacing - box.centre[across]
-            half = math.sqrt(max(0.0, reach**2 - offset**2))
-            for side in (-half, half):
-                point = np.full(3, height)
-                point[across] = index * spacing
-                point[along] = box.centre[along] + side
-                points.append(point)
-    return np.array(points)
+        ends = (box.centre[across] + np.array([-reach, reach])) / spacing
+        lines = spacing * np.arange(math.ceil(ends[0]), math.floor(ends[1]) + 1)
+        half = np.sqrt(np.maximum(0.0, reach**2 - (lines - box.centre[across]) ** 2))
+        rows = np.full((len(lines), 2, 3), height)
+        rows[..., across] = lines[:, None]
+        rows[..., along] = box.centre[along] + half[:, None] * [-1.0, 1.0]
+        points.append(rows.reshape(-1, 3))
+    return np.concatenate(points)

@@ -25,6 +25,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number, real_vector
@@ -92,7 +93,7 @@ class LiveView:
             raise InputError(f"robot is a {type(robot).__name__}; it must be an RPSRobot")
         positive_number(rate, "rate")
         start = real_vector(pose, 3, "pose")
-        self._asked = (robot, start, rate, port, title)
+        self._robot, self._asked = robot, (start, rate, port, title)
         # Not forked: Meshcat's server, and OpenBLAS, have threads.
         self._context = multiprocessing.get_context("spawn")
         self._slot = self._context.RawArray("B", _RECORD.size + _CHECKSUM)
@@ -132,19 +133,16 @@ class LiveView:
         try:
             self.url = self._start()
         except BaseException:  # Ctrl-C too: __exit__ is not called
-            self._stop()
+            self.__exit__()
             raise
         return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop()
 
     def _start(self) -> str:
         """Start the process and return its address."""
         self._line, theirs = self._context.Pipe()
         process = self._context.Process(
             target=_serve,
-            args=(*self._asked, self._slot, theirs),
+            args=(self._robot, self._asked, self._slot, theirs),
             name="rps_pin live view",
             daemon=True,
         )
@@ -159,8 +157,8 @@ class LiveView:
             raise RPSPinError(f"the live view did not start: {told}")
         return str(told)
 
-    def _stop(self) -> None:
-        """End the process: it ends when anything is sent, or the connection is closed."""
+    def __exit__(self, *_: object) -> None:
+        # The process ends when anything is sent, or the connection is closed.
         if self._line is not None:
             with contextlib.suppress(OSError):  # nobody listens any more
                 self._line.send(None)
@@ -195,15 +193,10 @@ def _ctrl_c_blocked() -> Iterator[None]:
 
 
 def _serve(
-    robot: RPSRobot,
-    start: Any,
-    rate: float,
-    port: int | None,
-    title: str,
-    slot: Any,
-    line: Connection,
+    robot: RPSRobot, asked: tuple[Array, float, int | None, str], slot: Any, line: Connection
 ) -> None:
     """Show the newest pose at the rate, until the connection or the loop's process ends."""
+    start, rate, port, title = asked
     memory, parent = memoryview(slot).cast("B"), os.getppid()
     # The shapes depend on the limits: they are those of the robot as it is.
     free, still, seen = RPSRobot(robot.parameters.without_limits()), np.zeros(3), 0.0

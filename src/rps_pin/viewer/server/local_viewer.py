@@ -7,43 +7,23 @@ listens on 127.0.0.1 and ends with its ``with`` block.
 from __future__ import annotations
 
 import asyncio
+import os
 import socket
 import threading
-from collections.abc import Mapping
-from types import TracebackType
 from typing import Self
 
 import tornado.httpserver
 import umsgpack
 
 from rps_pin.errors import InputError, RPSPinError
-from rps_pin.viewer.server.store import SceneStore
 from rps_pin.viewer.server.web import Hub, application
-from rps_pin.viewer.writers.window import Command
+from rps_pin.viewer.writers.window import Command, Window
 
 HOST = "127.0.0.1"
 """The address that is listened on."""
 _START_SECONDS = 10.0
 _FAREWELL_SECONDS = 0.5
 """Time for the open tabs to close their connections before these are cut."""
-
-
-class LiveWindow:
-    """A Meshcat window that sends every command to the browser tabs of a `LocalViewer`."""
-
-    def __init__(self, viewer: LocalViewer) -> None:
-        self._viewer = viewer
-
-    def send(self, command: Command) -> None:
-        """Show a command in every open tab and keep it for those that open later.
-
-        Raises
-        ------
-        RPSPinError
-            If the viewer is not running.
-        """
-        message = command.lower()
-        self._viewer.deliver(message, umsgpack.packb(message))
 
 
 class LocalViewer:
@@ -60,8 +40,8 @@ class LocalViewer:
 
     Attributes
     ----------
-    window : LiveWindow
-        The window to give to a `Scene`.
+    window : Window
+        The window to give to a `Scene`: this object.
 
     Examples
     --------
@@ -73,16 +53,13 @@ class LocalViewer:
     def __init__(self, port: int | None = None, *, title: str = "Robot", note: str = "") -> None:
         if port is not None and not 1 <= port <= 65535:
             raise InputError(f"port = {port}: it must be between 1 and 65535")
-        self._asked = port
-        self._title = title
-        self._note = note
-        self._store = SceneStore()
-        self._hub = Hub(self._store)
+        self._asked, self._title, self._note = port, title, note
+        self._hub = Hub()
         self._thread: threading.Thread | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._end: asyncio.Event | None = None
         self._port = 0
-        self.window = LiveWindow(self)
+        self.window: Window = self
 
     @property
     def url(self) -> str:
@@ -100,7 +77,14 @@ class LocalViewer:
     def __enter__(self) -> Self:
         if self._thread is not None:
             raise RPSPinError("the viewer is running already, or has run: make a new one")
-        listener = _listener(self._asked)
+        try:
+            listener = socket.create_server((HOST, self._asked or 0))
+        except OSError as error:
+            raise InputError(
+                f"port {self._asked} of {HOST} cannot be used ({os.strerror(error.errno or 0)}): "
+                "choose another, or none for a free one"
+            ) from error
+        listener.setblocking(False)
         self._port = int(listener.getsockname()[1])
         ready = threading.Event()
         self._thread = threading.Thread(
@@ -112,29 +96,29 @@ class LocalViewer:
         try:
             started = ready.wait(_START_SECONDS)
         except BaseException:
-            self._stop()
+            self.__exit__()
             raise
         if not started:
             raise RPSPinError(f"the viewer did not start within {_START_SECONDS:g} s")
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._stop()
-
-    def _stop(self) -> None:
-        """End the server's thread, if it serves, and wait until the port is free again."""
+    def __exit__(self, *_: object) -> None:
+        # The port is free again when this returns.
         loop, self._loop = self._loop, None
         if loop is not None and self._end is not None and self._thread is not None:
             loop.call_soon_threadsafe(self._end.set)
             self._thread.join()
 
-    def deliver(self, message: Mapping[str, object], packed: bytes) -> None:
-        """Pass a message, and the same in wire format, to the server's thread."""
+    def send(self, command: Command) -> None:
+        """Show a command in every open tab and keep it for those that open later.
+
+        Raises
+        ------
+        RPSPinError
+            If the viewer is not running.
+        """
+        message = command.lower()
+        packed = umsgpack.packb(message)
         if self._loop is None:
             raise RPSPinError("the viewer is not running: nothing can be shown")
         self._loop.call_soon_threadsafe(self._hub.publish, message, packed)
@@ -151,21 +135,3 @@ class LocalViewer:
         server.stop()
         await self._hub.close(_FAREWELL_SECONDS)
         await server.close_all_connections()
-
-
-def _listener(port: int | None) -> socket.socket:
-    """Return a listening socket on this machine's own address; port ``None`` is any free one."""
-    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    try:
-        # The port of a viewer that has just ended may be used again at once.
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind((HOST, port or 0))
-        listener.listen()
-        listener.setblocking(False)
-    except OSError as error:
-        listener.close()
-        raise InputError(
-            f"port {port} of {HOST} cannot be used ({error.strerror}): choose another, or none "
-            "for a free one"
-        ) from error
-    return listener

@@ -24,8 +24,8 @@ _GOING_AWAY = 1001
 class Hub:
     """The open tabs and the scene that they show; for the server's thread only."""
 
-    def __init__(self, store: SceneStore) -> None:
-        self._store = store
+    def __init__(self) -> None:
+        self._store = SceneStore()
         self._tabs: set[Tab] = set()
 
     def publish(self, message: Mapping[str, object], packed: bytes) -> None:
@@ -72,22 +72,17 @@ class _LocalHandler(tornado.web.RequestHandler):
     def prepare(self) -> None:
         origin = self.request.headers.get("Origin")
         hosts: frozenset[str] = self.settings["hosts"]
-        if self.request.headers.get("Host") not in hosts or (
-            origin is not None and not self._is_own(origin)
-        ):
+        foreign = origin is not None and origin not in {f"http://{host}" for host in hosts}
+        if foreign or self.request.headers.get("Host") not in hosts:
             self.set_status(403)
             self.finish("This viewer answers to this machine only.")
-
-    def _is_own(self, origin: str) -> bool:
-        return origin in {f"http://{host}" for host in self.settings["hosts"]}
 
 
 class _Text(_LocalHandler):
     """Handler of one text."""
 
     def initialize(self, content: str, kind: str) -> None:
-        self._content = content
-        self._kind = kind
+        self._content, self._kind = content, kind
 
     def get(self) -> None:
         self.set_header("Content-Type", f"{self._kind}; charset=utf-8")
@@ -105,8 +100,8 @@ class Tab(_LocalHandler, tornado.websocket.WebSocketHandler):
         self._stream: IOStream | None = None
 
     def check_origin(self, origin: str) -> bool:
-        """Return whether the page that opens the connection is this server's."""
-        return self._is_own(origin)
+        """Return True: `prepare` has refused other pages."""
+        return True
 
     def open(self, *args: str, **kwargs: str) -> None:
         """Join the hub."""
@@ -160,16 +155,13 @@ def application(hub: Hub, *, port: int, title: str, note: str) -> tornado.web.Ap
     # A browser leaves the port out of Host where it is HTTP's own.
     hosts = frozenset(f"{name}:{port}" for name in names) | frozenset(names if port == 80 else ())
     sockets = " ".join(f"ws://{host}" for host in sorted(hosts))
-    text = page(
-        title=title,
-        note=note,
-        policy=(
-            "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'unsafe-inline'; "
-            f"img-src data: blob:; connect-src {sockets}"
-        ),
-        scripts=f'<script src="{_SCRIPT_PATH}"></script>\n'
-        + inline_script(own_file("legend.js") + own_file("live.js")),
+    policy = (
+        "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'unsafe-inline'; "
+        f"img-src data: blob:; connect-src {sockets}"
     )
+    own = inline_script(own_file("legend.js") + own_file("live.js"))
+    scripts = f'<script src="{_SCRIPT_PATH}"></script>\n{own}'
+    text = page(title=title, note=note, policy=policy, scripts=scripts)
     return tornado.web.Application(
         [
             ("/", _Text, {"content": text, "kind": "text/html"}),

@@ -14,6 +14,7 @@ its users: the pages of this package draw it, and Meshcat's own ignore it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import meshcat
@@ -22,19 +23,10 @@ import numpy as np
 import umsgpack
 
 from rps_pin.arrays import Array
+from rps_pin.viewer.scene import shapes
 from rps_pin.viewer.scene.keyframes import NodeKeyframes, continuous_quaternions
 from rps_pin.viewer.scene.legend import LegendEntry
-from rps_pin.viewer.scene.shapes import (
-    Box,
-    Cylinder,
-    Ellipsoid,
-    LineSegments,
-    Part,
-    Shape,
-    Sphere,
-    TriangleMesh,
-    translated,
-)
+from rps_pin.viewer.scene.shapes import Cylinder, LineSegments, Part, TriangleMesh, translated
 from rps_pin.viewer.scene.stage import WORLD, Stage
 from rps_pin.viewer.writers.window import RawCommand, Window
 
@@ -59,24 +51,23 @@ class MeshcatWriter:
 
     def set_stage(self, stage: Stage) -> None:
         """Set camera, lights and background, and draw floor, grid and axes."""
-        box, lights = stage.box, stage.lights
-        world = np.eye(4)
+        box, world = stage.box, np.eye(4)
         world[:3, :3] /= box.radius
         world[:3, 3] = -box.centre / box.radius
         self.place(WORLD, world)
-        x, y, z = stage.camera.position
+        x, y, z = stage.camera_position
         camera = "/Cameras/default/rotated/<object>"
-        self._set(camera, "fov", stage.camera.field_of_view)
+        self._set(camera, "fov", stage.field_of_view)
         self._set(camera, "position", [x, z, -y])  # the camera's parent has y up
         self._set("/Lights/SpotLight", "visible", True)
         lamp = "/Lights/SpotLight/<object>"
-        self._set(lamp, "position", list(lights.lamp_position))
-        self._set(lamp, "intensity", lights.lamp)
+        self._set(lamp, "position", list(stage.lamp_position))
+        self._set(lamp, "intensity", stage.lamp)
         self._set(lamp, "castShadow", True)
-        self._set("/Lights/AmbientLight/<object>", "intensity", lights.ambient)
-        self._set("/Lights/FillLight/<object>", "intensity", lights.fill)
+        self._set("/Lights/AmbientLight/<object>", "intensity", stage.ambient)
+        self._set("/Lights/FillLight/<object>", "intensity", stage.fill)
         for side in ("PointLightNegativeX", "PointLightPositiveX"):
-            self._set(f"/Lights/{side}/<object>", "intensity", lights.sides)
+            self._set(f"/Lights/{side}/<object>", "intensity", stage.sides)
         self._set("/Background", "top_color", list(stage.top_colour))
         self._set("/Background", "bottom_color", list(stage.bottom_colour))
         self._set("/Grid", "visible", False)
@@ -113,44 +104,33 @@ class MeshcatWriter:
         """Send the legend to the page."""
         lines = []
         for entry, shown in zip(entries, visible, strict=True):
-            line: dict[str, object] = {
-                "name": entry.name,
-                "text": entry.text,
-                "colour": entry.colour,
-                "visible": shown,
-            }
-            if entry.bar is not None:
-                bar = entry.bar
-                line |= {"colours": list(bar.colours), "low": bar.low, "high": bar.high}
-            lines.append(line)
+            line = {**asdict(entry), "visible": shown}
+            lines.append(line | (line.pop("bar") or {}))
         self._set(WORLD, "userData", {"layers": lines})
 
     def animate(self, elapsed: Array, keyframes: Sequence[NodeKeyframes]) -> None:
         """Let the page play keyframes in a loop, with Meshcat's playback controls."""
         # Meshcat's own `Animation` writes a dictionary for each keyframe; packed arrays, which
         # three.js reads as well, are a tenth of the size.
-        animations: list[dict[str, object]] = []
+        tracks: list[tuple[str, list[dict[str, object]]]] = []
         for node in keyframes:
-            animations.append({"path": node.path, "clip": _clip(_pose_tracks(elapsed, node.poses))})
+            tracks.append((node.path, _pose_tracks(elapsed, node.poses)))
             if node.colours is not None:
                 colour = _track("material.color", "color", elapsed, node.colours)
-                animations += [
-                    {"path": f"{part}/<object>", "clip": _clip([colour])} for part in node.parts
-                ]
-        self._window.send(
-            RawCommand(
-                {
-                    "type": "set_animation",
-                    "path": "",
-                    "animations": animations,
-                    "options": {"play": True, "repetitions": float("inf")},
-                }
-            )
-        )
+                tracks += [(f"{part}/<object>", [colour]) for part in node.parts]
+        # The tracks' times count frames of 1 / fps; with one frame a second they are seconds.
+        animations = [
+            {"path": path, "clip": {"fps": 1, "name": "default", "tracks": own}}
+            for path, own in tracks
+        ]
+        options = {"play": True, "repetitions": float("inf")}
+        self._send("set_animation", "", animations=animations, options=options)
+
+    def _send(self, kind: str, path: str, **message: object) -> None:
+        self._window.send(RawCommand({"type": kind, "path": path, **message}))
 
     def _set(self, path: str, name: str, value: object) -> None:
-        message = {"type": "set_property", "path": path, "property": name, "value": value}
-        self._window.send(RawCommand(message))
+        self._send("set_property", path, property=name, value=value)
 
     def _lay_floor(self, stage: Stage) -> None:
         """Lay an invisible floor that shows nothing but shadows."""
@@ -177,7 +157,7 @@ class MeshcatWriter:
             "materials": [shadow],
             "object": mesh,
         }
-        self._window.send(RawCommand({"type": "set_object", "path": path, "object": floor}))
+        self._send("set_object", path, object=floor)
         x, y, _ = stage.box.centre
         self.place(path, translated([x, y, stage.floor_height]))
 
@@ -207,13 +187,13 @@ def _object(part: Part) -> Any:
     return mg.Mesh(_geometry(shape), surface)
 
 
-def _geometry(shape: Shape) -> Any:
+def _geometry(shape: shapes.Shape) -> Any:
     match shape:
-        case Box():
+        case shapes.Box():
             return mg.Box(list(shape.size))
-        case Sphere():
+        case shapes.Sphere():
             return mg.Sphere(shape.radius)
-        case Ellipsoid():
+        case shapes.Ellipsoid():
             return mg.Ellipsoid(list(shape.radii))
         case Cylinder():
             radii = {"radiusTop": shape.upper_radius, "radiusBottom": shape.radius}
@@ -221,11 +201,6 @@ def _geometry(shape: Shape) -> Any:
         case TriangleMesh():
             return mg.TriangularMeshGeometry(*shape)
     raise TypeError(f"{type(shape).__name__} is not a surface")
-
-
-def _clip(tracks: list[dict[str, object]]) -> dict[str, object]:
-    # The tracks' times count frames of 1 / fps; with one frame a second they are seconds.
-    return {"fps": 1, "name": "default", "tracks": tracks}
 
 
 def _pose_tracks(elapsed: Array, poses: Array) -> list[dict[str, object]]:
@@ -242,8 +217,8 @@ def _pose_tracks(elapsed: Array, poses: Array) -> list[dict[str, object]]:
 
 
 def _track(name: str, kind: str, elapsed: Array, values: Array) -> dict[str, object]:
-    return {"name": f".{name}", "type": kind, "times": _packed(elapsed), "values": _packed(values)}
-
-
-def _packed(values: Array) -> umsgpack.Ext:
-    return umsgpack.Ext(_FLOAT32_ARRAY, values.astype("<f4").tobytes())
+    times, packed = (
+        umsgpack.Ext(_FLOAT32_ARRAY, numbers.astype("<f4").tobytes())
+        for numbers in (elapsed, values)
+    )
+    return {"name": f".{name}", "type": kind, "times": times, "values": packed}

@@ -17,18 +17,10 @@ import trimesh
 
 from rps_pin.arrays import Array
 from rps_pin.errors import RPSPinError
+from rps_pin.viewer.scene import shapes
 from rps_pin.viewer.scene.keyframes import NodeKeyframes
 from rps_pin.viewer.scene.legend import LegendEntry
-from rps_pin.viewer.scene.shapes import (
-    Box,
-    Cylinder,
-    Ellipsoid,
-    LineSegments,
-    Part,
-    Shape,
-    Sphere,
-    TriangleMesh,
-)
+from rps_pin.viewer.scene.shapes import Box, Cylinder, LineSegments, Part, TriangleMesh
 from rps_pin.viewer.scene.stage import WORLD, Stage
 
 _LIGHT = math.pi
@@ -54,16 +46,16 @@ class ViserWriter:
 
     def set_stage(self, stage: Stage) -> None:
         """Set camera and lights, and draw grid and axes."""
-        box, lights, scene = stage.box, stage.lights, self._server.scene
+        box, scene = stage.box, self._server.scene
         scene.configure_default_lights(enabled=False)
         scene.configure_environment_map(None)
-        scene.add_light_ambient("/light/ambient", intensity=_LIGHT * lights.ambient)
-        position = np.asarray(stage.camera.position)
+        scene.add_light_ambient("/light/ambient", intensity=_LIGHT * stage.ambient)
+        position = np.asarray(stage.camera_position)
         for name, direction, intensity in (
-            ("lamp", lights.lamp_position, lights.lamp),
-            ("fill", position, lights.fill),
-            ("side_1", (-1.0, 0.0, 0.0), lights.sides),
-            ("side_2", (1.0, 0.0, 0.0), lights.sides),
+            ("lamp", stage.lamp_position, stage.lamp),
+            ("fill", position, stage.fill),
+            ("side_1", (-1.0, 0.0, 0.0), stage.sides),
+            ("side_2", (1.0, 0.0, 0.0), stage.sides),
         ):
             scene.add_light_directional(
                 f"/light/{name}", intensity=_LIGHT * intensity, position=tuple(direction)
@@ -73,7 +65,7 @@ class ViserWriter:
         camera, distance = self._server.initial_camera, box.radius * np.linalg.norm(position)
         camera.position = tuple(box.centre + box.radius * position)
         camera.look_at = tuple(box.centre)
-        camera.fov = math.radians(stage.camera.field_of_view)
+        camera.fov = math.radians(stage.field_of_view)
         camera.near, camera.far = 0.01 * distance, 100.0 * distance
 
     def add_part(self, path: str, part: Part, *, casts_shadow: bool = True) -> None:
@@ -96,9 +88,8 @@ class ViserWriter:
         elif isinstance(shape, TriangleMesh) and shape.colours is not None:
             alpha = np.full((len(shape.colours), 1), part.material.opacity)
             colours = np.round(255 * np.hstack([shape.colours, alpha])).astype(np.uint8)
-            mesh = trimesh.Trimesh(
-                shape.vertices, shape.faces, vertex_colors=colours, process=False
-            )
+            mesh = _mesh(shape)
+            mesh.visual.vertex_colors = colours
             handle = scene.add_mesh_trimesh(path, mesh, cast_shadow=False, receive_shadow=False)
         else:
             mesh = _mesh(shape)
@@ -177,23 +168,20 @@ def _hint(entry: LegendEntry) -> str:
     return entry.text if bar is None else f"{entry.text} ({bar.low} to {bar.high})"
 
 
-def _mesh(shape: Shape) -> trimesh.Trimesh:
-    """Return a shape's surface as triangles."""
-    mesh: trimesh.Trimesh
+def _mesh(shape: shapes.Shape) -> Any:
+    """Return the triangles of a surface."""
     match shape:
         case Box():
-            mesh = trimesh.creation.box(shape.size)
-        case Sphere():
-            mesh = trimesh.creation.icosphere(subdivisions=3, radius=shape.radius)
-        case Ellipsoid():
+            return trimesh.creation.box(shape.size)
+        case shapes.Sphere():
+            return trimesh.creation.icosphere(subdivisions=3, radius=shape.radius)
+        case shapes.Ellipsoid():
             ball = trimesh.creation.icosphere(subdivisions=3)
-            mesh = trimesh.Trimesh(ball.vertices * shape.radii, ball.faces)
+            return trimesh.Trimesh(ball.vertices * shape.radii, ball.faces)
         case Cylinder():
             half = shape.length / 2.0
             outline = [[0.0, -half], [shape.radius, -half], [shape.upper_radius, half], [0.0, half]]
-            mesh = trimesh.creation.revolve(outline, sections=48)
+            return trimesh.creation.revolve(outline, sections=48)
         case TriangleMesh():
-            mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
-        case _:
-            raise TypeError(f"{type(shape).__name__} is not a surface")
-    return mesh
+            return trimesh.Trimesh(shape.vertices, shape.faces, process=False)
+    raise TypeError(f"{type(shape).__name__} is not a surface")
