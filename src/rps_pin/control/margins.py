@@ -19,9 +19,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from rps_pin.arrays import Array, ComplexArray
-from rps_pin.control.axis_loop import axis_loop
-
-Response = Callable[[Array], ComplexArray]
+from rps_pin.control.axis_loop import AxisLoop, axis_loop
 
 
 class LoopMargins(NamedTuple):
@@ -103,67 +101,58 @@ def loop_margins(
     t = axis.grid()
     value = axis.response(t)
     nyquist = 0.5 / period
-    crossings = _unit_gain(axis.response, t, value)
+    crossings = _roots(_gain_excess, axis, t, value)
+    if abs(value[-1]) >= 1:
+        crossings = np.append(crossings, np.pi)
     # Without a crossing the whole curve is inside the unit circle: all gains are zero.
     crossover = float(nyquist * crossings[-1] / np.pi) if crossings.size else 0.0
-    if axis.kp == 0 or np.abs(np.linalg.eigvals(axis.matrix())).max() >= 1:
+    unstable = axis.kp == 0 or np.abs(np.linalg.eigvals(axis.matrix())).max() >= 1
+    if unstable or not crossings.size:
         return LoopMargins(False, 1.0, 1.0, 0.0, 0.0, 0.0, crossover, 0.0)
-    factors = _critical_factors(axis.response, t, value)
+    # Factors of the gain with a pole on the unit circle: 1 / abs(L) where L < 0.
+    real = axis.response(np.append(_roots(np.imag, axis, t, value), np.pi)).real
+    factors = 1 / real[real > 0]
     lag = np.angle(axis.response(crossings))  # of -L: the angle by which L leads -1
+    # abs(L / (1 + L)) = 1 / sqrt(2); pi if it is nowhere.
+    limits = _roots(
+        lambda minus_l: _gain_excess(minus_l / (1 - minus_l), math.sqrt(0.5)), axis, t, value
+    )
     return LoopMargins(
         stable=True,
         gain_up=float(np.min(factors[factors > 1], initial=np.inf)),
         gain_down=float(np.max(factors[factors < 1], initial=0.0)),
         phase=float(np.abs(lag).min()),
         delay=float(period * np.min(lag % (2 * np.pi) / crossings)),
-        modulus=_modulus(axis.response, t, value),
+        modulus=_modulus(axis, t, value),
         crossover=crossover,
-        bandwidth=nyquist * _bandwidth(axis.response, t, value) / np.pi,
+        bandwidth=nyquist * float(limits[0] if limits.size else math.pi) / np.pi,
     )
 
 
-def _roots(function: Callable[[Array], Array], t: Array, values: Array) -> Array:
-    """Return the angles where a real function of the angle changes sign."""
-    below = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
+def _gain_excess(value: ComplexArray, gain: float = 1.0) -> Array:
+    return np.asarray(np.abs(value) - gain)
+
+
+def _roots(
+    function: Callable[[ComplexArray], Array], axis: AxisLoop, t: Array, value: ComplexArray
+) -> Array:
+    """Return the angles where a real function of -L changes sign; `value` is -L at t."""
+    signs = np.sign(function(value))
+    below = np.flatnonzero(signs[:-1] * signs[1:] < 0)
 
     def scalar(angle: float) -> float:
-        return float(function(np.array(angle)))
+        return float(function(axis.response(np.array(angle))))
 
     return np.array([brentq(scalar, t[i], t[i + 1], xtol=1e-15, rtol=1e-13) for i in below])
 
 
-def _unit_gain(response: Response, t: Array, value: ComplexArray) -> Array:
-    """Return the angles where abs(L) = 1, rising; also pi if abs(L) is at least 1 there."""
-    roots = _roots(lambda angle: np.abs(response(angle)) - 1, t, np.abs(value) - 1)
-    return np.append(roots, np.pi) if abs(value[-1]) >= 1 else roots
-
-
-def _critical_factors(response: Response, t: Array, value: ComplexArray) -> Array:
-    """Return the factors of the gain with a pole on the unit circle: 1 / abs(L) where L < 0."""
-    roots = _roots(lambda angle: response(angle).imag, t, value.imag)
-    real = response(np.append(roots, np.pi)).real
-    factors: Array = 1 / real[real > 0]
-    return factors
-
-
-def _modulus(response: Response, t: Array, value: ComplexArray) -> float:
+def _modulus(axis: AxisLoop, t: Array, value: ComplexArray) -> float:
     distance = np.abs(1 - value)
     i = int(distance.argmin())
     found = minimize_scalar(
-        lambda angle: float(np.abs(1 - response(np.array(angle)))),
+        lambda angle: float(np.abs(1 - axis.response(np.array(angle)))),
         bounds=(t[max(i - 1, 0)], t[min(i + 1, t.size - 1)]),
         method="bounded",
         options={"xatol": 1e-9 * t[i]},
     )
     return float(min(found.fun, distance[i]))
-
-
-def _bandwidth(response: Response, t: Array, value: ComplexArray) -> float:
-    """Return the first angle where abs(L / (1 + L)) = 1 / sqrt(2); pi if there is none."""
-
-    def excess(minus_l: ComplexArray) -> Array:
-        gain: Array = np.abs(minus_l / (1 - minus_l)) - math.sqrt(0.5)
-        return gain
-
-    roots = _roots(lambda angle: excess(response(angle)), t, excess(value))
-    return float(roots[0]) if roots.size else math.pi

@@ -41,9 +41,7 @@ class DisplayedMechanism:
     @property
     def title(self) -> str:
         """The robot's name, for captions."""
-        if self.robot is not None:
-            return f"3-RPS {self.robot.parameters.name}"
-        return self.mechanism.name
+        return f"3-RPS {self.robot.parameters.name}" if self.robot else self.mechanism.name
 
 
 def displayed(

@@ -11,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
@@ -193,9 +192,8 @@ def _keyframes(path: str, drawn: DrawnLayer, states: Sequence[MotionState]) -> l
     keyframes = []
     for node, first in updates[0].items():
         poses = np.array([nodes[node].placement for nodes in updates])
-        colours: Array | None = None
-        if first.colour is not None:
-            colours = np.array([nodes[node].colour for nodes in updates])
+        changes = first.colour is not None
+        colours = np.array([nodes[node].colour for nodes in updates]) if changes else None
         parts = [_part_path(path, part) for part in _parts_of(drawn, node)]
         keyframes.append(NodeKeyframes(f"{path}/{node}", poses, parts, colours))
     return keyframes

@@ -17,7 +17,6 @@ import os
 import signal
 import struct
 import zlib
-from collections.abc import Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -146,9 +145,16 @@ class LiveView:
             name="rps_pin live view",
             daemon=True,
         )
-        with theirs, _ctrl_c_blocked():
-            process.start()
+        # Block SIGINT in the processes that are started here: Ctrl-C is for the loop. They inherit
+        # the mask, and so show no traceback, not even while they import.
+        resource_tracker.ensure_running()  # where it first has to start it unblocks the signal
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            with theirs:
+                process.start()
             self._process = process
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         try:
             told = self._line.recv() if self._line.poll(_START_SECONDS) else "it took too long"
         except (EOFError, OSError):
@@ -173,20 +179,6 @@ class LiveView:
 def _checked(record: bytes) -> bytes:
     """Return a record and its checksum."""
     return record + zlib.crc32(record).to_bytes(_CHECKSUM, "little")
-
-
-@contextlib.contextmanager
-def _ctrl_c_blocked() -> Iterator[None]:
-    """Block SIGINT in the processes that are started here: Ctrl-C is for the loop.
-
-    They inherit the mask, and so show no traceback, not even while they import.
-    """
-    resource_tracker.ensure_running()  # where it first has to start, it would unblock the signal
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 # In the viewer's process --------------------------------------------------------------------------

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-_Key = tuple[str, str, str]
-
 
 class SceneStore:
     """The latest message of each kind for each path of the scene tree, oldest change first.
@@ -15,17 +13,17 @@ class SceneStore:
     """
 
     def __init__(self) -> None:
-        self._messages: dict[_Key, bytes] = {}
+        self._messages: dict[tuple[str, str, str], bytes] = {}
 
     def apply(self, message: Mapping[str, object], packed: bytes) -> None:
         """Store a message; `packed` is the same in Meshcat's wire format."""
         kind, path = str(message["type"]), str(message.get("path", ""))
         if kind == "delete":
-            self._forget(lambda key: _within(key[1], path))
+            self._forget(lambda other: f"{other}/".startswith(f"{path}/"))
             return
         if kind == "set_object":
             # The new object starts without what was set on the old one.
-            self._forget(lambda key: key[1] == f"{path}/<object>")
+            self._forget(lambda other: other == f"{path}/<object>")
         key = (kind, path, str(message.get("property", "")))
         self._messages.pop(key, None)
         self._messages[key] = packed
@@ -36,10 +34,5 @@ class SceneStore:
     def __len__(self) -> int:
         return len(self._messages)
 
-    def _forget(self, doomed: Callable[[_Key], bool]) -> None:
-        self._messages = {key: kept for key, kept in self._messages.items() if not doomed(key)}
-
-
-def _within(path: str, ancestor: str) -> bool:
-    """Return whether `path` is `ancestor` or lies below it."""
-    return path == ancestor or path.startswith(f"{ancestor}/")
+    def _forget(self, doomed: Callable[[str], bool]) -> None:
+        self._messages = {key: kept for key, kept in self._messages.items() if not doomed(key[1])}
