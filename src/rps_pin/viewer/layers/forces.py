@@ -64,10 +64,11 @@ class Forces(RobotSizedLayer):
                 q, v, a = _closed_state(context, state)[:3]
                 tau = mechanism.inverse_dynamics(q, v, a, wrenches=outside).tau
             pin.computeJointJacobians(model, data, state.q)
-            return {
-                one.node: (np.array(data.oMi[one.joint].translation), force * one.axis(model, data))
-                for one, force in zip(actuators, tau, strict=True)
-            }
+            found = {}
+            for (node, joint, column, turns), force in zip(actuators, tau, strict=True):
+                axis = _column(model, data, joint, column)[3 * turns :][:3]
+                found[node] = (np.array(data.oMi[joint].translation), force * axis)
+            return found
 
         units = {one.node: "N m" if one.turns else "N" for one in actuators}
         scales = {"N": self.newtons_per_metre, "N m": self.newton_metres_per_metre}
@@ -211,11 +212,6 @@ class _Actuator(NamedTuple):
     """Its index in the velocity."""
     turns: bool
     """Whether its force is a torque."""
-
-    def axis(self, model: pin.Model, data: pin.Data) -> Array:
-        """Return its unit direction in world axes, after `computeJointJacobians`."""
-        column = _column(model, data, self.joint, self.column)
-        return column[3:] if self.turns else column[:3]
 
 
 def _actuators(mechanism: ClosedLoopModel) -> list[_Actuator]:
