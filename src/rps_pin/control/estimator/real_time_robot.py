@@ -259,7 +259,7 @@ class RealTimeRobot:
             )
         if status & Status.BEYOND_LIMIT:
             messages += self._limits.messages(state.geometry)
-            messages += self._limits.speed_messages(state.speed)
+            messages += self._limits.actuator_messages("speed", state.speed)
         return "; ".join(messages) or "ok"
 
     @property
@@ -287,8 +287,8 @@ class RealTimeRobot:
             if geometry is None:
                 return "; ".join([*messages, "the length of a leg is zero"])
             messages += self._limits.messages(geometry)
-            f1, f2, f3 = self.answers.forces.tolist()
-            messages += self._limits.force_messages((f1, f2, f3))
+            forces = self.answers.forces.tolist()
+            messages += self._limits.actuator_messages("force", forces)
         return "; ".join(messages) or "ok"
 
     # Inner workings -------------------------------------------------------------------------------

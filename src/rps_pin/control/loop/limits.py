@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -58,13 +59,15 @@ class RobotLimits:
         cone = cone_angles(angle, rotation(np.array(geometry.pose)), p.spherical_rest_angle)
         return [str(one) for one in violations(p, length, angle, cone)]
 
-    def speed_messages(self, speed: Triple) -> list[str]:
-        """Return a sentence for each actuator beyond its speed limit."""
-        return _messages("speed", speed, self._greatest_speed, "m/s")
-
-    def force_messages(self, force: Triple) -> list[str]:
-        """Return a sentence for each actuator beyond its force limit."""
-        return _messages("force", force, self._greatest_force, "N")
+    def actuator_messages(self, quantity: str, values: Iterable[float]) -> list[str]:
+        """Return a sentence for each actuator beyond its limit of ``speed`` or ``force``."""
+        speed, force = (self._greatest_speed, "m/s"), (self._greatest_force, "N")
+        limit, unit = speed if quantity == "speed" else force
+        return [
+            f"leg {leg}: {quantity} is {value:.6g} {unit}; its limit is {limit:.6g} {unit}"
+            for leg, value in enumerate(values, start=1)
+            if abs(value) > limit
+        ]
 
 
 @compiled
@@ -83,11 +86,3 @@ def _within_limits(geometry: LegGeometry, bounds: _Bounds) -> bool:
         if cone_cosine(cosine, sine, axis[0], axis[2]) < least_cosine:
             return False
     return True
-
-
-def _messages(quantity: str, values: Triple, limit: float, unit: str) -> list[str]:
-    return [
-        f"leg {leg}: {quantity} is {value:.6g} {unit}; its limit is {limit:.6g} {unit}"
-        for leg, value in enumerate(values, start=1)
-        if abs(value) > limit
-    ]
