@@ -29,9 +29,10 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
 from rps_pin.paper.lagrange_terms import lagrange_terms
-from rps_pin.paper.lagrange_vectors import refuse_large_gain, times
+from rps_pin.paper.lagrange_vectors import times
 from rps_pin.rps.kinematics.legs import leg_motion
 from rps_pin.rps.kinematics.pose import checked_motion
+from rps_pin.rps.kinematics.rates import accepted_gains
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 
@@ -119,7 +120,7 @@ def _multipliers(
     """Solve Eq. 25 for lambda, arcs d_i dphi_i instead of angles and distances instead of f."""
     side = 2 * math.sqrt(3.0) * parameters.platform_radius  # f = side * (distance - sqrt(3) h)
     cosines = jacobian[..., 3:] / (side * length[..., None, :])
-    refuse_large_gain(
+    accepted_gains(
         cosines,
         max_gain,
         "Eq. 25 does not determine the multipliers{where}: the legs' angles could change with "

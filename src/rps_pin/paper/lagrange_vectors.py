@@ -21,9 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, SingularityError
 from rps_pin.rps.kinematics.legs import RADIAL
-from rps_pin.rps.kinematics.samples import refuse
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -129,26 +127,3 @@ def times(matrix: Array, vector: Array) -> Array:
     """Return the product of matrices (..., m, n) and vectors (..., n), shape (..., m)."""
     product: Array = (matrix @ vector[..., None])[..., 0]
     return product
-
-
-def refuse_large_gain(matrices: Array, limit: float, message: str) -> None:
-    """Raise `SingularityError` at the first matrix whose inverse is larger than a limit.
-
-    Parameters
-    ----------
-    matrices
-        Shape (..., n, n), in one unit.
-    limit
-        Largest norm of the inverse, the gain, that is accepted; positive.
-    message
-        With the fields ``{where}``, ``{gain}`` and ``{limit}``.
-    """
-    if not limit > 0:
-        raise InputError(f"max_gain = {limit}: it must be positive")
-    smallest = np.linalg.svd(matrices, compute_uv=False)[..., -1]
-
-    def error(first: tuple[int, ...], where: str) -> SingularityError:
-        gain = 1 / float(smallest[first]) if smallest[first] > 0 else math.inf
-        return SingularityError(message.format(where=where, gain=gain, limit=limit), gain, limit)
-
-    refuse(~(smallest * limit >= 1), error)

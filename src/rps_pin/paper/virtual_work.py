@@ -27,11 +27,12 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
-from rps_pin.paper.lagrange_vectors import refuse_large_gain, times
+from rps_pin.paper.lagrange_vectors import times
 from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.kinematics.pose import checked_motion, platform_motion
 from rps_pin.rps.kinematics.rates import (
     LegJacobians,
+    accepted_gains,
     jacobian_rates_of_legs,
     leg_jacobians,
 )
@@ -98,7 +99,7 @@ def virtual_work_forces(
     # Tilts made lengths by h, on both sides.
     units = np.array([1.0, *2 * [1 / parameters.platform_radius]])
     scaled = legs.length_jacobian * units
-    refuse_large_gain(
+    accepted_gains(
         scaled,
         max_gain,
         "the actuators cannot hold the platform here{where}: it could move {gain:.3g} times as "

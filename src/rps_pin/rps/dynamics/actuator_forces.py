@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -62,7 +61,7 @@ def actuator_forces(
     if suspect.any():
         refused[suspect] = _refused(parameters, x[suspect], max_condition)
         if errors == "raise":
-            refuse(refused, partial(_error, parameters, x, refused.size, max_condition))
+            _refuse(parameters, x, refused, max_condition)
     force[refused] = 0.0
     _refuse_overflow(force)
     if errors == "raise":
@@ -158,30 +157,29 @@ def _refused(parameters: RPSParameters, pose: Array, max_condition: float) -> Bo
     return refused
 
 
-def _error(
-    parameters: RPSParameters,
-    pose: Array,
-    count: int,
-    max_condition: float,
-    first: tuple[int, ...],
-    _: str,
-) -> UnreachableError | SingularityError:
-    """Return the error of a sample that is refused."""
-    which = f"sample {first[0] if len(first) == 1 else first} of {count}: " if first else ""
-    try:
-        inverse_kinematics(parameters, pose[first])
-    except UnreachableError as error:
-        return UnreachableError(f"{which}{error}", error.violations)
-    distance = float(passive_conditioning(parameters, pose[first]))
-    condition = 1 / distance if distance > 0 else math.inf
-    z, tilt_x, tilt_y = pose[first]
-    return SingularityError(
-        f"{which}pose z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad is singular: the "
-        f"condition number of the passive joints' Jacobian is {condition:.3g}, and at most "
-        f"{max_condition:.3g} is accepted",
-        condition,
-        max_condition,
-    )
+def _refuse(parameters: RPSParameters, pose: Array, refused: Bools, max_condition: float) -> None:
+    """Raise the error of the first sample that is refused."""
+
+    def error(first: tuple[int, ...], _: str) -> UnreachableError | SingularityError:
+        which = (
+            f"sample {first[0] if len(first) == 1 else first} of {refused.size}: " if first else ""
+        )
+        try:
+            inverse_kinematics(parameters, pose[first])
+        except UnreachableError as out:
+            return UnreachableError(f"{which}{out}", out.violations)
+        distance = float(passive_conditioning(parameters, pose[first]))
+        condition = 1 / distance if distance > 0 else math.inf
+        z, tilt_x, tilt_y = pose[first]
+        return SingularityError(
+            f"{which}pose z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad is singular: the "
+            f"condition number of the passive joints' Jacobian is {condition:.3g}, and at most "
+            f"{max_condition:.3g} is accepted",
+            condition,
+            max_condition,
+        )
+
+    refuse(refused, error)
 
 
 def _refuse_overflow(force: Array) -> None:

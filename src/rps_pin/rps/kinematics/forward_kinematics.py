@@ -107,9 +107,25 @@ def forward_kinematics(
     angle = np.arctan2(direction[3:], direction[:3]).T
     reached, batch = fraction == 1.0, shape[:-1]
 
-    def error(first: tuple[int, ...], where: str) -> ClosureError | SingularityError:
+    def error(_: tuple[int, ...], where: str) -> ClosureError | SingularityError:
         i = int(np.argmin(reached))
-        return _error(goal[i], angle[i], fraction[i], condition[i], limit, g, h, where)
+        d = goal[i]
+        asked = f"leg lengths ({d[0]:.6g}, {d[1]:.6g}, {d[2]:.6g}) m{where}"
+        if d.max() <= longest_leg(g, h) and not len(assembly_modes(d, g, h).angle):
+            best = least_squares(_residuals_of, angle[i], args=(d, g, h))
+            gap = float(np.abs(best.fun).max())
+            return ClosureError(
+                f"{asked} cannot close: no pose of the platform has them; nearest to the one "
+                f"continued, a distance between two tips is {gap:.3g} m off {_SQRT3 * h:.6g} m",
+                gap,
+            )
+        return SingularityError(
+            f"{asked} cannot be reached from the pose given: after {fraction[i]:.4%} of the line a "
+            f"parallel singularity is met (condition {condition[i]:.3g}, limit {limit:.3g}). "
+            "assembly_modes lists the poses that have such lengths",
+            float(condition[i]),
+            limit,
+        )
 
     if errors == "raise":
         refuse(~reached.reshape(batch), error)
@@ -309,35 +325,6 @@ def follow_many(
             done[going], share[going], condition[going] = progress
             going = going[(done[going] < 1.0) & (share[going] >= 1e-14)]
     return direction, done, condition
-
-
-def _error(
-    goal: Array,
-    angle: Array,
-    fraction: float,
-    condition: float,
-    limit: float,
-    g: float,
-    h: float,
-    where: str,
-) -> ClosureError | SingularityError:
-    """Return the error that says why lengths cannot be reached."""
-    asked = f"leg lengths ({goal[0]:.6g}, {goal[1]:.6g}, {goal[2]:.6g}) m{where}"
-    if goal.max() <= longest_leg(g, h) and not len(assembly_modes(goal, g, h).angle):
-        best = least_squares(_residuals_of, angle, args=(goal, g, h))
-        gap = float(np.abs(best.fun).max())
-        return ClosureError(
-            f"{asked} cannot close: no pose of the platform has them; nearest to the one "
-            f"continued, a distance between two tips is {gap:.3g} m off {_SQRT3 * h:.6g} m",
-            gap,
-        )
-    return SingularityError(
-        f"{asked} cannot be reached from the pose given: after {fraction:.4%} of the line a "
-        f"parallel singularity is met (condition {condition:.3g}, limit {limit:.3g}). "
-        "assembly_modes lists the poses that have such lengths",
-        float(condition),
-        limit,
-    )
 
 
 def _residuals_of(angle: Array, length: Array, g: float, h: float) -> Array:

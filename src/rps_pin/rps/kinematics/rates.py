@@ -278,7 +278,6 @@ def pose_rate(
     SingularityError
         If K is too near a singular matrix: the gain and its limit are in the message.
     """
-    _check_options(errors, max_gain)
     x, speed = one_shape(pose=checked_pose(pose), leg_speed=checked_legs(leg_speed))
     return _solved(parameters, x, lambda _: speed, errors, max_gain)
 
@@ -308,7 +307,6 @@ def pose_acceleration(
     InputError, UnreachableError, SingularityError
         As `pose_rate`.
     """
-    _check_options(errors, max_gain)
     x, dx, acceleration = one_shape(
         pose=checked_pose(pose),
         rate=checked_pose(rate, "rate"),
@@ -388,33 +386,55 @@ def _solved(
         refuse_vanishing(legs.length, vanishing)
     units = np.array([1.0, *2 * [1 / parameters.platform_radius]])
     scaled = legs.length_jacobian * units
-    values = np.linalg.svd(scaled, compute_uv=False)
-    determined = (values[..., 2] * max_gain >= 1) & ~vanishing.any(axis=-1)
-    if errors == "raise":
-        _refuse_singular(values, determined, max_gain)
+    determined = ~vanishing.any(axis=-1) & accepted_gains(
+        scaled,
+        max_gain,
+        "the legs do not determine how the platform moves here{where}: it could move {gain:.3g} "
+        "times as fast as they, and at most {limit:.3g} times is accepted",
+        errors,
+    )
     regular = np.where(determined[..., None, None], scaled, np.eye(3))
     right = np.where(determined[..., None], right_side(legs), 0.0)
     return PoseDerivative(units * np.linalg.solve(regular, right[..., None])[..., 0], determined)
 
 
-def _refuse_singular(values: Array, determined: Bools, limit: float) -> None:
-    def error(first: tuple[int, ...], where: str) -> SingularityError:
-        smallest = float(values[first][2])
-        gain = 1 / smallest if smallest > 0 else float("inf")
-        return SingularityError(
-            f"the legs do not determine how the platform moves here{where}: it could move "
-            f"{gain:.3g} times as fast as they, and at most {limit:.3g} times is accepted",
-            gain,
-            limit,
-        )
+def accepted_gains(
+    matrices: Array, max_gain: float, message: str, errors: Errors = "raise"
+) -> Bools:
+    """Return which matrices have an inverse of accepted size, shape (...).
 
-    refuse(~determined, error)
+    Parameters
+    ----------
+    matrices
+        Shape (..., n, n), in one unit.
+    max_gain
+        Largest norm of the inverse, the gain, that is accepted; positive.
+    message
+        Of the error, with the fields ``{where}``, ``{gain}`` and ``{limit}``.
+    errors
+        ``"raise"`` refuses the first matrix whose gain is larger.
 
-
-def _check_options(errors: str, max_gain: float) -> None:
+    Raises
+    ------
+    InputError
+        If an option is not possible.
+    SingularityError
+        With ``errors="raise"``, if a gain is larger.
+    """
     check_errors_option(errors)
     if not max_gain > 0:
         raise InputError(f"max_gain = {max_gain}: it must be positive")
+    smallest = np.linalg.svd(matrices, compute_uv=False)[..., -1]
+    accepted = np.asarray(smallest * max_gain >= 1)
+
+    def error(first: tuple[int, ...], where: str) -> SingularityError:
+        gain = 1 / float(smallest[first]) if smallest[first] > 0 else float("inf")
+        text = message.format(where=where, gain=gain, limit=max_gain)
+        return SingularityError(text, gain, max_gain)
+
+    if errors == "raise":
+        refuse(~accepted, error)
+    return accepted
 
 
 def checked_legs(value: ArrayLike, name: str = "leg_speed") -> Array:
