@@ -395,8 +395,8 @@ def near_type_ii(parameters: RPSParameters, rng: np.random.Generator, count: int
     """Poses 1e-1 to 1e-15 from where det d(length)/d(pose) changes its sign, found by bisection."""
 
     def sign(pose: Array) -> Array:
-        columns = [ne.kinematics(parameters, pose, e, STILL).leg_length_rates for e in np.eye(3)]
-        return np.sign(np.linalg.det(np.stack(columns, axis=-1)))
+        slopes = ne.kinematics(parameters, pose[:, None], np.eye(3), STILL).leg_length_rates
+        return np.sign(np.linalg.det(slopes))
 
     one, other = (strategies.random_motions(rng, parameters, 4000, 2.5)[0] for _ in range(2))
     across = sign(one) * sign(other) < 0

@@ -10,6 +10,7 @@ import importlib
 import re
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -97,17 +98,35 @@ ROOMS = ("rps", "control", "viewer", "plots", "panel", "numerics")
 OPERATIONS, OPERATIONS_WITHOUT_NUMBERS = 7, 12
 
 
+@cache
+def trees() -> dict[str, ast.Module]:
+    """Every module of the package."""
+    return {
+        ".".join(path.relative_to(SOURCE).with_suffix("").parts): ast.parse(path.read_text("utf-8"))
+        for path in sorted(SOURCE.rglob("*.py"))
+    }
+
+
 def modules(*rooms: str) -> Iterator[tuple[str, ast.Module]]:
-    for path in sorted(SOURCE.rglob("*.py")):
-        parts = path.relative_to(SOURCE).with_suffix("").parts
-        if parts[0] in rooms or not rooms:
-            yield ".".join(parts), ast.parse(path.read_text("utf-8"))
+    for module, tree in trees().items():
+        if module.partition(".")[0] in rooms:
+            yield module, tree
 
 
-def expressions(tree: ast.AST) -> Iterator[ast.AST]:
-    for node in ast.walk(tree):
-        if isinstance(node, (ast.BinOp, ast.Compare, ast.Call)):
-            yield node
+@cache
+def expressions() -> dict[str, str]:
+    """The texts of all expressions of each module, one a line."""
+    return {
+        module: "\n".join(
+            {
+                ast.unparse(node)
+                for node in ast.walk(tree)
+                if isinstance(node, (ast.BinOp, ast.Compare, ast.Call))
+            }
+        )
+        for module, tree in trees().items()
+        if not module.startswith("paper.")
+    }
 
 
 class _Nameless(ast.NodeTransformer):
@@ -177,13 +196,7 @@ def test_every_kernel_is_in_one_module() -> None:
 @pytest.mark.parametrize("formula", TRACES)
 def test_traces_of_a_formula_are_in_its_module_only(formula: str) -> None:
     pattern, allowed = TRACES[formula]
-    found = {
-        module
-        for module, tree in modules()
-        if not module.startswith("paper.")
-        for node in expressions(tree)
-        if re.search(pattern, ast.unparse(node))
-    }
+    found = {module for module, text in expressions().items() if re.search(pattern, text)}
     assert found <= allowed
     assert found or not allowed
 
