@@ -7,6 +7,10 @@ import inspect
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import pytest
+
+ParameterSet = type(pytest.param())
+
 
 def each(names: str | tuple[str, ...], cases: Iterable[Any], ids: Any = None) -> Any:
     """Run a test with each case in turn; as `pytest.mark.parametrize`, but one test.
@@ -14,14 +18,18 @@ def each(names: str | tuple[str, ...], cases: Iterable[Any], ids: Any = None) ->
     An error notes its case. Fixtures are made once for all cases.
     """
     keys = [name.strip() for name in names.split(",")] if isinstance(names, str) else list(names)
-    table = [getattr(case, "values", case) for case in cases]
+    alone = len(keys) == 1
+    table = [
+        case.values if isinstance(case, ParameterSet) else (case,) if alone else case
+        for case in cases
+    ]
     assert table, "no cases"
 
     def decorate(test: Callable[..., object]) -> Callable[..., object]:
         @functools.wraps(test)
         def run(**fixtures: Any) -> None:
             for case in table:
-                given = dict(zip(keys, case if len(keys) > 1 else [case], strict=True))
+                given = dict(zip(keys, case, strict=True))
                 try:
                     test(**given, **fixtures)
                 except BaseException as error:

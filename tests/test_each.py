@@ -25,6 +25,18 @@ def test_none_is_left_out() -> None:
     assert SEEN == [(1, 3), (1, 5), (2, 3), (2, 5)]
 
 
+def test_cases_of_one_argument_are_what_is_listed() -> None:
+    """Also those with an id, tuples, and mappings, whose `values` is a method."""
+    seen: list[object] = []
+
+    @each("one", [1, pytest.param(2, id="two"), (3, 4), {"five": 6}])
+    def note(one: object) -> None:
+        seen.append(one)
+
+    note()
+    assert seen == [1, 2, (3, 4), {"five": 6}]
+
+
 def test_a_failing_case_is_named() -> None:
     @each("number", [1, 2, 3])
     def smaller(number: int) -> None:
