@@ -21,7 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure
+from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure, frame_id
 from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
 from rps_pin.closed_loop.io.mechanism_schema import Description
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
@@ -56,7 +56,7 @@ def parts_from_yaml(path: str | os.PathLike[str]) -> MechanismParts:
     parts = _with_effects(file, description, parts)
     actuated = parts.actuated if description.actuated is None else tuple(description.actuated)
     for index, name in enumerate(actuated):
-        _check_name(file, ("actuated", index), name, list(parts.model.names)[1:])
+        _check_joint(file, ("actuated", index), name, parts.model)
     return replace(
         parts,
         closures=(*parts.closures, *_closures(file, description, parts.model)),
@@ -129,7 +129,7 @@ def _with_effects(
     """Replace effects of the tree's file by the description's, on a copy of its model."""
     for effect in (*EFFECTS, "armature"):
         for name in getattr(description, effect):
-            _check_name(file, (effect, name), name, list(parts.model.names)[1:])
+            _check_joint(file, (effect, name), name, parts.model)
     model = pin.Model(parts.model)
     if description.gravity is not None:
         model.gravity.linear = np.array(description.gravity)
@@ -157,7 +157,7 @@ def _home(
     before = pin.neutral(tree.model) if tree.home is None else tree.home.copy()
     for name in description.home:
         if name not in list(tree.model.names)[1:]:
-            _check_name(file, ("home", name), name, list(parts.model.names)[1:])
+            _check_joint(file, ("home", name), name, parts.model)
     _set_joints(file, description.home, tree.model, before)
     q = merged_configuration(tree.model, merges, before) if merges else before
     new = {k: v for k, v in description.home.items() if not tree.model.existJointName(k)}
@@ -197,17 +197,10 @@ def _set_joints(
 
 def _closures(file: YamlFile, description: Description, model: pin.Model) -> list[Closure]:
     found: list[Closure] = []
-    frames = [frame.name for frame in model.frames]
     for i, entry in enumerate(description.closures):
         for end in ("frame_a", "frame_b"):
-            name = getattr(entry, end)
-            where = ("closures", i, end)
-            _check_name(file, where, name, frames, "frame")
-            if frames.count(name) > 1:
-                raise MechanismError(
-                    f"{file.place(where)}: {end} = {name!r}: {frames.count(name)} frames have "
-                    "this name"
-                )
+            with file.at("closures", i, end):
+                frame_id(model, getattr(entry, end), "closures")
         with file.at("closures", i):
             found.append(LoopClosure(**entry.model_dump()))
     for i, coupled in enumerate(description.couplings):
@@ -218,17 +211,10 @@ def _closures(file: YamlFile, description: Description, model: pin.Model) -> lis
     return found
 
 
-# Messages -----------------------------------------------------------------------------------------
-
-
-def _check_name(
-    file: YamlFile,
-    path: tuple[str | int, ...],
-    name: str,
-    there: Sequence[str],
-    what: str = "joint",
-) -> None:
-    if name not in there:
+def _check_joint(file: YamlFile, path: tuple[str | int, ...], name: str, model: pin.Model) -> None:
+    """Refuse a name that no joint has."""
+    joints = list(model.names)[1:]
+    if name not in joints:
         raise MechanismError(
-            f"{file.place(path)}: {path[0]}: no {what} {name!r}; there are: {', '.join(there)}"
+            f"{file.place(path)}: {path[0]}: no joint {name!r}; there are: {', '.join(joints)}"
         )
