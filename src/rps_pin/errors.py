@@ -43,14 +43,11 @@ class RPSPinError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle without calling the constructor, whose arguments differ."""
-        return _rebuilt, (type(self), self.args, self.__dict__)
+        return _rebuilt, (type(self), self.args), self.__dict__
 
 
-def _rebuilt(kind: type[RPSPinError], args: tuple[Any, ...], state: dict[str, Any]) -> RPSPinError:
-    error = kind.__new__(kind)
-    error.args = args
-    error.__dict__.update(state)
-    return error
+def _rebuilt(kind: type[RPSPinError], args: tuple[Any, ...]) -> RPSPinError:
+    return kind.__new__(kind, *args)
 
 
 class InputError(RPSPinError, ValueError):

@@ -207,11 +207,8 @@ class RPSParameters(pydantic.BaseModel):
 
     def without_limits(self) -> RPSParameters:
         """Return a copy without limits of lengths, angles and spherical joints."""
-        return self.replace(
-            leg_length_limits=(0.0, math.inf),
-            leg_angle_limits=(-math.pi, math.pi),
-            spherical_cone_limit=math.pi,
-        )
+        limits = ("leg_length_limits", "leg_angle_limits", "spherical_cone_limit")
+        return self.replace(**{name: type(self).model_fields[name].default for name in limits})
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RPSParameters):

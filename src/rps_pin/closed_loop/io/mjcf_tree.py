@@ -177,8 +177,8 @@ class MjcfTree:
         for number, joint in enumerate(joints, 1):
             link = frame if number == len(joints) else self._fresh(f"{frame}_{number}")
             plain = etree.SubElement(plain, "body", name=link, **placement(pose))
-            alone = len(joints) == 1
-            self._read_joint(joint, plain, f"{frame}_joint" + ("" if alone else f"_{number}"), pose)
+            unnamed = f"{frame}_joint" + (f"_{number}" if joints[1:] else "")
+            self._read_joint(joint, plain, unnamed, pose)
             pose = pin.SE3.Identity()
         if not joints:
             plain = etree.SubElement(plain, "body", name=frame, **placement(pose))

@@ -57,16 +57,12 @@ def parts_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") ->
     Parameters and errors are those of `model_from_urdf`.
     """
     model = model_from_urdf(path_or_xml, root)
+    joints = list(zip(model.names, model.idx_vs, strict=True))[1:]
     damping, friction = (
-        {name: float(values[model.idx_vs[i]]) for i, name in enumerate(model.names) if i}
+        {name: float(values[index]) for name, index in joints if values[index]}
         for values in (model.damping, model.upperDryFrictionLimit)
     )
-    return MechanismParts(
-        model,
-        name=model.name,
-        damping={name: value for name, value in damping.items() if value},
-        friction={name: value for name, value in friction.items() if value},
-    )
+    return MechanismParts(model, name=model.name, damping=damping, friction=friction)
 
 
 def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
