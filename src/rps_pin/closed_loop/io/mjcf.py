@@ -110,8 +110,7 @@ def _effects(tree: MjcfTree, equalities: Equalities) -> dict[str, Any]:
         if joint.name in equalities.fixed:
             continue
         for option, effect in _OPTIONS.items():
-            value = _effect(joint.element, option)
-            if value:
+            if value := _effect(joint.element, option):
                 effects[effect][joint.name] = value
         if joint.name in effects["stiffness"]:
             if joint.kind not in ("hinge", "slide"):
@@ -124,21 +123,18 @@ def _effect(joint: MjcfElement, option: str) -> float:
     if joint.get("springdamper", "0 0").split() != ["0", "0"]:
         joint.refuse("has a springdamper, which is not read; give its stiffness")
     values = joint.numbers(option)
-    if values is None:
-        return 0.0
     if values[1:].any():
         joint.refuse(f"has a {option} that is not linear, which is not read")
-    if values[0] < 0:
+    if (values < 0).any():
         joint.refuse(f"has a negative {option}")
-    return float(values[0])
+    return float(values.sum())
 
 
 def _refuse_tendons(file: MjcfFile) -> None:
     """Refuse tendons with forces of their own; others are only measured or driven."""
     for tendon in file.entries("tendon"):
         for option in _TENDON_FORCES:
-            values = tendon.numbers(option)
-            if values is not None and values.any():
+            if tendon.numbers(option).any():
                 tendon.refuse(f"is a tendon with {option}, which is not read")
 
 

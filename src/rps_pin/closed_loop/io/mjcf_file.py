@@ -175,10 +175,10 @@ class MjcfElement:
         called = f"{self.tag} {self.name!r}" if self.name else self.tag
         raise MechanismError(f"{self.file.origin}, line {self.xml.sourceline}: {called} {why}")
 
-    def numbers(self, name: str) -> Array | None:
-        """Return an attribute's numbers, or None if it is not given."""
+    def numbers(self, name: str) -> Array:
+        """Return an attribute's numbers: none if it is not given, else one or more."""
         if name not in self:
-            return None
+            return np.empty(0)
         try:
             values = np.array([float(part) for part in self.get(name).split()])
         except ValueError:
@@ -190,7 +190,7 @@ class MjcfElement:
     def vector(self, name: str, default: Iterable[float], partial: bool = False) -> Array:
         """Return as many numbers as `default` has; `partial`: it replaces missing ones."""
         values, default = self.numbers(name), np.array(list(default), dtype=np.float64)
-        if values is None:
+        if not values.size:
             return default
         if partial and values.size <= default.size:
             return np.concatenate([values, default[values.size :]])

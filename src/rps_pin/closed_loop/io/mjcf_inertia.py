@@ -45,11 +45,10 @@ def _inertial(element: MjcfElement) -> Any:
     if "mass" not in element or "pos" not in element:
         element.refuse("needs a mass and a pos")
     mass = element.number("mass")
-    full = np.concatenate([element.vector("diaginertia", (0.0,) * 3), np.zeros(3)])
-    if "fullinertia" in element:
-        if "diaginertia" in element:
-            element.refuse("has both diaginertia and fullinertia")
-        full = element.vector("fullinertia", (0.0,) * 6)
+    if "diaginertia" in element and "fullinertia" in element:
+        element.refuse("has both diaginertia and fullinertia")
+    diagonal = element.vector("diaginertia", (0.0,) * 3)
+    full = element.vector("fullinertia", (*diagonal, 0.0, 0.0, 0.0))
     xx, yy, zz, xy, xz, yz = full
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     fault = "has a negative mass" if mass < 0 else inertia_fault(matrix)
@@ -78,8 +77,7 @@ def _add_geom(geom: MjcfElement, around: pin.SE3, plain: Any) -> None:
     if geom.get("shellinertia", "false") != "false":
         geom.refuse("is a shell, whose mass is not computed")
     pose, half = geom.segment()
-    size = geom.numbers("size")
-    values = [] if size is None else list(size)
+    values = list(geom.numbers("size"))
     if half is not None and kind == "sphere":
         geom.refuse("is a sphere, which does not reach from one point to another")
     if half is not None:  # the first number is the width both ways

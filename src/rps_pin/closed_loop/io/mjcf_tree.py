@@ -247,8 +247,8 @@ class MjcfTree:
     def _limits(self, joint: MjcfElement, name: str, flag: str) -> tuple[float, float] | None:
         """Return the limits that apply, or None."""
         limited = joint.choice(flag, "true false auto", "auto")
-        given = joint.numbers(name)
-        if limited == "false" or (limited == "auto" and given is None):
+        given = joint.numbers(name).size
+        if limited == "false" or (limited == "auto" and not given):
             return None
         if limited == "auto" and not self._file.autolimits:
             joint.refuse(f"has a {name}, but autolimits is off and {flag} is not given")
@@ -279,7 +279,7 @@ class MjcfTree:
         for section in self._file.sections("keyframe"):
             for key in map(self._file.plain, children(section.xml)):
                 values = key.numbers("qpos")
-                if values is None:
+                if not values.size:
                     continue
                 if values.size != start.size:
                     key.refuse(f"has {values.size} numbers in qpos, not {start.size}")
