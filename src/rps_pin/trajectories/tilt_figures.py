@@ -98,17 +98,16 @@ def circle(
     InputError
         If a number is not finite, or not positive where it must be.
     """
-    quarter = math.pi / 2  # cos(start + u) = sin(u + start + pi/2)
-    first = finite_number(start, "start")
-    size = positive_number(tilt, "tilt")
-    curve = HarmonicCurve(
-        [finite_number(height, "height"), 0.0, 0.0],
-        [0.0, size, size],
-        [0.0, 1.0, 1.0],
-        [0.0, first + quarter, first],
-        2 * math.pi * positive_number(turns, "turns"),
+    size, first = positive_number(tilt, "tilt"), finite_number(start, "start")
+    return lissajous(
+        height=height,
+        amplitude=(size, size),
+        frequency=(1, 1),
+        phase=(first + math.pi / 2, first),  # cos(start + u) = sin(u + start + pi/2)
+        turns=turns,
+        duration=duration,
+        profile=profile,
     )
-    return TimedCurve(curve, time_law(curve.length, profile, duration=duration))
 
 
 def lissajous(
