@@ -51,16 +51,10 @@ def refuse_mistakes(robot: Any, origin: str) -> None:
 
 def _check_numbers(element: Any, origin: str) -> None:
     for attribute, count in _NUMBERS[str(element.tag)].items():
-        text = element.get(attribute)
-        if text is None:
-            continue
-        parts = text.split()
-        if len(parts) != count or not all(map(_is_finite, parts)):
+        text = element.get(attribute, " 0" * count)
+        if len(text.split()) != count or not all(map(_is_finite, text.split())):
             wanted = "a finite number" if count == 1 else f"{count} finite numbers"
-            raise MechanismError(
-                f"{origin}, line {element.sourceline}: {element.tag} {attribute} = {text!r} "
-                f"must be {wanted}"
-            )
+            _refuse(element, origin, f"{element.tag} {attribute} = {text!r} must be {wanted}")
 
 
 def _is_finite(text: str) -> bool:
