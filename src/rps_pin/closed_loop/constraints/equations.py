@@ -27,6 +27,7 @@ from rps_pin.validation import positive_number
 _WORLD_AXES = ("spherical", "rigid")
 _WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _THREE, _NINE = Struct("3d").unpack_from, Struct("9d").unpack_from
+_distance, _ORIGIN = math.dist, (0.0, 0.0, 0.0)  # names of the module: fast
 
 _Reader = Callable[[], Floats]
 _OpenTest = tuple[_Reader, _Reader, Callable[[Floats, Floats], float]]
@@ -161,7 +162,7 @@ class ClosureEquations:
                 self.angular_rows[row] = angular[one.idx_v]
         self.row_scale = np.where(self.angular_rows, self.length, 1.0)
         self._groups = self._row_groups()
-        self._open_limit = (OPEN * self.length) ** 2
+        self._open_limit = OPEN * self.length
         self._open_points, self._open_frames = self._open_tests()
         self._only_spherical = len(self._open_points) == len(self.closures)
 
@@ -233,13 +234,13 @@ class ClosureEquations:
 
     def is_open(self, q: Array) -> bool:
         """Return whether a gap exceeds `OPEN`, after `jacobian` at q: fast, for control loops."""
-        limit = self._open_limit
+        reach = self._open_limit
         for point in self._open_points:
-            x, y, z = point()
-            if not x * x + y * y + z * z <= limit:
+            if not _distance(point(), _ORIGIN) <= reach:
                 return True
         if self._only_spherical:
             return False
+        limit = reach * reach
         for point, rotation, squared_gap in self._open_frames:
             if not squared_gap(point(), rotation()) <= limit:
                 return True

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Literal, get_args
 
 import numpy as np
@@ -154,7 +154,13 @@ def _merged_joint(model: pin.Model, merge: JointMerge, row: list[int]) -> JointR
     for joint in row:
         placement = placement * model.jointPlacements[joint]
     if merge.into == "spherical":
-        _refuse_lost_armature(model, merge, row)
+        for joint, name in product(row, ("armature", "rotorInertia")):
+            value = getattr(model, name)[model.idx_vs[joint]]
+            if value != 0:  # of a rotor about an axis that is not constant in the merged joint
+                raise MechanismError(
+                    f"merge {merge.name!r}: joint {model.names[joint]!r} has {name} = {value:.6g}, "
+                    "which a spherical joint cannot have; set it to 0 first"
+                )
         return JointRow([NewJoint(merge.name, pin.JointModelSpherical(), placement)], [])
     kind = pin.JointModelUniversal(*_axes(model, row))
     return JointRow([NewJoint(merge.name, kind, placement)], row)
@@ -245,19 +251,6 @@ def _refuse_shared(model: pin.Model, merges: Sequence[JointMerge], rows: list[li
                 f"a merged joint cannot be called {merge.name!r}: that name is taken"
             )
         kept.add(merge.name)
-
-
-def _refuse_lost_armature(model: pin.Model, merge: JointMerge, row: list[int]) -> None:
-    """Refuse rotors about axes that are not constant in the merged joint."""
-    for joint in row:
-        index = model.idx_vs[joint]
-        for name in ("armature", "rotorInertia"):
-            value = getattr(model, name)[index]
-            if value != 0:
-                raise MechanismError(
-                    f"merge {merge.name!r}: joint {model.names[joint]!r} has {name} = {value:.6g}, "
-                    "which a spherical joint cannot have; set it to 0 first"
-                )
 
 
 def _axes(model: pin.Model, row: list[int]) -> list[Array]:

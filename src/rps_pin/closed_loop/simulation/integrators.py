@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -18,17 +17,12 @@ from scipy.integrate import DOP853
 from rps_pin.arrays import Array
 from rps_pin.errors import SingularityError
 
+#: Function of (t, q, v) that returns the acceleration a, shape (nv,).
+Acceleration = Callable[[float, Array, Array], Array]
 #: Weights of the stages of `rk4_step`, for integrals along a step.
 RK4_WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 #: Of the work among the entries of an adaptive step.
 _SCALE = 1e-100
-
-
-class Acceleration(Protocol):
-    """Function of (t, q, v) that returns the acceleration a, shape (nv,)."""
-
-    def __call__(self, t: float, q: Array, v: Array) -> Array:
-        """Return the acceleration."""
 
 
 def rk4_step(
