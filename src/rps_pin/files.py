@@ -75,6 +75,12 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         scratch.unlink(missing_ok=True)
 
 
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text file in UTF-8, whole or not at all; see `whole_file`."""
+    with whole_file(path) as scratch:
+        scratch.write_text(text, "utf-8")
+
+
 def _umask() -> int:
     """Return the process's umask (which can only be read by setting it)."""
     mask = os.umask(0)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
 
+from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
-from rps_pin.cli.console import JsonOption, RobotOption, load_robot, print_json
 from rps_pin.rps.singularity.measures import GRAZE
 from rps_pin.rps.singularity.path_check import check_path
-from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck, SingularityEvent
 
 
 def check_command(
-    robot: RobotOption = "sokolov",
+    robot: common.RobotOption = "sokolov",
     radius: helix.RadiusOption = helix.DEFAULT_RADIUS,
     pitch: helix.PitchOption = helix.DEFAULT_PITCH,
     height: helix.HeightOption = None,
@@ -26,7 +24,7 @@ def check_command(
         float,
         typer.Option(help="Distance to a singularity (0 to 1) below which a path grazes it."),
     ] = GRAZE,
-    as_json: JsonOption = False,
+    as_json: common.JsonOption = False,
 ) -> None:
     """Check a helix for singularities that it crosses or grazes, and limits that it leaves.
 
@@ -42,27 +40,20 @@ def check_command(
 
     - `rps-pin check --radius 0.075 --pitch 0.05 --branch -` crosses none
     """
-    machine = load_robot(robot)
+    machine = common.load_robot(robot)
     path = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     found = check_path(machine, path, threshold=threshold)
     if as_json:
-        events = {name: [_plain(e) for e in getattr(found, name)] for name in _EVENTS}
-        print_json(_plain(found) | events | {"robot": machine.parameters.name, "ok": found.ok})
+        common.print_json(_plain(found) | {"robot": machine.parameters.name, "ok": found.ok})
     else:
-        console = Console(soft_wrap=True)
-        for line in found.lines():
-            console.print(line, highlight=False, markup=False)
-    if not found.ok:
-        raise typer.Exit(1)
+        common.text_console(soft_wrap=True).print(str(found), markup=False)
+    raise typer.Exit(not found.ok)
 
 
-#: Fields of `PathCheck` that hold events.
-_EVENTS = ("singularities", "limits")
-
-
-def _plain(found: PathCheck | SingularityEvent | LimitEvent) -> dict[str, object]:
-    """Return a named tuple as a dictionary without arrays, for JSON."""
-    return {
-        name: value.tolist() if isinstance(value, np.ndarray) else value
-        for name, value in found._asdict().items()
-    }
+def _plain(value: Any) -> Any:
+    """Return named tuples as dictionaries, and arrays as lists, for JSON."""
+    if hasattr(value, "_asdict"):
+        return {name: _plain(part) for name, part in value._asdict().items()}
+    if isinstance(value, tuple):
+        return [_plain(part) for part in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value

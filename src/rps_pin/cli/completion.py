@@ -7,12 +7,13 @@ from importlib import resources
 from pathlib import Path
 
 _FILES = (".yaml", ".yml", ".xml")
+#: The folder of the package's mechanisms.
+MECHANISMS = Path(str(resources.files("rps_pin"))) / "urdf"
 
 
 def mechanism_names() -> list[str]:
     """Return the names of the package's mechanisms."""
-    folder = Path(str(resources.files("rps_pin"))) / "urdf"
-    return sorted(path.stem for path in folder.glob("*.yaml"))
+    return sorted(path.stem for path in MECHANISMS.glob("*.yaml"))
 
 
 def preset_names() -> list[str]:
@@ -33,7 +34,7 @@ def names_or_files(names: Callable[[], Iterable[str]]) -> Callable[[str], list[s
         files = []
         if place.is_dir():
             for path in sorted(place.iterdir()):
-                if path.name.startswith(begun or ""):
+                if path.name.startswith(begun):
                     if path.is_dir() and not path.name.startswith("."):
                         files.append(f"{prefix}{path.name}/")
                     elif path.suffix.lower() in _FILES:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import track
+from rich.progress import Progress, track
+from rich.table import Table
 
 from rps_pin.cli.completion import names_or_files, preset_names
 from rps_pin.rps import robot_file
@@ -55,11 +57,28 @@ def print_json(answer: dict[str, Any]) -> None:
     typer.echo(json.dumps(answer, indent=2, default=str))
 
 
+def text_console(as_json: bool = False, **options: Any) -> Console:
+    """Return a console for text without highlighting; it prints nothing where JSON is printed."""
+    return Console(quiet=as_json, highlight=False, **options)
+
+
+def table_of(
+    rows: Iterable[Sequence[str]], *headers: str, right: slice = slice(0), **options: Any
+) -> Table:
+    """Return a table of rows, some columns aligned to the right; without headers, none is shown."""
+    table = Table(*headers, show_header=bool(headers), **options)
+    for column in table.columns[right]:
+        column.justify = "right"
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
 def print_files(console: Console, files: list[Path]) -> None:
     """Print which files were written."""
     console.print("Written:")
     for file in files:
-        console.print(f"  {file}", highlight=False, soft_wrap=True)
+        console.print(f"  {file}", soft_wrap=True)
 
 
 def progress_bar(console: Console, task: str) -> Callable[[Iterable[Any]], Iterable[Any]]:
@@ -67,3 +86,11 @@ def progress_bar(console: Console, task: str) -> Callable[[Iterable[Any]], Itera
     return lambda items: track(
         items, task, console=console, transient=True, disable=not console.is_terminal
     )
+
+
+@contextmanager
+def share_bar(console: Console, task: str) -> Iterator[Callable[[float], None]]:
+    """Show a progress bar on a terminal; give a function that takes the share that is done."""
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        shown = bar.add_task(task, total=1.0)
+        yield lambda done: bar.update(shown, completed=done)

@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 OLDEST_PYTHON = (3, 11)
 _EXTRA = "pip install 'rps-pin[{}]'"
@@ -95,7 +95,7 @@ def doctor(as_json: bool = False) -> int:
     findings = diagnose()
     failed = any(one.needed and one.trouble for one in findings)
     if as_json:
-        rows: list[dict[str, Any]] = [one._asdict() for one in findings]
+        rows = [one._asdict() for one in findings]
         print(json.dumps({"ok": not failed, "found": rows}, indent=2))
         return int(failed)
     for one in findings:
@@ -109,49 +109,41 @@ def doctor(as_json: bool = False) -> int:
 
 def _itself() -> Finding:
     where = str(Path(__file__).parents[1])
-    try:
-        return Finding("rps-pin", importlib.metadata.version("rps-pin"), where, True, "")
-    except importlib.metadata.PackageNotFoundError:
-        return Finding("rps-pin", "", where, True, "not installed: pip install . in its checkout")
+    found = _package(Part("rps-pin", "rps_pin", where), importing=False)
+    return found._replace(trouble=found.trouble and "not installed: pip install . in its checkout")
 
 
 def _python() -> Finding:
-    new_enough = sys.version_info[:2] >= OLDEST_PYTHON
     oldest = ".".join(map(str, OLDEST_PYTHON))
-    trouble = "" if new_enough else f"it must be {oldest} or newer"
+    trouble = "" if sys.version_info[:2] >= OLDEST_PYTHON else f"it must be {oldest} or newer"
     return Finding("Python", platform.python_version(), sys.executable, True, trouble)
 
 
 def _package(part: Part, importing: bool) -> Finding:
-    needed = part.extra is None
     get = _EXTRA.format(part.extra) if part.extra else f"pip install {part.name}"
+    version = trouble = ""
     try:
         version = importlib.metadata.version(part.name)
-    except importlib.metadata.PackageNotFoundError:
-        return Finding(part.name, "", part.purpose, needed, f"not installed: {get}")
-    try:
         if importing:
             importlib.import_module(part.module)
     except Exception as error:  # whatever a broken package raises
         words = " ".join(str(error).split())
         if "libgomp" in words:
             get = "apt-get install libgomp1"
-        return Finding(
-            part.name, version, part.purpose, needed, f"it does not import ({words}): {get}"
-        )
-    return Finding(part.name, version, part.purpose, needed, "")
+        trouble = f"{f'it does not import ({words})' if version else 'not installed'}: {get}"
+    return Finding(part.name, version, part.purpose, part.extra is None, trouble)
 
 
 def _pinocchio_parts() -> Finding:
     """Whether Pinocchio was built with what is optional in it and needed here."""
-    name, purpose = "pin's options", "reading URDF, shapes of links"
     import pinocchio
 
     options = ("WITH_URDFDOM", "WITH_COLLISION")
-    missing = [option for option in options if not getattr(pinocchio, option, False)]
+    missing = ", ".join(option for option in options if not getattr(pinocchio, option, False))
     get = "pip install --force-reinstall pin"
-    trouble = f"it was built without {', '.join(missing)}: {get}" if missing else ""
-    return Finding(name, "" if missing else "URDF, coal", purpose, True, trouble)
+    trouble = missing and f"it was built without {missing}: {get}"
+    found = "" if missing else "URDF, coal"
+    return Finding("pin's options", found, "reading URDF, shapes of links", True, trouble)
 
 
 def _backend() -> Finding:
@@ -162,26 +154,24 @@ def _backend() -> Finding:
 
 
 def _films() -> Finding:
-    name, purpose = "ffmpeg", "films as MP4"
+    name = trouble = ""
     try:
-        path = importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
+        name = Path(importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()).name[:17]
     except Exception:  # not there, or none for this system
         get = _EXTRA.format("pictures")
-        return Finding(name, "", purpose, False, f"not found: {get}, or set IMAGEIO_FFMPEG_EXE")
-    return Finding(name, Path(path).name[:17], purpose, False, "")
+        trouble = f"not found: {get}, or set IMAGEIO_FFMPEG_EXE"
+    return Finding("ffmpeg", name, "films as MP4", False, trouble)
 
 
 def _browser() -> Finding:
     """Look for a Chromium that runs: some distributions have a stub of that name."""
-    name, purpose = "Chromium", "pictures and films of the viewer"
     cache = os.environ.get("PLAYWRIGHT_BROWSERS_PATH") or Path.home() / ".cache" / "ms-playwright"
     own = map(str, Path(cache).glob("chromium-*/chrome-linux*/chrome"))
-    for candidate in (os.environ.get("RPS_PIN_CHROMIUM") or "", *_BROWSERS, *own):
-        path = shutil.which(candidate) if candidate else None
-        if path and _runs(path):
-            return Finding(name, path, purpose, False, "")
+    candidates = map(shutil.which, (os.environ.get("RPS_PIN_CHROMIUM") or "", *_BROWSERS, *own))
+    path = next((path for path in candidates if path and _runs(path)), "")
     get = "apt-get install chromium, or playwright install chromium"
-    return Finding(name, "", purpose, False, f"not found: {get}")
+    trouble = "" if path else f"not found: {get}"
+    return Finding("Chromium", path, "pictures and films of the viewer", False, trouble)
 
 
 def _runs(program: str) -> bool:
@@ -200,7 +190,7 @@ def _threads() -> Finding:
 
 def _forces() -> Finding:
     """Compute one sample of the paper's helix in two ways."""
-    name, purpose = "a calculation", "forces on the helix, two ways"
+    found = trouble = ""
     try:
         from rps_pin.rps.robot import RPSRobot
         from rps_pin.trajectories.helix import helix
@@ -208,9 +198,9 @@ def _forces() -> Finding:
         robot = RPSRobot.from_preset("sokolov")
         motion = helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4).sample(1.0)
         constrained = robot.inverse_dynamics(*robot.state(*motion)).tau
-        closed_form = robot.actuator_forces(*motion)
-        apart = float(abs(constrained - closed_form).max())
+        apart = float(abs(constrained - robot.actuator_forces(*motion)).max())
+        found = f"{apart:.1e} N apart"
+        trouble = "" if apart < 1e-9 else "they differ: please report this"
     except Exception as error:  # this is what it looks for
-        return Finding(name, "", purpose, True, f"it failed: {' '.join(str(error).split())}")
-    trouble = "" if apart < 1e-9 else "they differ: please report this"
-    return Finding(name, f"{apart:.1e} N apart", purpose, True, trouble)
+        trouble = f"it failed: {' '.join(str(error).split())}"
+    return Finding("a calculation", found, "forces on the helix, two ways", True, trouble)

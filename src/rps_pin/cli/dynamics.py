@@ -8,25 +8,16 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from rps_pin.cli.console import (
-    JsonOption,
-    NamedFolderOption,
-    RateOption,
-    RobotOption,
-    Three,
-    load_robot,
-    print_files,
-    print_json,
-    progress_bar,
-)
+from rps_pin.cli import console as common
 from rps_pin.cli.motion_report import print_exceeded, run_table, write_motion
 from rps_pin.errors import InputError
+from rps_pin.files import write_text
+from rps_pin.rps.dynamics.force_causes import force_causes
 from rps_pin.rps.dynamics.loads import Payload
-from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion, summarise
+from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 from rps_pin.rps.dynamics.sizing import size_actuators
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, SizingSheet
+from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.path import end_states
@@ -39,7 +30,7 @@ def dynamics_command(
         Path,
         typer.Argument(metavar="TRAJECTORY", help="A CSV file of poses, or a YAML file."),
     ],
-    robot: RobotOption = "sokolov",
+    robot: common.RobotOption = "sokolov",
     fastest: Annotated[
         bool,
         typer.Option(
@@ -51,7 +42,7 @@ def dynamics_command(
         float | None, typer.Option(metavar="KG", help="Mass of a payload on the platform, kg.")
     ] = None,
     payload_centre: Annotated[
-        Three,
+        common.Three,
         typer.Option(metavar="X Y Z", help="Its centre of mass in platform axes, m."),
     ] = (0.0, 0.0, 0.0),
     wrench: Annotated[
@@ -62,15 +53,15 @@ def dynamics_command(
         ),
     ] = None,
     gravity: Annotated[
-        Three | None,
+        common.Three | None,
         typer.Option(metavar="X Y Z", help="Gravity in base axes, m/s^2; default: the robot's."),
     ] = None,
     power: Annotated[
         float | None, typer.Option(metavar="W", help="Power limit of an actuator, W.")
     ] = None,
-    rate: RateOption = 1000.0,
-    output: NamedFolderOption = None,
-    as_json: JsonOption = False,
+    rate: common.RateOption = 1000.0,
+    output: common.NamedFolderOption = None,
+    as_json: common.JsonOption = False,
 ) -> None:
     """Compute the actuator forces of a 3-RPS along a trajectory, and size its actuators.
 
@@ -89,9 +80,16 @@ def dynamics_command(
 
     - `rps-pin dynamics circle.yaml --robot micro --fastest`
     """
-    machine = _loaded(load_robot(robot), payload, payload_centre, gravity)
+    machine = common.load_robot(robot)
+    if payload is None and any(payload_centre):
+        raise InputError("--payload-centre is the place of a payload: give its mass with --payload")
+    if gravity is not None:
+        machine = RPSRobot(machine.parameters.replace(gravity=gravity))
+    if payload is not None:
+        machine = machine.with_payload(Payload(payload, payload_centre))
+    name = machine.parameters.name
     path = load_trajectory(trajectory, machine)
-    console = Console(quiet=as_json)
+    console = common.text_console(as_json)
     limits = ActuatorLimits.of(machine.parameters, power=math.inf if power is None else power)
     if fastest:
         from rps_pin.rps.motion.time_optimal import time_optimal
@@ -99,57 +97,31 @@ def dynamics_command(
         given = path.duration
         with console.status("computing the shortest time"):
             path = time_optimal(machine, path, limits=limits, wrench=wrench)
-        words = f"shortest time {path.duration:.6g} s (as given: {given:.6g} s)"
-        console.print(words, highlight=False)
-    progress = progress_bar(console, "inverse dynamics")
+        console.print(f"shortest time {path.duration:.6g} s (as given: {given:.6g} s)")
+    progress = common.progress_bar(console, "inverse dynamics")
     run = run_motion(machine, path, rate, wrench=wrench, progress=progress)
     sheet = size_actuators(run.time, run.force, run.speed, run.length, limits)
     summary = summarise(run, machine)
     folder = output or Path(f"{trajectory.stem}-dynamics")
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
-        files = _write(folder, trajectory, machine, run, sheet, wrench)
+        from rps_pin.plots import save_figure
+        from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
+
+        title = f"3-RPS {name} along {trajectory.name}"
+        files = write_motion(folder, "dynamics", title, machine, run)
+        causes = force_causes(machine, run.pose, run.rate, run.acceleration, wrench=wrench)
+        files += save_figure(plot_force_causes(run.time, causes), folder, "forces_by_cause")
+        files += save_figure(plot_sizing(sheet), folder, "force_over_speed")
+        files.append(folder / "sizing.json")
+        write_text(files[-1], json.dumps(sheet.as_dict(), indent=2) + "\n")
     if as_json:
-        answer = {"robot": machine.parameters.name, "trajectory": trajectory}
+        answer = {"robot": name, "trajectory": trajectory}
         answer |= dict(zip(("starts", "ends"), end_states(path), strict=True))
-        print_json(answer | summary.as_dict() | {"sizing": sheet.as_dict(), "files": files})
+        common.print_json(answer | summary.as_dict() | {"sizing": sheet.as_dict(), "files": files})
         return
-    console.print(f"3-RPS [bold]{machine.parameters.name}[/], {trajectory}", highlight=False)
+    console.print(f"3-RPS [bold]{name}[/], {trajectory}")
     console.print(sheet.table())
     console.print(run_table(summary, path))
     print_exceeded(console, summary)
-    print_files(console, files)
-
-
-def _loaded(robot: RPSRobot, mass: float | None, centre: Three, gravity: Three | None) -> RPSRobot:
-    """Return the robot with its payload, in the gravity given."""
-    if mass is None and any(centre):
-        raise InputError("--payload-centre is the place of a payload: give its mass with --payload")
-    if gravity is not None:
-        robot = RPSRobot(robot.parameters.replace(gravity=gravity))
-    return robot if mass is None else robot.with_payload(Payload(mass, centre))
-
-
-def _write(
-    folder: Path,
-    trajectory: Path,
-    robot: RPSRobot,
-    run: MotionRun,
-    sheet: SizingSheet,
-    wrench: Six | None,
-) -> list[Path]:
-    """Write the motion, the forces by cause and the sizing sheet; return the files."""
-    from rps_pin.files import whole_file
-    from rps_pin.plots import save_figure
-    from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
-    from rps_pin.rps.dynamics.force_causes import force_causes
-
-    title = f"3-RPS {robot.parameters.name} along {trajectory.name}"
-    files = write_motion(folder, "dynamics", title, robot, run)
-    causes = force_causes(robot, run.pose, run.rate, run.acceleration, wrench=wrench)
-    files += save_figure(plot_force_causes(run.time, causes), folder, "forces_by_cause")
-    files += save_figure(plot_sizing(sheet), folder, "force_over_speed")
-    sizing = folder / "sizing.json"
-    with whole_file(sizing) as scratch:
-        scratch.write_text(json.dumps(sheet.as_dict(), indent=2) + "\n", "utf-8")
-    return [*files, sizing]
+    common.print_files(console, files)

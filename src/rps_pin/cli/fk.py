@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from rps_pin.cli.console import JsonOption, RobotOption, Three, load_robot, print_json
+from rps_pin.cli import console as common
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
-from rps_pin.rps.robot import RPSRobot
+
+_HEADERS = ("", "z (m)", "tilt_x (rad)", "tilt_y (rad)", "leg angles (degrees)", "mirror")
+#: In place of the tilts of an assembly mode without a pose.
+_HALF_TURN = ("half", "turn")
 
 
 def fk_command(
-    lengths: Annotated[Three, typer.Option(metavar="D1 D2 D3", help="The three leg lengths, m.")],
+    lengths: Annotated[
+        common.Three, typer.Option(metavar="D1 D2 D3", help="The three leg lengths, m.")
+    ],
     near: Annotated[
-        Three | None,
+        common.Three | None,
         typer.Option(
             metavar="Z TILT_X TILT_Y",
             help="Only the pose that is reached from this one (m, rad, rad).",
         ),
     ] = None,
-    robot: RobotOption = "sokolov",
-    as_json: JsonOption = False,
+    robot: common.RobotOption = "sokolov",
+    as_json: common.JsonOption = False,
 ) -> None:
     """Compute the poses of given leg lengths: every assembly mode, or the one near a known pose.
 
@@ -41,73 +44,61 @@ def fk_command(
 
     - `rps-pin fk --lengths 0.45 0.47 0.46 --near 0.4 0 0` the one near the level pose
     """
-    machine = load_robot(robot)
+    machine = common.load_robot(robot)
     low, high = machine.parameters.leg_length_limits
     if not all(low <= length <= high for length in lengths):
         typer.echo(f"note: the legs' limits are {low:g} to {high:g} m", err=True)
+    answer: dict[str, Any] = {"robot": machine.parameters.name, "length": lengths}
     if near is None:
-        _show_all(machine, machine.assembly_modes(lengths), lengths, as_json=as_json)
-    else:
-        _show_one(machine, lengths, near, as_json=as_json)
-
-
-def _show_one(robot: RPSRobot, lengths: Three, near: Three, *, as_json: bool) -> None:
-    pose = robot.forward_kinematics(lengths, near=near)
-    position, _ = robot.platform_placement(pose)
+        modes = machine.assembly_modes(lengths)
+        if as_json:
+            common.print_json(answer | {"modes": _plain(modes)})
+        else:
+            _print_modes(modes)
+        raise typer.Exit(not len(modes.angle))
+    pose = machine.forward_kinematics(lengths, near=near)
+    position, _ = machine.platform_placement(pose)
     if as_json:
-        answer = {"pose": pose.tolist(), "position": position.tolist()}
-        print_json({"robot": robot.parameters.name, "length": lengths} | answer)
+        common.print_json(answer | {"pose": pose.tolist(), "position": position.tolist()})
         return
     z, tilt_x, tilt_y = pose
     x, y, _ = 1e3 * position + 0.0  # no negative zeros
-    Console(soft_wrap=True).print(
+    common.text_console(soft_wrap=True).print(
         f"z = {z:.9g} m, tilt = ({tilt_x:.9g}, {tilt_y:.9g}) rad; "
-        f"centre at x = {x:.6g} mm, y = {y:.6g} mm",
-        highlight=False,
+        f"centre at x = {x:.6g} mm, y = {y:.6g} mm"
     )
 
 
-def _show_all(robot: RPSRobot, modes: AssemblyModes, lengths: Three, *, as_json: bool) -> None:
-    if as_json:
-        solutions = [
-            {name: getattr(modes, name)[k].tolist() for name in _SHOWN}
-            | {"pose": modes.pose[k].tolist() if modes.has_pose[k] else None}
-            for k in range(len(modes.angle))
-        ]
-        print_json({"robot": robot.parameters.name, "length": lengths, "modes": solutions})
-    else:
-        _print_modes(modes)
-    if not len(modes.angle):
-        raise typer.Exit(1)
-
-
-#: What the JSON has of each assembly mode, besides its pose.
-_SHOWN = ("position", "rotation", "angle", "above", "mirror", "double", "residual")
+def _plain(modes: AssemblyModes) -> list[dict[str, Any]]:
+    """Return a dictionary for each assembly mode, for JSON; without a pose at half a turn."""
+    shown = ("position", "rotation", "angle", "above", "mirror", "double", "residual")
+    return [
+        {name: getattr(modes, name)[k].tolist() for name in shown}
+        | {"pose": modes.pose[k].tolist() if modes.has_pose[k] else None}
+        for k in range(len(modes.angle))
+    ]
 
 
 def _print_modes(modes: AssemblyModes) -> None:
-    console = Console()
+    console = common.text_console()
     count = len(modes.angle)
     if not count:
-        console.print("no assembly mode has these lengths", highlight=False)
+        console.print("no assembly mode has these lengths")
         return
-    table = Table("", "z (m)", "tilt_x (rad)", "tilt_y (rad)", "leg angles (degrees)", "mirror")
-    for column in table.columns[:5]:
-        column.justify = "right"
-    for k in range(count):
-        tilt = modes.pose[k, 1:] if modes.has_pose[k] else None
-        angles = " ".join(f"{angle:.2f}" for angle in np.degrees(modes.angle[k]))
-        table.add_row(
+    rows = (
+        (
             f"{k + 1}{'*' if modes.double[k] else ''}",
             f"{modes.position[k, 2]:.6g}",
-            *(["half", "turn"] if tilt is None else [f"{value:.6g}" for value in tilt]),
-            angles,
+            *([f"{tilt:.6g}" for tilt in modes.pose[k, 1:]] if modes.has_pose[k] else _HALF_TURN),
+            " ".join(f"{angle:.2f}" for angle in np.degrees(modes.angle[k])),
             str(int(modes.mirror[k]) + 1),
         )
-    console.print(table)
+        for k in range(count)
+    )
+    console.print(common.table_of(rows, *_HEADERS, right=slice(5)))
     notes = [f"{count} real solutions, largest residual {modes.residual.max():.1g} m"]
     if not modes.has_pose.all():
         notes.append("half turn: of the other operation mode, about an axis outside the base plane")
     if modes.double.any():
         notes.append("*: solutions coincide here, a parallel singularity")
-    console.print("; ".join(notes), highlight=False)
+    console.print("; ".join(notes))

@@ -4,33 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
-
+from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
-from rps_pin.cli.console import (
-    FolderOption,
-    JsonOption,
-    RateOption,
-    RobotOption,
-    load_robot,
-    print_files,
-    print_json,
-    progress_bar,
-)
 from rps_pin.cli.motion_report import actuator_table, print_exceeded, run_table, write_motion
 from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 
 
 def helix_command(
-    robot: RobotOption = "sokolov",
+    robot: common.RobotOption = "sokolov",
     radius: helix.RadiusOption = helix.DEFAULT_RADIUS,
     pitch: helix.PitchOption = helix.DEFAULT_PITCH,
     height: helix.HeightOption = None,
     branch: helix.BranchOption = helix.Branch.PLUS,
     duration: helix.DurationOption = helix.DEFAULT_DURATION,
-    rate: RateOption = 1000.0,
-    output: FolderOption = Path("helix"),
-    as_json: JsonOption = False,
+    rate: common.RateOption = 1000.0,
+    output: common.FolderOption = Path("helix"),
+    as_json: common.JsonOption = False,
 ) -> None:
     """Compute the actuator forces of a 3-RPS along the paper's helix.
 
@@ -54,10 +43,10 @@ def helix_command(
 
     Exit status: 0 done; 1 the robot cannot follow it (the error says why); 2 wrong usage.
     """
-    machine = load_robot(robot)
+    machine = common.load_robot(robot)
     path = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
-    console = Console(quiet=as_json)
-    run = run_motion(machine, path, rate, progress=progress_bar(console, "inverse dynamics"))
+    console = common.text_console(as_json)
+    run = run_motion(machine, path, rate, progress=common.progress_bar(console, "inverse dynamics"))
     summary = summarise(run, machine)
     output.mkdir(parents=True, exist_ok=True)
     name = machine.parameters.name
@@ -66,14 +55,13 @@ def helix_command(
     if as_json:
         described = ("radius", "pitch", "height", "branch", "tilt")
         answer = {"robot": name, "helix": {one: getattr(path, one) for one in described}}
-        print_json(answer | summary.as_dict() | {"files": files})
+        common.print_json(answer | summary.as_dict() | {"files": files})
         return
     console.print(
         f"3-RPS [bold]{name}[/], helix of radius {1e3 * path.radius:g} mm, "
-        f"pitch {1e3 * path.pitch:g} mm, from {path.height:g} m",
-        highlight=False,
+        f"pitch {1e3 * path.pitch:g} mm, from {path.height:g} m"
     )
     console.print(actuator_table(summary.actuators))
     console.print(run_table(summary, path))
     print_exceeded(console, summary)
-    print_files(console, files)
+    common.print_files(console, files)

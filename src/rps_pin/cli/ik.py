@@ -5,23 +5,18 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from rps_pin.arrays import Array
-from rps_pin.cli.console import JsonOption, RobotOption, Three, load_robot, print_json
-from rps_pin.errors import LimitViolation, UnreachableError
-from rps_pin.rps.kinematics.legs import cone_angles
-from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.robot import RPSRobot
+from rps_pin.cli import console as common
+from rps_pin.rps.kinematics.legs import cone_angles, violations
 
 
 def ik_command(
     pose: Annotated[
-        Three, typer.Option(metavar="Z TILT_X TILT_Y", help="The pose: height (m), tilt (rad).")
+        common.Three,
+        typer.Option(metavar="Z TILT_X TILT_Y", help="The pose: height (m), tilt (rad)."),
     ],
-    robot: RobotOption = "sokolov",
-    as_json: JsonOption = False,
+    robot: common.RobotOption = "sokolov",
+    as_json: common.JsonOption = False,
 ) -> None:
     """Compute the leg lengths and angles of a pose, and check them against the robot's limits.
 
@@ -30,13 +25,15 @@ def ik_command(
 
     Example: `rps-pin ik --robot micro --pose 0.22 0.1 -0.05`
     """
-    machine = load_robot(robot)
+    machine = common.load_robot(robot)
+    parameters = machine.parameters
     legs = machine.inverse_kinematics(pose, errors="mask")
     position, rotation = machine.platform_placement(pose)
-    cone = cone_angles(legs.angle, rotation, machine.parameters.spherical_rest_angle)
+    cone = cone_angles(legs.angle, rotation, parameters.spherical_rest_angle)
     if as_json:
+        broken = violations(parameters, legs.length, legs.angle, cone)
         answer = {
-            "robot": machine.parameters.name,
+            "robot": parameters.name,
             "pose": list(pose),
             "position": position.tolist(),
             "rotation": rotation.tolist(),
@@ -44,42 +41,22 @@ def ik_command(
             "angle": legs.angle.tolist(),
             "spherical_joint_angle": cone.tolist(),
             "reachable": bool(legs.reachable),
-            "violations": [one._asdict() for one in _violations(machine, pose)],
+            "violations": [one._asdict() for one in broken],
         }
-        print_json(answer)
-    else:
-        console = Console()
-        x, y, z = 1e3 * position + 0.0  # no negative zeros
-        console.print(f"centre at ({x:.6g}, {y:.6g}, {z:.6g}) mm", highlight=False)
-        console.print(_table(machine.parameters, legs.length, legs.angle, cone))
-    if not legs.reachable:
-        if as_json:
-            raise typer.Exit(1)
-        machine.inverse_kinematics(pose)  # raises, and says what is broken
-
-
-def _violations(robot: RPSRobot, pose: Three) -> tuple[LimitViolation, ...]:
-    try:
-        robot.inverse_kinematics(pose)
-    except UnreachableError as error:
-        return error.violations
-    return ()
-
-
-def _table(
-    parameters: RPSParameters,
-    length: Array,
-    angle: Array,
-    cone: Array,
-) -> Table:
-    table = Table("", "leg 1", "leg 2", "leg 3", "limits", "unit")
-    for column in table.columns[1:4]:
-        column.justify = "right"
-    for label, unit, values, (lower, upper) in (
-        ("length", "m", length, parameters.leg_length_limits),
-        ("angle", "rad", angle, parameters.leg_angle_limits),
-        ("spherical joint", "rad", cone, (0.0, parameters.spherical_cone_limit)),
-    ):
-        limits = f"{lower:.4g} to {upper:.4g}"
-        table.add_row(label, *(f"{value:.6g}" for value in values), limits, unit)
-    return table
+        common.print_json(answer)
+        raise typer.Exit(not legs.reachable)
+    x, y, z = 1e3 * position + 0.0  # no negative zeros
+    console = common.text_console()
+    console.print(f"centre at ({x:.6g}, {y:.6g}, {z:.6g}) mm")
+    quantities = (
+        ("length", legs.length, parameters.leg_length_limits, "m"),
+        ("angle", legs.angle, parameters.leg_angle_limits, "rad"),
+        ("spherical joint", cone, (0.0, parameters.spherical_cone_limit), "rad"),
+    )
+    rows = (
+        (label, *(f"{value:.6g}" for value in values), f"{low:.4g} to {high:.4g}", unit)
+        for label, values, (low, high), unit in quantities
+    )
+    legs_named = ("leg 1", "leg 2", "leg 3")
+    console.print(common.table_of(rows, "", *legs_named, "limits", "unit", right=slice(1, 4)))
+    machine.inverse_kinematics(pose)  # raises if a limit is exceeded, and says which

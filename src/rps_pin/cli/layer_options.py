@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
+import pinocchio as pin
 import typer
 
+from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
+from rps_pin.rps.robot import RPSRobot
 
 LayersOption = Annotated[
     str | None,
@@ -21,24 +25,44 @@ SizeOption = Annotated[
 ]
 
 
-def chosen_layers(text: str | None, fitting: list[str]) -> tuple[list[str], list[str]]:
-    """Return the layers that are shown at first, and the other ones of the page.
+def chosen_layers(text: str | None, mechanism: ClosedLoopModel) -> dict[str, Any]:
+    """Return the layers that are shown at first, and the hidden ones, which the page can show.
 
     Parameters
     ----------
     text
         The option's value; None for the trail and the forces.
-    fitting
-        Layers that fit the subject.
+    mechanism
+        The page has the layers that fit it.
     """
+    from rps_pin.viewer import fitting_layers
     from rps_pin.viewer.layers import layers_of
 
+    fitting = fitting_layers(mechanism)
     if text is None:
         shown: list[str] = [name for name in fitting if name in ("trail", "forces")]
     else:
         shown = [name.strip() for name in text.split(",") if name.strip() not in ("", "none")]
         layers_of(shown)  # says which there are
-    return shown, [name for name in fitting if name not in shown]
+    return {"layers": shown, "hidden": [name for name in fitting if name not in shown]}
+
+
+def write_page(
+    folder: Path,
+    subject: RPSRobot | ClosedLoopModel,
+    motion: Any,
+    title: str,
+    layers: str | None = None,
+    visual: pin.GeometryModel | None = None,
+) -> Path:
+    """Write ``viewer.html``, a motion in 3D with its layers, into a folder; return the file."""
+    from rps_pin.viewer import save_html
+
+    page = folder / "viewer.html"
+    mechanism = subject.mechanism if isinstance(subject, RPSRobot) else subject
+    chosen = chosen_layers(layers, mechanism)
+    save_html(page, subject, motion, visual=visual, title=title, **chosen)
+    return page
 
 
 def chosen_size(text: str) -> tuple[int, int]:

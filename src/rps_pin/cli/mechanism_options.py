@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
+import pinocchio as pin
 import typer
 
-from rps_pin.cli.completion import mechanism_names, names_or_files
+from rps_pin.cli.completion import MECHANISMS, mechanism_names, names_or_files
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 
@@ -25,48 +25,41 @@ FileArgument = Annotated[
 ]
 
 
-def load_mechanism(file: Path) -> ClosedLoopModel:
-    """Return the mechanism of a file, told by its suffix.
+def load_mechanism(file: Path) -> tuple[ClosedLoopModel, Path]:
+    """Return the mechanism of a file, told by its suffix, or of a name; and its file.
 
     Raises
     ------
     InputError
-        If the suffix is of neither kind; says what a URDF lacks.
+        If there is no mechanism of that name (lists those there are), or the suffix is of neither
+        kind; says what a URDF lacks.
     """
-    return _loaded(mechanism_file(file))
-
-
-def mechanism_file(file: Path) -> Path:
-    """Return a file's path as it is, or that of a mechanism of the package by its name.
-
-    Raises
-    ------
-    InputError
-        If it is a name, and there is none such; lists those there are.
-    """
-    if file.suffix or file.exists():
-        return file
-    names = mechanism_names()
-    if str(file) not in names:
-        raise InputError(
-            f"{str(file)!r} is not a file or a mechanism of the package; those are: "
-            f"{', '.join(names)}"
-        )
-    return Path(str(resources.files("rps_pin"))) / "urdf" / f"{file}.yaml"
-
-
-def _loaded(file: Path) -> ClosedLoopModel:
+    if not (file.suffix or file.exists()):
+        names = mechanism_names()
+        if str(file) not in names:
+            raise InputError(
+                f"{str(file)!r} is not a file or a mechanism of the package; those are: "
+                f"{', '.join(names)}"
+            )
+        file = MECHANISMS / f"{file}.yaml"
     suffix = file.suffix.lower()
     if suffix in (".yaml", ".yml"):
-        return ClosedLoopModel.load(file)
+        return ClosedLoopModel.load(file), file
     if suffix == ".xml":
-        return ClosedLoopModel.from_mjcf(file)
+        return ClosedLoopModel.from_mjcf(file), file
     if suffix == ".urdf":
         raise InputError(
             f"{file}: a URDF has no closures; name it in a description: urdf: {file.name}, "
             "closures: [...], actuated: [...] in a .yaml file"
         )
     raise InputError(f"{file}: a mechanism's file ends in .yaml (a description) or .xml (MuJoCo)")
+
+
+def shapes_of(file: Path, mechanism: ClosedLoopModel) -> pin.GeometryModel | None:
+    """Return the shapes of a mechanism's links; None, for a skeleton, of a MuJoCo file."""
+    from rps_pin.closed_loop.visuals import visual_model
+
+    return None if file.suffix.lower() == ".xml" else visual_model(file, mechanism.model)
 
 
 def by_joint(pairs: Sequence[str], option: str) -> dict[str, float]:

@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from rps_pin.cli.console import FolderOption, print_files, progress_bar
+from rps_pin.cli import console as common
 
 
 def reproduce_command(
-    output: FolderOption = Path("reproduction"),
+    output: common.FolderOption = Path("reproduction"),
     quick: Annotated[
         bool, typer.Option("--quick", help="Coarser grids and fewer interpretations: seconds.")
     ] = False,
@@ -34,15 +32,12 @@ def reproduce_command(
     from rps_pin.paper.page import summary_lines
     from rps_pin.paper.write import write
 
-    console = Console()
+    console = common.text_console()
 
     def track(items: Iterable[Any], task: str) -> Iterable[Any]:
-        yield from progress_bar(console, task)(list(items))
+        yield from common.progress_bar(console, task)(list(items))
 
     found = compute(quick=quick, track=track)
     files = write(found, output, track=track)
-    table = Table(show_header=False)
-    for name, value in summary_lines(found):
-        table.add_row(name, value)
-    console.print(table)
-    print_files(console, files)
+    console.print(common.table_of(summary_lines(found)))
+    common.print_files(console, files)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rps_pin.cli.console import RobotOption, load_robot
-from rps_pin.files import whole_file
+from rps_pin.files import write_text
 
 
 def urdf_command(
@@ -28,6 +28,5 @@ def urdf_command(
     if output is None:
         typer.echo(text, nl=False)
         return
-    with whole_file(output) as scratch:
-        scratch.write_text(text, encoding="utf-8")
+    write_text(output, text)
     typer.echo(f"wrote {output}")

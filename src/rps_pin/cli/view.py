@@ -10,18 +10,18 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
 from rps_pin.cli.completion import mechanism_names, names_or_files
-from rps_pin.cli.console import RobotOption, Three, load_robot, progress_bar
 from rps_pin.cli.layer_options import LayersOption, SizeOption, chosen_layers, chosen_size
-from rps_pin.cli.mechanism_options import load_mechanism, mechanism_file
+from rps_pin.cli.mechanism_options import load_mechanism, shapes_of
 from rps_pin.errors import InputError
 
 
 def view_command(
-    robot: RobotOption = "sokolov",
+    robot: common.RobotOption = "sokolov",
     pose: Annotated[
-        Three | None,
+        common.Three | None,
         typer.Option(
             metavar="Z TILT_X TILT_Y",
             help="Show this pose (m, rad, rad) instead of the helix.",
@@ -86,29 +86,30 @@ def view_command(
     if mechanism is not None:
         raise InputError("--mechanism goes with --interactive; see rps-pin simulate for its motion")
     # Meshcat and its server are for this command only.
-    from rps_pin.viewer import fitting_layers, save_html, save_png, save_video, show
+    from rps_pin.viewer import save_html, save_png, save_video, show
 
-    machine = load_robot(robot)
-    shown, at_hand = chosen_layers(layers, fitting_layers(machine.mechanism))
+    machine = common.load_robot(robot)
+    chosen = chosen_layers(layers, machine.mechanism)
     sides = chosen_size(size)
     motion: Any = pose
     if pose is None:
         motion = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     if html is not None:
-        save_html(html, machine, motion, layers=shown, hidden=at_hand)
+        save_html(html, machine, motion, **chosen)
         typer.echo(f"wrote {html}")
-    picture: dict[str, Any] = {"layers": shown, "size": sides, "background": background}
+    picture: dict[str, Any] = {"size": sides, "background": background}
+    picture["layers"] = chosen["layers"]
     if png is not None:
         save_png(png, machine, motion, time=time, **picture)
         typer.echo(f"wrote {png}")
     if video is not None:
-        progress = progress_bar(Console(stderr=True), "drawing")
+        progress = common.progress_bar(Console(stderr=True), "drawing")
         save_video(video, machine, motion, progress=progress, **picture)
         typer.echo(f"wrote {video}")
     if html or png or video:
         return
     try:
-        with show(machine, motion, layers=shown, hidden=at_hand, port=port) as view:
+        with show(machine, motion, port=port, **chosen) as view:
             typer.echo(f"Open {view.url} in a browser on this machine. Ctrl-C ends.")
             view.play()
     except KeyboardInterrupt:
@@ -117,27 +118,23 @@ def view_command(
 
 def _interact(
     robot: str,
-    pose: Three | None,
+    pose: common.Three | None,
     mechanism: Path | None,
     port: int | None,
     layers: str | None,
 ) -> None:
     """Serve a panel until Ctrl-C."""
-    from rps_pin.closed_loop.visuals import visual_model
     from rps_pin.panel import BrowserPanel, MechanismPanel, Panel, RPSPanel
-    from rps_pin.viewer import fitting_layers
 
     panel: Panel
     if mechanism is None:
-        machine = load_robot(robot)
+        machine = common.load_robot(robot)
         panel, title = RPSPanel(machine, pose), f"3-RPS {machine.parameters.name}"
     else:
-        file = mechanism_file(mechanism)
-        loaded = load_mechanism(file)
-        shapes = visual_model(file, loaded.model) if file.suffix != ".xml" else None
-        panel, title = MechanismPanel(loaded, visual=shapes), loaded.name
-    shown, at_hand = chosen_layers(layers or "none", fitting_layers(panel.mechanism))
-    with BrowserPanel(panel, port=port, title=title, layers=shown, hidden=at_hand) as page:
+        loaded, file = load_mechanism(mechanism)
+        panel, title = MechanismPanel(loaded, visual=shapes_of(file, loaded)), loaded.name
+    chosen = chosen_layers(layers or "none", panel.mechanism)
+    with BrowserPanel(panel, port=port, title=title, **chosen) as page:
         typer.echo(f"Open {page.url} in a browser on this machine. Ctrl-C ends.")
         with contextlib.suppress(KeyboardInterrupt):
             threading.Event().wait()

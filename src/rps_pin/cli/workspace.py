@@ -6,19 +6,11 @@ import math
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
-from rich.console import Console
 from rich.table import Table
 
-from rps_pin.cli.console import (
-    FolderOption,
-    JsonOption,
-    RobotOption,
-    load_robot,
-    print_files,
-    print_json,
-    progress_bar,
-)
+from rps_pin.cli import console as common
 from rps_pin.errors import InputError
 from rps_pin.paper import PaperComparison, paper_comparison
 from rps_pin.rps.robot import RPSRobot
@@ -39,15 +31,15 @@ _DRAWN_POINTS = 18
 
 
 def workspace_command(
-    robot: RobotOption = "micro",
+    robot: common.RobotOption = "micro",
     points: Annotated[
         int, typer.Option(help="Lengths per leg; 51 are the paper's 1 mm steps over 50 mm.")
     ] = 51,
-    output: FolderOption = Path("workspace"),
+    output: common.FolderOption = Path("workspace"),
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace existing results.")
     ] = False,
-    as_json: JsonOption = False,
+    as_json: common.JsonOption = False,
 ) -> None:
     """Compute the workspace of a 3-RPS by discretised leg lengths, as the paper does.
 
@@ -61,30 +53,24 @@ def workspace_command(
 
     Example: `rps-pin workspace --points 101 -o results`
     """
-    machine = load_robot(robot)
-    folder = _prepared(output, overwrite=overwrite)
-    console = Console(quiet=as_json)
+    machine = common.load_robot(robot)
+    if not overwrite and (output / "workspace.h5").exists():
+        raise InputError(f"{output / 'workspace.h5'} exists; --overwrite replaces it")
+    output.mkdir(parents=True, exist_ok=True)
+    console = common.text_console(as_json)
     grid = leg_grid(machine.parameters, points)
-    found = workspace(machine, grid, progress=progress_bar(console, "direct kinematics"))
+    found = workspace(machine, grid, progress=common.progress_bar(console, "direct kinematics"))
     rows = paper_comparison() if machine.parameters.name == "micro" else ()
     summary = _summary(machine, found, rows)
     with console.status("writing the results"):
-        files = _write(folder, machine, found, rows, overwrite=overwrite)
+        files = _write(output, machine, found, rows)
     if as_json:
-        print_json(summary | {"files": files})
+        common.print_json(summary | {"files": files})
         return
     console.print(_table(summary))
     if rows:
         console.print(_comparison_table(rows))
-    print_files(console, files)
-
-
-def _prepared(folder: Path, *, overwrite: bool) -> Path:
-    """Make the folder; refuse one that has results."""
-    if not overwrite and (folder / "workspace.h5").exists():
-        raise InputError(f"{folder / 'workspace.h5'} exists; --overwrite replaces it")
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+    common.print_files(console, files)
 
 
 def _write(
@@ -92,38 +78,28 @@ def _write(
     robot: RPSRobot,
     found: Workspace,
     rows: tuple[PaperComparison, ...],
-    *,
-    overwrite: bool,
 ) -> list[Path]:
+    """Write the results into a folder, in place of older ones; return the files."""
     # Slow to import: only for commands that draw.
     from rps_pin.plots import save_figure
-    from rps_pin.plots.workspace import (
-        plot_assembly_modes,
-        plot_comparison,
-        plot_effective,
-        plot_space,
-        plot_theoretical,
-        plot_views,
-    )
+    from rps_pin.plots import workspace as plots
 
     data, mesh = folder / "workspace.h5", folder / "boundary.stl"
-    save_workspace(found, data, overwrite=overwrite)
-    save_mesh(boundary(found), mesh, overwrite=overwrite)
+    save_workspace(found, data, overwrite=True)
+    save_mesh(boundary(found), mesh, overwrite=True)
     parameters = robot.parameters
     # Matplotlib draws surfaces triangle by triangle: a coarser grid shows the same shape.
     coarse = workspace(robot, leg_grid(parameters, min(_DRAWN_POINTS, found.grid.shape[0])))
-    middle = sum(parameters.leg_length_limits) / 2
+    modes = robot.assembly_modes([sum(parameters.leg_length_limits) / 2] * 3)
     figures = {
-        "figure_2_assembly_modes": plot_assembly_modes(
-            parameters, robot.assembly_modes([middle] * 3)
-        ),
-        "figure_3_theoretical": plot_theoretical(parameters),
-        "figure_4_effective": plot_effective(coarse),
-        "figure_5_space": plot_space(coarse),
-        "figure_6_views": plot_views(found),
+        "figure_2_assembly_modes": plots.plot_assembly_modes(parameters, modes),
+        "figure_3_theoretical": plots.plot_theoretical(parameters),
+        "figure_4_effective": plots.plot_effective(coarse),
+        "figure_5_space": plots.plot_space(coarse),
+        "figure_6_views": plots.plot_views(found),
     }
     if rows:
-        figures["base_radius"] = plot_comparison(rows)
+        figures["base_radius"] = plots.plot_comparison(rows)
     files = [data, mesh]
     for name, figure in figures.items():
         files += save_figure(figure, folder, name)
@@ -137,20 +113,17 @@ def _summary(
     if not len(inside):
         raise InputError("no point of the grid is inside the workspace")
     size = volume(found)
-    tilts = largest_tilt_range(robot)
-    low, high = inside.min(axis=0), inside.max(axis=0)
-    height = high[2] - low[2]
+    sides = np.stack([inside.min(axis=0), inside.max(axis=0)], axis=1).tolist()
+    height = sides[2][1] - sides[2][0]
     return {
         "robot": robot.parameters.name,
         "points": found.grid.size,
         "inside": len(inside),
-        "x": [float(low[0]), float(high[0])],
-        "y": [float(low[1]), float(high[1])],
-        "z": [float(low[2]), float(high[2])],
+        **dict(zip("xyz", sides, strict=True)),
         "volume": size.position,
-        "cylinder_volume": math.pi * robot.parameters.platform_radius**2 * float(height),
+        "cylinder_volume": math.pi * robot.parameters.platform_radius**2 * height,
         "pose_volume": size.pose,
-        "full_tilt": tilts._asdict(),
+        "full_tilt": largest_tilt_range(robot)._asdict(),
         "out": {
             reason.text: count
             for reason, count in found.counts().items()
@@ -161,35 +134,33 @@ def _summary(
 
 
 def _table(summary: dict[str, Any]) -> Table:
-    table = Table(show_header=False)
-    table.add_row("points", f"{summary['points']}, of which inside: {summary['inside']}")
-    for axis in "xyz":
-        low, high = (1e3 * value for value in summary[axis])
-        table.add_row(f"p_{axis}", f"{low:.4g} to {high:.4g} mm")
-    table.add_row(
-        "volume of the centre's positions",
-        f"{1e9 * summary['volume']:.5g} mm^3; theoretical cylinder of radius h: "
-        f"{1e9 * summary['cylinder_volume']:.5g} mm^3",
-    )
     tilts = summary["full_tilt"]
-    table.add_row(
-        "largest cylinder of full tilt",
-        f"every tilt up to {math.degrees(tilts['tilt']):.3g} degrees, "
-        f"for z from {1e3 * tilts['lower']:.4g} to {1e3 * tilts['upper']:.4g} mm",
-    )
-    for reason, count in summary["out"].items():
-        table.add_row("out", f"{count}: {reason}")
-    return table
+    sides = {f"p_{axis}": [1e3 * value for value in summary[axis]] for axis in "xyz"}
+    rows = [
+        ("points", f"{summary['points']}, of which inside: {summary['inside']}"),
+        *((name, f"{low:.4g} to {high:.4g} mm") for name, (low, high) in sides.items()),
+        (
+            "volume of the centre's positions",
+            f"{1e9 * summary['volume']:.5g} mm^3; theoretical cylinder of radius h: "
+            f"{1e9 * summary['cylinder_volume']:.5g} mm^3",
+        ),
+        (
+            "largest cylinder of full tilt",
+            f"every tilt up to {math.degrees(tilts['tilt']):.3g} degrees, "
+            f"for z from {1e3 * tilts['lower']:.4g} to {1e3 * tilts['upper']:.4g} mm",
+        ),
+        *(("out", f"{count}: {reason}") for reason, count in summary["out"].items()),
+    ]
+    return common.table_of(rows)
 
 
 def _comparison_table(rows: tuple[PaperComparison, ...]) -> Table:
-    table = Table("g (mm)", "p_x (mm)", "p_y (mm)", "within the paper's 2.5 mm")
-    for row in rows:
-        (x_low, x_high), (y_low, y_high) = row.x, row.y
-        table.add_row(
+    texts = (
+        (
             f"{1e3 * row.base_radius:g}",
-            f"{1e3 * x_low:.2f} to {1e3 * x_high:.2f}",
-            f"{1e3 * y_low:.2f} to {1e3 * y_high:.2f}",
+            *(f"{1e3 * low:.2f} to {1e3 * high:.2f}" for low, high in (row.x, row.y)),
             "yes" if row.holds else f"no: {1e3 * row.reach:.2f} mm",
         )
-    return table
+        for row in rows
+    )
+    return common.table_of(texts, "g (mm)", "p_x (mm)", "p_y (mm)", "within the paper's 2.5 mm")

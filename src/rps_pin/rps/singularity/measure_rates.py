@@ -69,24 +69,14 @@ def rates_of_legs(
     # d/dt cos(beta/2) = -sin(beta/2) / (2 beta) w . w'
     couple_rate = -np.sinc(beta / (2 * np.pi)) / 4 * (x[..., 1:] * dx[..., 1:]).sum(axis=-1)
     speed = np.einsum("...ij,...j->...i", legs.length_jacobian, dx)
-    return MeasureRates(
-        np.concatenate(
-            [
-                np.where(regular, sigma, 0.0)[..., None],
-                np.cos(beta / 2)[..., None],
-                np.where(vanishing, 0.0, legs.length) / h,
-            ],
-            axis=-1,
-        ),
-        np.concatenate(
-            [
-                np.where(regular, dsigma, 0.0)[..., None],
-                couple_rate[..., None],
-                np.where(vanishing, 0.0, speed) / h,
-            ],
-            axis=-1,
-        ),
+    least = np.where(regular, [sigma, dsigma], 0.0)
+    couple = np.cos(beta / 2), couple_rate
+    lengths = np.where(vanishing, 0.0, [legs.length, speed]) / h
+    value, rate = (
+        np.concatenate([least[k][..., None], couple[k][..., None], lengths[k]], axis=-1)
+        for k in range(2)
     )
+    return MeasureRates(value, rate)
 
 
 def _least_gain(

@@ -40,6 +40,8 @@ NOISE = 1e-13
 _VANISHING = 1e-6
 
 _MOST_SAMPLES = 1_000_000
+#: Signals of singularities; those of limits follow.
+_KINDS = len(SINGULARITIES)
 
 
 class _HasParameters(Protocol):
@@ -87,20 +89,11 @@ def check_path(
     values, rates = path.signals(times)
     found = _Findings(path, times, values, rates, threshold)
     singularities = found.singularities()
-    least, singularity, when = found.nearest(singularities)
-    return PathCheck(
-        singularities,
-        found.limits(),
-        least,
-        singularity,
-        when,
-        path.duration,
-        threshold,
-        tolerance,
-        times.size,
-        float(np.diff(times).max()),
-        path.sample(np.array([when]))[0][0],
-    )
+    nearest = found.nearest(singularities)
+    pose = path.sample(np.array([nearest[2]]))[0][0]
+    density = times.size, float(np.diff(times).max())
+    about = path.duration, threshold, tolerance
+    return PathCheck(singularities, found.limits(), *nearest, *about, *density, pose)
 
 
 # Events -------------------------------------------------------------------------------------------
@@ -116,18 +109,11 @@ class _Brackets(NamedTuple):
 
     def part(self, chosen: Bools | Indices) -> _Brackets:
         """Return some of them."""
-        return _Brackets(
-            self.low[chosen], self.high[chosen], self.signal[chosen], self.negative[chosen]
-        )
+        return _Brackets._make(field[chosen] for field in self)
 
     def joined(self, more: _Brackets) -> _Brackets:
         """Return these and more of them."""
-        return _Brackets(
-            np.concatenate([self.low, more.low]),
-            np.concatenate([self.high, more.high]),
-            np.concatenate([self.signal, more.signal]),
-            np.concatenate([self.negative, more.negative]),
-        )
+        return _Brackets._make(map(np.concatenate, zip(self, more, strict=True)))
 
 
 class _Findings:
@@ -140,52 +126,45 @@ class _Findings:
         self.times = times
         self.values = values
         self.threshold = threshold
-        singular = np.arange(values.shape[1]) < len(SINGULARITIES)
+        singular = np.arange(values.shape[1]) < _KINDS
         self.noise = np.where(singular, NOISE, 0.0)
         self.zero = (np.abs(values) <= self.noise) & singular
         self.sign = _filled_signs(np.where(self.zero, 0.0, np.where(values < 0, -1.0, 1.0)))
         # Of each signal's size: negative where it falls towards zero.
         self.growth = self.sign * rates
-        turning, split = self._turning_points()
-        self.turning = turning
+        self.turning, split = self._turning_points()
         self.zeros = self._zeros(split)
 
     def singularities(self) -> tuple[SingularityEvent, ...]:
         """Return every event of the first signals, in order of time."""
-        zeros, touches = _apart(self._only(self.zeros, singular=True), self.path.tolerance)
-        zeros = self._continuous(zeros)
-        turning = self._only(self.turning, singular=True)
+        zeros, touches = _apart(self.zeros.part(self.zeros.signal < _KINDS), self.path.tolerance)
         events = [
-            *self._events("crosses", zeros),
+            *self._events("crosses", self._continuous(zeros)),
             *self._events("grazes", touches),
-            *(e for e in self._events("grazes", turning) if abs(e.distance) < self.threshold),
-            *self._ends(),
-            *self._stays(),
+            *(e for e in self._approaches() if abs(e.distance) < self.threshold),
+            *self._events("grazes", self._ends()),
+            *self._events("stays", self._stays()),
         ]
         return tuple(sorted(events, key=lambda event: event.time))
 
     def limits(self) -> tuple[LimitEvent, ...]:
         """Return every event of the limits, in order of time."""
-        zeros = self._only(self.zeros, singular=False)
-        start = np.flatnonzero(self.values[0, len(SINGULARITIES) :] < 0) + len(SINGULARITIES)
-        events = [self._limit_event("starts outside", 0.0, 0.0, int(signal)) for signal in start]
-        for low, high, signal, negative in zip(*zeros, strict=True):
-            kind = "returns" if negative else "leaves"
-            events.append(self._limit_event(kind, (low + high) / 2, high - low, int(signal)))
+        start = np.flatnonzero(self.values[0, _KINDS:] < 0) + _KINDS
+        zeros = self.zeros.part(self.zeros.signal >= _KINDS)
+        events = [self._limit_event("starts outside", 0.0, 0.0, signal) for signal in start]
+        events += [
+            self._limit_event("returns" if negative else "leaves", low, high, signal)
+            for low, high, signal, negative in zip(*zeros, strict=True)
+        ]
         return tuple(sorted(events, key=lambda event: event.time))
 
     def nearest(self, events: tuple[SingularityEvent, ...]) -> tuple[float, str, float]:
         """Return the smallest distance to a singularity, which kind, and when."""
-        sizes = np.abs(self.values[:, : len(SINGULARITIES)])
+        sizes = np.abs(self.values[:, :_KINDS])
         sample, signal = np.unravel_index(int(np.argmin(sizes)), sizes.shape)
-        best = (
-            float(sizes[sample, signal]),
-            SINGULARITIES[signal].name,
-            float(self.times[sample]),
-        )
-        turning = self._only(self.turning, singular=True)
-        near = self._events("grazes", turning)
-        found = [(abs(e.distance), e.singularity, e.time) for e in (*near, *events)]
+        best = float(sizes[sample, signal]), SINGULARITIES[signal].name, float(self.times[sample])
+        near = (*self._approaches(), *events)
+        found = [(abs(e.distance), e.singularity, e.time) for e in near]
         return min([best, *found], key=lambda candidate: candidate[0])
 
     # Zeros and turning points ---------------------------------------------------------------------
@@ -203,14 +182,11 @@ class _Findings:
             return np.asarray(sign[which] * rates[np.arange(which.size), signal[which]] < 0)
 
         low, high = bisected(falling, self.times[step], self.times[step + 1], self.path.tolerance)
-        there = sign * self._at((low + high) / 2, signal)
-        beyond = there < -self.noise[signal]
-        middle = ((low + high) / 2)[beyond]
-        negative = sign < 0
-        begin, end = self.times[step[beyond]], self.times[step[beyond] + 1]
-        before = _Brackets(begin, middle, signal[beyond], negative[beyond])
-        after = _Brackets(middle, end, signal[beyond], ~negative[beyond])
-        return _Brackets(low, high, signal, negative).part(~beyond), before.joined(after)
+        middle = (low + high) / 2
+        beyond = sign * self._at(middle, signal) < -self.noise[signal]
+        before = _Brackets(self.times[step], middle, signal, sign < 0).part(beyond)
+        after = _Brackets(middle, self.times[step + 1], signal, sign >= 0).part(beyond)
+        return _Brackets(low, high, signal, sign < 0).part(~beyond), before.joined(after)
 
     def _zeros(self, split: _Brackets) -> _Brackets:
         """Return brackets of every sign change: between samples, and beside turning points."""
@@ -244,66 +220,47 @@ class _Findings:
         shortest = np.minimum(at_low, at_high)[:, TYPE_I].min(axis=-1)
         return zeros.part(smooth | (shortest > _VANISHING))
 
-    @staticmethod
-    def _only(brackets: _Brackets, *, singular: bool) -> _Brackets:
-        return brackets.part((brackets.signal < len(SINGULARITIES)) == singular)
-
     # What they mean -------------------------------------------------------------------------------
 
     def _events(self, kind: str, brackets: _Brackets) -> list[SingularityEvent]:
-        low, high, signal, _ = brackets
+        """Return events in the middle of brackets; stays at their beginning."""
+        low, high, signals, _ = brackets
         if not low.size:
             return []
-        times = (low + high) / 2
-        pose, _ = self.path.sample(times)
-        distance = self._at(times, signal)
+        times = low if kind == "stays" else (low + high) / 2
+        pose, distance = self.path.sample(times)[0], self._at(times, signals).tolist()
+        events = zip(signals, times.tolist(), (high - low).tolist(), pose, distance, strict=True)
         return [
-            _singularity_event(kind, *item)
-            for item in zip(signal, times, high - low, pose, distance, strict=True)
+            SingularityEvent(kind, about.name, time, width, x, size, about.leg)
+            for about, time, width, x, size in ((SINGULARITIES[i], *rest) for i, *rest in events)
         ]
 
-    def _ends(self) -> list[SingularityEvent]:
-        """Return grazes where the path begins or ends near a singularity that it does not enter."""
-        events = []
-        for end, moving_away in ((0, self.growth[0] >= 0), (-1, self.growth[-1] < 0)):
-            near = np.abs(self.values[end]) < self.threshold
-            standing = self.zero[end] & self.zero[1 if end == 0 else -2]
-            chosen = near & (moving_away | self.zero[end]) & ~standing
-            signal = np.flatnonzero(chosen[: len(SINGULARITIES)])
-            time = np.full(signal.size, self.times[end])
-            events += self._events("grazes", _Brackets(time, time, signal, signal < 0))
-        return events
+    def _approaches(self) -> list[SingularityEvent]:
+        """Return where the path comes near to a singularity and turns away, however far it is."""
+        return self._events("grazes", self.turning.part(self.turning.signal < _KINDS))
 
-    def _stays(self) -> list[SingularityEvent]:
+    def _ends(self) -> _Brackets:
+        """Return where the path begins or ends near a singularity that it does not enter."""
+        ends, beside = [0, -1], [1, -2]
+        away = np.stack([self.growth[0] >= 0, self.growth[-1] < 0])
+        near = (np.abs(self.values[ends]) < self.threshold) & ~(self.zero[ends] & self.zero[beside])
+        end, signal = np.nonzero((near & (away | self.zero[ends]))[:, :_KINDS])
+        time = self.times[-end]  # 0 the first, 1 the last
+        return _Brackets(time, time, signal, signal < 0)
+
+    def _stays(self) -> _Brackets:
         """Return when the path stays in a singularity: at two neighbouring samples or more."""
-        events = []
-        for signal in range(len(SINGULARITIES)):
-            edges = np.diff(np.concatenate([[0], self.zero[:, signal].astype(int), [0]]))
-            first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-            for begin, end in zip(first, last, strict=True):
-                if end > begin:
-                    time, until = self.times[begin], self.times[end]
-                    pose, _ = self.path.sample(np.array([time]))
-                    distance = self.values[begin, signal]
-                    events.append(
-                        _singularity_event("stays", signal, time, until - time, pose[0], distance)
-                    )
-        return events
+        edges = np.diff(np.pad(self.zero.astype(int), ((1, 1), (0, 0))), axis=0).T
+        signal, first = np.nonzero(edges == 1)
+        last = np.nonzero(edges == -1)[1] - 1
+        stays = _Brackets(self.times[first], self.times[last], signal, signal < 0)
+        return stays.part(last > first)
 
-    def _limit_event(self, kind: str, time: float, width: float, signal: int) -> LimitEvent:
-        about = self.path.limits[signal - len(SINGULARITIES)]
-        pose, _ = self.path.sample(np.array([time]))
-        return LimitEvent(
-            kind,
-            about.leg,
-            about.name,
-            float(time),
-            float(width),
-            pose[0],
-            about.limit,
-            about.side,
-            about.unit,
-        )
+    def _limit_event(self, kind: str, low: float, high: float, signal: Any) -> LimitEvent:
+        name, leg, side, limit, unit = self.path.limits[signal - _KINDS]
+        time = (low + high) / 2
+        pose = self.path.sample(np.array([time]))[0][0]
+        return LimitEvent(kind, leg, name, float(time), float(high - low), pose, limit, side, unit)
 
 
 def _filled_signs(signs: Array) -> Array:
@@ -323,23 +280,12 @@ def _apart(zeros: _Brackets, tolerance: float) -> tuple[_Brackets, _Brackets]:
     """Part zeros from touches: pairs of zeros, of one signal, that cannot be told apart in time."""
     near = (zeros.signal[1:] == zeros.signal[:-1]) & (zeros.low[1:] - zeros.high[:-1] <= tolerance)
     alone = np.ones(zeros.low.size, dtype=bool)
-    first = []
+    first = np.zeros(zeros.low.size, dtype=bool)
     for k in np.flatnonzero(near):
         if alone[k]:  # else it is the second of the pair before
-            alone[k : k + 2] = False
-            first.append(k)
-    touching = zeros.part(np.array(first, dtype=np.intp))
-    last = zeros.part(np.array(first, dtype=np.intp) + 1)
-    return zeros.part(alone), touching._replace(high=last.high)
-
-
-def _singularity_event(
-    kind: str, signal: Any, time: float, width: float, pose: Array, distance: float
-) -> SingularityEvent:
-    about = SINGULARITIES[int(signal)]
-    return SingularityEvent(
-        kind, about.name, float(time), float(width), pose, float(distance), about.leg
-    )
+            alone[k : k + 2], first[k] = False, True
+    touches = zeros.part(first)._replace(high=zeros.high[np.flatnonzero(first) + 1])
+    return zeros.part(alone), touches
 
 
 def _sample_times(path: PathSignals, least_steps: int, max_step: float) -> Array:
@@ -367,12 +313,8 @@ def _sample_times(path: PathSignals, least_steps: int, max_step: float) -> Array
                 f"max_step = {max_step:.3g} would take {wanted:.3g} samples of this path, and at "
                 f"most {_MOST_SAMPLES:,} are accepted"
             )
-        times = _subdivided(times, parts.astype(np.intp))
-
-
-def _subdivided(times: Array, parts: Indices) -> Array:
-    """Return times with each step divided into equal parts."""
-    first = np.cumsum(parts) - parts
-    within = np.arange(parts.sum()) - np.repeat(first, parts)
-    inner = np.repeat(times[:-1], parts) + np.repeat(np.diff(times) / parts, parts) * within
-    return np.append(inner, times[-1])
+        # Each step is divided into equal parts.
+        count = parts.astype(np.intp)
+        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        inner = np.repeat(times[:-1], count) + np.repeat(gap / count, count) * within
+        times = np.append(inner, times[-1])

@@ -67,8 +67,7 @@ class PathSignals:
     def sample(self, times: Array) -> tuple[Array, Array]:
         """Return poses and rates at times (n,), shape (n, 3) each, checked."""
         found = self.trajectory.sample(times)
-        pose = _checked_samples(found.pose, times, "pose")
-        rate = _checked_samples(found.rate, times, "rate")
+        pose, rate = (_checked_samples(getattr(found, n), times, n) for n in ("pose", "rate"))
         return checked_tilt(pose), rate
 
     def signals(self, times: Array) -> tuple[Array, Array]:
@@ -97,22 +96,16 @@ def _limits_of(parameters: RPSParameters) -> tuple[Signal, ...]:
     """Return the limits that a leg can break."""
     p = parameters
     sides = [
-        ("length", "lower", p.leg_length_limits[0], "m", p.leg_length_limits[0] > 0),
-        ("length", "upper", p.leg_length_limits[1], "m", math.isfinite(p.leg_length_limits[1])),
-        ("angle", "lower", p.leg_angle_limits[0], "rad", p.leg_angle_limits[0] > -math.pi),
-        ("angle", "upper", p.leg_angle_limits[1], "rad", p.leg_angle_limits[1] < math.pi),
-        (
-            "spherical joint",
-            "upper",
-            p.spherical_cone_limit,
-            "rad",
-            p.spherical_cone_limit < math.pi,
-        ),
+        ("length", "lower", p.leg_length_limits[0], "m", 0.0),
+        ("length", "upper", p.leg_length_limits[1], "m", math.inf),
+        ("angle", "lower", p.leg_angle_limits[0], "rad", -math.pi),
+        ("angle", "upper", p.leg_angle_limits[1], "rad", math.pi),
+        ("spherical joint", "upper", p.spherical_cone_limit, "rad", math.pi),
     ]
     return tuple(
         Signal(quantity, leg, side, limit, unit)
-        for quantity, side, limit, unit, breakable in sides
-        if breakable
+        for quantity, side, limit, unit, widest in sides
+        if (limit > widest if side == "lower" else limit < widest)
         for leg in (1, 2, 3)
     )
 
@@ -129,19 +122,19 @@ def _rooms(
     For the spherical joints it is that of the angle's cosine, which is smooth. `quantities` are the
     legs' lengths and angles with their rates, (n, 3 legs) each.
     """
-    rooms, rates = np.empty((len(pose), len(limits))), np.empty((len(pose), len(limits)))
+    rooms, rates = np.empty((2, len(pose), len(limits)))
     if any(signal.name == "spherical joint" for signal in limits):
         angles = _cone_cosines(parameters, pose, rate, *quantities["angle"])
         quantities = quantities | {"spherical joint": angles}
     for column, signal in enumerate(limits):
         value, change = (array[:, signal.leg - 1] for array in quantities[signal.name])
         if signal.name == "spherical joint":
-            least = math.cos(min(signal.limit + LIMIT_TOLERANCE, math.pi))
-            rooms[:, column], rates[:, column] = value - least, change
+            room = value - math.cos(min(signal.limit + LIMIT_TOLERANCE, math.pi))
         elif signal.side == "lower":
-            rooms[:, column], rates[:, column] = value - signal.limit + LIMIT_TOLERANCE, change
+            room = value - signal.limit + LIMIT_TOLERANCE
         else:
-            rooms[:, column], rates[:, column] = signal.limit + LIMIT_TOLERANCE - value, -change
+            room, change = signal.limit + LIMIT_TOLERANCE - value, -change
+        rooms[:, column], rates[:, column] = room, change
     return rooms, rates
 
 
