@@ -12,8 +12,6 @@ themselves.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rps_pin.arrays import Array, Bools
@@ -34,15 +32,6 @@ _ITERATIONS = 12
 _TOLERANCE = 1e-11
 #: A start whose |determinant| is below this decides no mode.
 _SINGULAR_START = 1e-9
-
-
-class ModePoses(NamedTuple):
-    """Poses of one assembly mode."""
-
-    pose: Array
-    """(z, tilt_x, tilt_y), shape (..., 3), m and rad; zeros where there is none."""
-    found: Bools
-    """Whether the lengths close in this mode, shape (...)."""
 
 
 class AssemblyMode:
@@ -103,8 +92,11 @@ class AssemblyMode:
             angle[lost], found[lost] = self.follow(length[lost])
         return angle, found
 
-    def poses(self, length: Array, block: Block = WHOLE) -> ModePoses:
-        """Return the poses of a block of the grid, whose points are `length`."""
+    def poses(self, length: Array, block: Block = WHOLE) -> tuple[Array, Bools]:
+        """Return poses (..., 3) of a block of the grid, m and rad, and whether there are any.
+
+        `length` are the points of the block. A pose is zero where lengths do not close.
+        """
         angle, found = self.angles(length, block)
         pose = np.zeros(length.shape)
         if found.any():
@@ -113,7 +105,7 @@ class AssemblyMode:
             pose[where] = placement.pose
             found[where] = placement.in_plane_mode
         pose[~found] = 0.0
-        return ModePoses(pose, found)
+        return pose, found
 
     def _interpolated(self, block: Block) -> tuple[Array, Bools]:
         """Return angles interpolated in the coarse map, and where all its corners are known."""
@@ -138,5 +130,4 @@ def _thinned(axis: Array) -> Array:
 
 def _interpolation(coarse: Array, fine: Array) -> Array:
     """Return the matrix (fine, coarse) of linear interpolation."""
-    columns = [np.interp(fine, coarse, unit) for unit in np.eye(len(coarse))]
-    return np.stack(columns, axis=-1)
+    return np.stack([np.interp(fine, coarse, unit) for unit in np.eye(len(coarse))], axis=-1)

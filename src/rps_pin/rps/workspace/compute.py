@@ -13,12 +13,7 @@ from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError, UnreachableError
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.assembly_mode import AssemblyMode
-from rps_pin.rps.workspace.evaluate import (
-    MIN_CONDITIONING,
-    Fields,
-    evaluate,
-    side_of_singularity,
-)
+from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, Fields, evaluate, side_of_singularity
 from rps_pin.rps.workspace.grids import WHOLE, Block, Grid, checked_grid, leg_grid
 from rps_pin.rps.workspace.result import Workspace
 from rps_pin.validation import real, real_vector
@@ -109,26 +104,17 @@ class GridJob:
         self._side = side_of_singularity(self.parameters, self.start)
         if self._side == 0:
             raise SingularityError("the start pose is singular", math.inf, math.inf)
-        self.assembly_mode = (
-            AssemblyMode(self.parameters, self.start, self.grid)
-            if self.grid.kind == "leg lengths"
-            else None
-        )
+        self.assembly_mode = None
+        if self.grid.kind == "leg lengths":
+            self.assembly_mode = AssemblyMode(self.parameters, self.start, self.grid)
 
     def compute(self, block: Block = WHOLE) -> Fields:
         """Return the fields of a block of the grid."""
-        points = self.grid.points(block)
-        if self.assembly_mode is None:
-            pose, found = points, None
-        else:
-            pose, found = self.assembly_mode.poses(points, block)
-        return evaluate(
-            self.parameters,
-            pose,
-            self._side,
-            found=found,
-            min_conditioning=self.min_conditioning,
-        )
+        pose, found = self.grid.points(block), None
+        if self.assembly_mode is not None:
+            pose, found = self.assembly_mode.poses(pose, block)
+        least = self.min_conditioning
+        return evaluate(self.parameters, pose, self._side, found=found, min_conditioning=least)
 
     def empty_fields(self) -> Fields:
         """Return fields of the whole grid's shape, to be filled."""
@@ -176,8 +162,7 @@ def checked_start(parameters: RPSParameters, grid: Grid, start: ArrayLike | None
     if start is not None:
         return real_vector(start, 3, "start")
     if grid.kind == "leg lengths":
-        ends = [(axis[0], axis[-1]) for axis in grid.axes]
-        return level_pose(parameters, float(np.mean(ends)))
+        return level_pose(parameters, float(np.mean([(a[0], a[-1]) for a in grid.axes])))
     shortest, longest = parameters.leg_length_limits
     if math.isfinite(longest):
         return level_pose(parameters, (shortest + longest) / 2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,8 +43,7 @@ class Fields(NamedTuple):
 
     def part(self, where: tuple[slice, ...]) -> Fields:
         """Return the fields of a part of the points."""
-        parts: list[Any] = [field[where] for field in self]
-        return Fields(*parts)
+        return Fields._make(field[where] for field in self)
 
     def fill(self, where: tuple[slice, ...], values: Fields) -> None:
         """Copy the fields of a part of the points into these."""

@@ -53,10 +53,8 @@ def volume(workspace: Workspace) -> Volume:
     """
     _refuse_slices(workspace)
     inside = workspace.inside
-    weight = np.ones(())
-    for axis in workspace.grid.axes:
-        weight = weight[..., None] * _trapezoid_weights(axis)
-    element = weight[inside]
+    ends = [(np.diff(a, prepend=a[0]) + np.diff(a, append=a[-1])) / 2 for a in workspace.grid.axes]
+    element = np.einsum("i,j,k->ijk", *ends)[inside]
     h = workspace.parameters.platform_radius
     if workspace.grid.kind == "leg lengths":
         element = element / (h**2 * np.abs(workspace.determinant[inside]))
@@ -65,11 +63,8 @@ def volume(workspace: Workspace) -> Volume:
     # 1 - cos(beta) = 2 sin^2(beta/2), |sin|: the centre turns back beyond a half turn
     spread = h**2 * np.sin(beta / 2) ** 2 * np.abs(np.sinc(beta / np.pi))
     share = np.where(_opposite_inside(workspace, pose), 0.5, 1.0)
-    return Volume(
-        float(element.sum()),
-        float((element * spread * share).sum()),
-        float((element * spread).sum()),
-    )
+    elements = element, element * spread * share, element * spread
+    return Volume(*(float(volumes.sum()) for volumes in elements))
 
 
 def boundary(workspace: Workspace, space: Space = "position") -> trimesh.Trimesh:
@@ -173,11 +168,6 @@ def _opposite_inside(workspace: Workspace, pose: Array) -> Bools:
     for i, axis in enumerate(workspace.grid.axes):
         inside &= (coordinates[:, i] >= axis[0] - 1e-12) & (coordinates[:, i] <= axis[-1] + 1e-12)
     return np.asarray(inside)
-
-
-def _trapezoid_weights(axis: Array) -> Array:
-    step = np.diff(axis)
-    return np.concatenate([[0.0], step]) / 2 + np.concatenate([step, [0.0]]) / 2
 
 
 def _outer_faces(inside: Bools) -> Indices:

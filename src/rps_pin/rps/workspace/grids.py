@@ -19,9 +19,10 @@ GridKind = Literal["leg lengths", "poses"]
 Block = tuple[slice, slice]
 WHOLE: Block = (slice(None), slice(None))
 
-_AXIS_NAMES = {
-    "leg lengths": ("length of leg 1", "length of leg 2", "length of leg 3"),
-    "poses": ("z", "tilt_x", "tilt_y"),
+#: Meaning and unit of each axis.
+AXES = {
+    "leg lengths": tuple((f"length of leg {leg}", "m") for leg in (1, 2, 3)),
+    "poses": (("z", "m"), ("tilt_x", "rad"), ("tilt_y", "rad")),
 }
 
 
@@ -52,16 +53,11 @@ class Grid(NamedTuple):
     def blocks(self, points: int) -> list[Block]:
         """Cut the grid into blocks of at most `points` points (or one row), in storage order."""
         planes, rows, columns = self.shape
-        if rows * columns <= points:
-            size = points // (rows * columns)
-            return [
-                (slice(i, min(i + size, planes)), slice(0, rows)) for i in range(0, planes, size)
-            ]
-        size = max(1, points // columns)
+        thick, wide = max(1, points // (rows * columns)), min(rows, max(1, points // columns))
         return [
-            (slice(i, i + 1), slice(j, min(j + size, rows)))
-            for i in range(planes)
-            for j in range(0, rows, size)
+            (slice(i, min(i + thick, planes)), slice(j, min(j + wide, rows)))
+            for i in range(0, planes, thick)
+            for j in range(0, rows, wide)
         ]
 
 
@@ -143,16 +139,15 @@ def checked_grid(grid: object) -> Grid:
     """
     if not isinstance(grid, Grid):
         raise InputError("grid must be a Grid; leg_grid(...) and pose_grid(...) make one")
-    if grid.kind not in _AXIS_NAMES:
+    if grid.kind not in AXES:
         raise InputError(f"grid.kind = {grid.kind!r}; it must be 'leg lengths' or 'poses'")
     if len(grid.axes) != 3:
         raise InputError(f"a grid has three axes, not {len(grid.axes)}")
-    names = _AXIS_NAMES[grid.kind]
-    first, second, third = (_axis(axis, name) for axis, name in zip(grid.axes, names, strict=True))
-    if grid.kind == "leg lengths":
-        for axis, name in zip((first, second, third), names, strict=True):
-            if axis[0] <= 0:
-                raise InputError(f"{name} begins at {axis[0]:.6g} m; it must be positive")
+    named = zip(grid.axes, AXES[grid.kind], strict=True)
+    first, second, third = (_axis(axis, name) for axis, (name, _) in named)
+    for axis, (name, _) in zip((first, second, third), AXES[grid.kind], strict=True):
+        if grid.kind == "leg lengths" and axis[0] <= 0:
+            raise InputError(f"{name} begins at {axis[0]:.6g} m; it must be positive")
     return Grid(grid.kind, (first, second, third))
 
 

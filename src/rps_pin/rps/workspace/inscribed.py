@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, UnreachableError
 from rps_pin.numerics.bisection import bisected
+from rps_pin.rps.kinematics.pose import stacked
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import checked_start, parameters_of
 from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, evaluate, side_of_singularity
@@ -87,14 +89,9 @@ def free_tilt(
         raise InputError(f"largest = {largest!r} rad; it must be in (0, pi]")
     parameters = parameters_of(robot)
     grid = pose_grid(z, [0.0])
-    side = side_of_singularity(parameters, checked_start(parameters, grid, start))
+    inside = _inside(parameters, checked_start(parameters, grid, start), min_conditioning)
     heights = grid.axes[0]
     way = 2 * np.pi * np.arange(directions) / directions
-
-    def inside(height: Array, angle: Array, size: Array) -> Bools:
-        pose = np.stack([height, size * np.cos(angle), size * np.sin(angle)], axis=-1)
-        fields = evaluate(parameters, pose, side, min_conditioning=min_conditioning)
-        return np.asarray(fields.reason == 0)
 
     # The last step of each ray before its first way out.
     sizes = np.linspace(0.0, largest, _RAY_STEPS + 1)
@@ -165,6 +162,20 @@ def largest_tilt_range(
     return best
 
 
+def _inside(
+    parameters: RPSParameters, start: Array, min_conditioning: float
+) -> Callable[..., Bools]:
+    """Return the test whether poses by height, direction and size of tilt are in the workspace."""
+    side = side_of_singularity(parameters, start)
+
+    def inside(height: Array, angle: Array | float = 0.0, size: Array | float = 0.0) -> Bools:
+        pose = stacked(height, size * np.cos(angle), size * np.sin(angle))
+        fields = evaluate(parameters, pose, side, min_conditioning=min_conditioning)
+        return np.asarray(fields.reason == 0)
+
+    return inside
+
+
 def _level_heights(
     parameters: RPSParameters, start: ArrayLike | None, min_conditioning: float
 ) -> tuple[float, float]:
@@ -173,13 +184,7 @@ def _level_heights(
     if not math.isfinite(longest):
         raise InputError("leg_length_limits has no upper end: the heights have none either")
     first = checked_start(parameters, pose_grid([0.0], [0.0]), start)
-    side = side_of_singularity(parameters, first)
-
-    def inside(z: Array) -> Bools:
-        pose = np.stack([z, np.zeros_like(z), np.zeros_like(z)], axis=-1)
-        reason = evaluate(parameters, pose, side, min_conditioning=min_conditioning).reason
-        return np.asarray(reason == 0)
-
+    inside = _inside(parameters, first, min_conditioning)
     if not inside(first[:1]).all():
         raise UnreachableError(
             f"the level pose at the start's height, {first[0]:.6g} m, is not in the workspace; "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -132,10 +132,5 @@ class Workspace:
         part = slice(nearest, nearest + 1)
         where = tuple(part if i == axis else slice(None) for i in range(3))
         first, second, third = (a[part] if i == axis else a for i, a in enumerate(self.grid.axes))
-        return Workspace(
-            self.parameters,
-            Grid(self.grid.kind, (first, second, third)),
-            self.start,
-            self.min_conditioning,
-            self.fields.part(where),
-        )
+        grid = Grid(self.grid.kind, (first, second, third))
+        return replace(self, grid=grid, fields=self.fields.part(where))

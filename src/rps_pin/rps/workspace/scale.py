@@ -7,8 +7,9 @@ import os
 import shutil
 import signal
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,13 +40,6 @@ _WORTH_PROCESSES = 2_000_000
 #: The cores are shared out among processes: none of them shall take more than one.
 _ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
 STORED = ("reason", "pose", "conditioning", "transmission")
-
-
-class _Cast(NamedTuple):
-    """What of a block's fields the file keeps."""
-
-    fields: frozenset[str]
-    dtype: DType
 
 
 class WorkspaceCounts(NamedTuple):
@@ -103,25 +97,21 @@ def workspace_to_file(
         If the disk has no room (asked before the start), or a write fails.
     """
     job = GridJob(robot, grid, start=start, min_conditioning=min_conditioning)
-    count = checked_workers(workers)
-    if workers is None and job.grid.size < _WORTH_PROCESSES:
-        count = 1
+    if workers is not None:
+        count = whole_number(workers, "workers")
+    else:  # the cores that this process may run on
+        count = int(cpu_count()) if job.grid.size >= _WORTH_PROCESSES else 1
     names = checked_fields(fields)
     size = bytes_per_point(names, dtype)
-    with new_workspace_file(
-        path,
-        job.parameters,
-        job.grid,
-        job.start,
-        job.min_conditioning,
-        fields=names,
-        dtype=dtype,
-        overwrite=overwrite,
-    ) as file:
-        _refuse_full_disk(Path(path), size * job.grid.size)
+    needed = size * job.grid.size
+    with new_workspace_file(path, job, fields=names, dtype=dtype, overwrite=overwrite) as file:
+        free = shutil.disk_usage(Path(path).parent).free
+        if needed > free:
+            words = f"{needed / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB are free"
+            raise OSError(errno.ENOSPC, words)
         tally = np.zeros(1 << len(Reason), dtype=np.int64)
         blocks = job.grid.blocks(BLOCK)
-        cast = _Cast(frozenset((*names, "reason")), dtype)
+        cast = partial(_cast_block, job, names, dtype)
         for block, values in _computed(job, blocks, cast, count, progress):
             file.write(block, values)
             tally += np.bincount(values.reason.ravel(), minlength=len(tally))
@@ -131,17 +121,10 @@ def workspace_to_file(
     return WorkspaceCounts(job.grid.size, inside, {Reason.INSIDE: inside} | counts, size)
 
 
-def checked_workers(workers: int | None) -> int:
-    """Return the number of processes to use: as given, or the cores this process may run on."""
-    if workers is None:
-        return int(cpu_count())
-    return whole_number(workers, "workers")
-
-
 def _computed(
     job: GridJob,
     blocks: list[Block],
-    cast: _Cast,
+    cast: Callable[[Block], Fields],
     workers: int,
     progress: Progress,
 ) -> Iterable[tuple[Block, Fields]]:
@@ -152,38 +135,28 @@ def _computed(
         return
     pool = ProcessPoolExecutor(workers, initializer=_ignore_interrupts, env=_ONE_THREAD)
     pending: deque[Future[Fields]] = deque()
-    done = False
     try:
         ahead = iter(blocks)
         for i in progress(range(len(blocks))):
             while len(pending) < _AHEAD * workers and (block := next(ahead, None)) is not None:
-                pending.append(pool.submit(_cast_block, job, block, cast))
+                pending.append(pool.submit(cast, block))
             yield blocks[i], pending.popleft().result()
-        done = True
-    finally:
-        pool.shutdown(kill_workers=not done)
+    except BaseException:
+        pool.shutdown(kill_workers=True)
+        raise
+    pool.shutdown()
 
 
-def _cast_block(job: GridJob, block: Block, cast: _Cast) -> Fields:
+def _cast_block(job: GridJob, names: Sequence[str], dtype: DType, block: Block) -> Fields:
     """Return a block's fields as the file will hold them: only that goes between processes."""
     fields = job.compute(block)
     kept = {
-        name: (value if name == "reason" else value.astype(cast.dtype))
-        if name in cast.fields
-        else value[:0]
+        name: value.astype(dtype) if name in names else value[:0]
         for name, value in fields._asdict().items()
     }
-    return Fields(**kept)
+    return Fields(**kept | {"reason": fields.reason})
 
 
 def _ignore_interrupts() -> None:
     """Leave Ctrl-C to the process that waits for the workers: it ends them."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _refuse_full_disk(path: Path, size: int) -> None:
-    free = shutil.disk_usage(path.parent).free
-    if size > free:
-        raise OSError(
-            errno.ENOSPC, f"{size / 1e9:.3g} GB are needed and {free / 1e9:.3g} GB are free"
-        )

@@ -21,17 +21,17 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import h5py
 import numpy as np
 
-from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.workspace.compute import GridJob
 from rps_pin.rps.workspace.evaluate import Fields, evaluate
-from rps_pin.rps.workspace.grids import WHOLE, Block, Grid, checked_grid
+from rps_pin.rps.workspace.grids import AXES, WHOLE, Block, Grid, checked_grid
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
 from rps_pin.validation import choice
@@ -52,10 +52,6 @@ _FIELDS = {
 }
 ALL_FIELDS = tuple(_FIELDS)
 _VECTORS = ("pose", "position", "length", "angle")
-_AXES = {
-    "leg lengths": (("m", "length of leg 1"), ("m", "length of leg 2"), ("m", "length of leg 3")),
-    "poses": (("m", "z"), ("rad", "tilt_x"), ("rad", "tilt_y")),
-}
 
 
 class WorkspaceFile:
@@ -74,10 +70,7 @@ class WorkspaceFile:
 @contextmanager
 def new_workspace_file(
     path: str | os.PathLike[str],
-    parameters: RPSParameters,
-    grid: Grid,
-    start: Array,
-    min_conditioning: float,
+    source: Workspace | GridJob,
     *,
     fields: Sequence[str] = ALL_FIELDS,
     dtype: DType = "float64",
@@ -102,13 +95,23 @@ def new_workspace_file(
         raise InputError(f"{target.parent} is not a folder: {target.name} cannot be written there")
     if target.exists() and not overwrite:
         raise InputError(f"{target} exists; overwrite=True replaces it")
+    grid = source.grid
     size = grid.size * bytes_per_point(names, dtype)
     with (
         _clear_failures(target, size),
         whole_file(target) as scratch,
         h5py.File(scratch, "w") as file,
     ):
-        _describe(file, parameters, grid, start, min_conditioning)
+        bits = {str(reason.name): int(reason) for reason in Reason}
+        file.attrs["format"] = FORMAT
+        file.attrs["parameters"] = json.dumps(source.parameters.model_dump())
+        file.attrs["grid"] = grid.kind
+        file.attrs["start"] = source.start
+        file.attrs["min_conditioning"] = source.min_conditioning
+        file.attrs["reason_bits"] = json.dumps(bits)
+        for i, (axis, (meaning, unit)) in enumerate(zip(grid.axes, AXES[grid.kind], strict=True)):
+            data = file.create_dataset(f"axis_{i + 1}", data=axis)
+            data.attrs["unit"], data.attrs["meaning"] = unit, meaning
         for name in names:
             shape = (*grid.shape, 3) if name in _VECTORS else grid.shape
             data = file.create_dataset(name, shape, "uint16" if name == "reason" else dtype)
@@ -145,12 +148,10 @@ def save_workspace(
     InputError, OSError
         As `new_workspace_file`.
     """
-    w = workspace
-    options: Any = {"fields": fields, "dtype": dtype, "overwrite": overwrite}
     with new_workspace_file(
-        path, w.parameters, w.grid, w.start, w.min_conditioning, **options
+        path, workspace, fields=fields, dtype=dtype, overwrite=overwrite
     ) as file:
-        file.write(WHOLE, w.fields)
+        file.write(WHOLE, workspace.fields)
 
 
 def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> Workspace:
@@ -179,23 +180,22 @@ def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> 
             parameters = RPSParameters(**json.loads(file.attrs["parameters"]))
             start = np.asarray(file.attrs["start"], dtype=np.float64)
             least = float(file.attrs["min_conditioning"])
-            stored: dict[str, Any] = {
-                name: file[name][planes, rows] for name in ALL_FIELDS if name in file
-            }
+            stored = {name: file[name][planes, rows] for name in ALL_FIELDS if name in file}
             missing = {"reason", "pose"} - set(stored)
             if missing:
                 raise InputError(f"{path} has no dataset {', '.join(sorted(missing))}")
+    except InputError:
+        raise
     except (OSError, KeyError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(f"cannot read the workspace {path}: {error}") from None
     reason = stored.pop("reason")
     floats = {name: np.asarray(values, dtype=np.float64) for name, values in stored.items()}
-    fields = (
-        Fields(reason=reason, **floats)
-        if len(floats) == 7
-        else _completed(parameters, reason, floats)
-    )
+    if len(floats) == len(ALL_FIELDS) - 1:
+        fields = Fields(reason=reason, **floats)
+    else:  # the others follow from the pose
+        found = np.asarray((reason & np.uint16(Reason.UNREACHABLE)) == 0)
+        computed = evaluate(parameters, floats["pose"], 1.0, found=found)
+        fields = computed._replace(reason=reason, **floats)
     return Workspace(parameters, grid, start, least, fields)
 
 
@@ -212,28 +212,6 @@ def bytes_per_point(fields: Sequence[str], dtype: DType) -> int:
     """Return how many bytes of a file one point of the grid takes."""
     numbers = sum(3 if name in _VECTORS else 1 for name in fields if name != "reason")
     return 2 + numbers * np.dtype(dtype).itemsize
-
-
-def _describe(
-    file: h5py.File, parameters: RPSParameters, grid: Grid, start: Array, min_conditioning: float
-) -> None:
-    attributes = file.attrs
-    attributes["format"] = FORMAT
-    attributes["parameters"] = json.dumps(parameters.model_dump())
-    attributes["grid"] = grid.kind
-    attributes["start"] = start
-    attributes["min_conditioning"] = min_conditioning
-    attributes["reason_bits"] = json.dumps({str(reason.name): int(reason) for reason in Reason})
-    for i, axis in enumerate(grid.axes):
-        data = file.create_dataset(f"axis_{i + 1}", data=axis)
-        data.attrs["unit"], data.attrs["meaning"] = _AXES[grid.kind][i]
-
-
-def _completed(parameters: RPSParameters, reason: Any, stored: dict[str, Array]) -> Fields:
-    """Return all fields: those stored, and the others from the pose."""
-    found = np.asarray((reason & np.uint16(Reason.UNREACHABLE)) == 0)
-    computed = evaluate(parameters, stored["pose"], 1.0, found=found)
-    return computed._replace(reason=reason, **stored)
 
 
 @contextmanager
