@@ -85,13 +85,14 @@ class CurveDynamics:
         """Return the terms at parameters of shape (...)."""
         x, first, second = self.curve.at(u)
         still = np.zeros_like(x)
+        jacobian = leg_jacobians(self.robot.parameters, x).length_jacobian
         holding = self._forces(x, still, still)
         there, back = self._forces(x, first, second), self._forces(x, -first, second)
         return CurveTerms(
             self._forces(x, still, first) - holding,
             (there + back) / 2 - holding,
             holding,
-            np.einsum("...ij,...j->...i", self._length_jacobian(x), first),
+            np.einsum("...ij,...j->...i", jacobian, first),
         )
 
     def friction(self, u: Array, square: Array) -> tuple[Array, Array]:
@@ -124,6 +125,3 @@ class CurveDynamics:
     def _friction(self, x: Array, rate: Array) -> Array:
         still = np.zeros_like(x)
         return (self._forces(x, rate, still) - self._forces(x, -rate, still)) / 2
-
-    def _length_jacobian(self, x: Array) -> Array:
-        return leg_jacobians(self.robot.parameters, x).length_jacobian

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from rps_pin.errors import InfeasibleError, InputError, LimitExcess, ParameterError
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.curve_dynamics import CurveDynamics
-from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_refusal import PathWords, require_clear
 from rps_pin.trajectories.curve import Curve
@@ -83,29 +82,19 @@ def require_clear_curve(robot: RPSRobot, curve: Curve, limits: ActuatorLimits) -
     UnreachableError, SingularityError
         Says at which u, and why.
     """
-    parameters = _with_lengths(robot.parameters, limits.length)
-    if parameters != robot.parameters:
-        robot = RPSRobot(parameters)
-    require_clear(
-        robot,
-        _AsTrajectory(curve),
-        tolerance=_BRACKET * curve.length,
-        words=PathWords("curve", "u", "", 9),
-    )
-
-
-def _with_lengths(p: RPSParameters, length: tuple[float, float]) -> RPSParameters:
-    low, high = (
-        max(p.leg_length_limits[0], length[0]),
-        min(p.leg_length_limits[1], length[1]),
-    )
-    try:
-        return p.replace(leg_length_limits=(low, high))
-    except ParameterError:
-        raise InputError(
-            f"length limits = {length}: the robot's legs have {p.leg_length_limits} m, and no "
-            "length is within both"
-        ) from None
+    parameters, asked = robot.parameters, limits.length
+    own = parameters.leg_length_limits
+    both = max(own[0], asked[0]), min(own[1], asked[1])
+    if both != own:
+        try:
+            robot = RPSRobot(parameters.replace(leg_length_limits=both))
+        except ParameterError:
+            raise InputError(
+                f"length limits = {asked}: the robot's legs have {own} m, and no length is within "
+                "both"
+            ) from None
+    words = PathWords("curve", "u", "", 9)
+    require_clear(robot, _AsTrajectory(curve), tolerance=_BRACKET * curve.length, words=words)
 
 
 def infeasible(dynamics: CurveDynamics) -> InfeasibleError:

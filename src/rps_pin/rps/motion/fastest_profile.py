@@ -27,7 +27,7 @@ import clarabel
 import numpy as np
 from scipy import sparse
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Indices
 from rps_pin.errors import RPSPinError
 from rps_pin.rps.motion.speed_profile import SpeedProfile
 
@@ -127,9 +127,8 @@ class _Program:
         unit = np.concatenate([guess, (guess[:-1] + guess[1:]) / 2])  # of b at knots, and bumps
         self.knots = knots
         self.units = sparse.diags_array(unit).tocsc()[:, kept]
-        rows, bound = _limit_rows(knots, limits)
         departing = _departing(n, rest) / unit[1]
-        linear = sparse.vstack([rows, departing]).tocsc() @ self.units
+        linear = sparse.vstack([_limit_rows(knots, limits), departing]).tocsc() @ self.units
         size = (1 - share) * guess[piece] + share * guess[piece + 1]  # of b where time is summed
         b_of = sparse.diags_array(1 / size) @ _square_at(n, piece, share) @ self.units
         cones, cone_bound = _cones(b_of, count)
@@ -137,7 +136,7 @@ class _Program:
         times = weights / np.sqrt(size)
         self.matrix = sparse.vstack([sparse.hstack([linear, free]), cones]).tocsc()
         self.cost = np.concatenate([np.zeros(kept.sum() + count), times / times.sum()])
-        self.right = np.concatenate([bound, np.zeros(departing.shape[0]), cone_bound])
+        self.right = np.concatenate([limits.bound.ravel(), np.zeros(sum(rest)), cone_bound])
         self.kinds = [
             clarabel.NonnegativeConeT(linear.shape[0]),
             *[clarabel.SecondOrderConeT(3)] * (2 * count),
@@ -173,7 +172,7 @@ def _is_solved(found: Any) -> bool:
 # What the solver is given -------------------------------------------------------------------------
 
 
-def _quadrature(knots: Array, rest: tuple[bool, bool]) -> tuple[tuple[Array, Array], Array]:
+def _quadrature(knots: Array, rest: tuple[bool, bool]) -> tuple[tuple[Indices, Array], Array]:
     """Return piece and share of each place where the time is summed, and the weights."""
     width = np.diff(knots)
     n = len(width)
@@ -194,29 +193,28 @@ def _quadrature(knots: Array, rest: tuple[bool, bool]) -> tuple[tuple[Array, Arr
     return (np.concatenate(piece)[used], np.concatenate(share)[used]), weights[used]
 
 
-def _square_at(n: int, piece: Array, share: Array) -> Sparse:
-    """Return the matrix of b at places: (1 - s) b_i + s b_(i+1) + 4 s (1 - s) bump_i."""
-    row = np.arange(len(piece))
-    values = np.concatenate([1 - share, share, 4 * share * (1 - share)])
+def _at_pieces(n: int, piece: Indices, *parts: Array) -> Sparse:
+    """Return the matrix of sums, each of a piece's b at both ends and bump, times these parts."""
     columns = np.concatenate([piece, piece + 1, n + 1 + piece])
-    return sparse.csc_matrix((values, (np.tile(row, 3), columns)), (len(piece), 2 * n + 1))
+    places = np.tile(np.arange(piece.size), 3), columns
+    return sparse.csc_matrix((np.concatenate(parts, axis=None), places), (piece.size, 2 * n + 1))
 
 
-def _limit_rows(knots: Array, limits: ProfileLimits) -> tuple[Sparse, Array]:
-    """Return the matrix and the right-hand side of the limits."""
+def _square_at(n: int, piece: Indices, share: Array) -> Sparse:
+    """Return the matrix of b at places: (1 - s) b_i + s b_(i+1) + 4 s (1 - s) bump_i."""
+    return _at_pieces(n, piece, 1 - share, share, 4 * share * (1 - share))
+
+
+def _limit_rows(knots: Array, limits: ProfileLimits) -> Sparse:
+    """Return the matrix of the limits."""
     n = len(knots) - 1
     s = limits.share[:, None]
     p = limits.by_acceleration / (2 * np.diff(knots))[:, None, None]
     q = limits.by_square
-    # a = (b_(i+1) - b_i + 4 (1 - 2 s) bump_i) / (2 h)
-    of_first, of_second = q * (1 - s) - p, q * s + p
-    of_bump = 4 * s * (1 - s) * q + 4 * (1 - 2 * s) * p
-    row = np.arange(p.size)
     piece = np.broadcast_to(np.arange(n)[:, None, None], p.shape).ravel()
-    values = np.concatenate([of_first.ravel(), of_second.ravel(), of_bump.ravel()])
-    columns = np.concatenate([piece, piece + 1, n + 1 + piece])
-    matrix = sparse.csc_matrix((values, (np.tile(row, 3), columns)), (p.size, 2 * n + 1))
-    return matrix, limits.bound.ravel()
+    # a = (b_(i+1) - b_i + 4 (1 - 2 s) bump_i) / (2 h)
+    of_bump = 4 * s * (1 - s) * q + 4 * (1 - 2 * s) * p
+    return _at_pieces(n, piece, q * (1 - s) - p, q * s + p, of_bump)
 
 
 def _departing(n: int, rest: tuple[bool, bool]) -> Sparse:

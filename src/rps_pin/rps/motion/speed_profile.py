@@ -22,7 +22,7 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import LawSample
 from rps_pin.trajectories.path import checked_parameters, checked_times
-from rps_pin.validation import real_array
+from rps_pin.validation import fixed_array, read_only
 
 
 class SpeedProfile:
@@ -51,9 +51,9 @@ class SpeedProfile:
     """
 
     def __init__(self, knots: ArrayLike, squared: ArrayLike, bump: ArrayLike) -> None:
-        self.knots = _vector(knots, "knots")
-        self.squared = _vector(squared, "squared rates")
-        self.bump = _vector(bump, "bumps")
+        self.knots = fixed_array(knots, "knots", (None,))
+        self.squared = fixed_array(squared, "squared rates", (None,))
+        self.bump = fixed_array(bump, "bumps", (None,))
         n = len(self.bump)
         if n == 0 or self.knots.shape != (n + 1,) or self.squared.shape != (n + 1,):
             raise InputError(
@@ -70,8 +70,7 @@ class SpeedProfile:
         self._rate = np.sqrt(self.squared)
         mean = (self._rate[:-1] + self._rate[1:]) / 2
         steps = self._width / mean * _artanhc(self._slope * (self._width / (2 * mean)) ** 2)
-        self.times = np.concatenate([[0.0], np.cumsum(steps)])
-        self.times.setflags(write=False)
+        self.times = read_only(np.append(0.0, np.cumsum(steps)))
 
     @property
     def length(self) -> float:
@@ -147,34 +146,24 @@ class SpeedProfile:
             raise InputError("the squared rate of a speed profile must be positive inside")
 
 
-def _vector(values: ArrayLike, name: str) -> Array:
-    array = np.array(real_array(values, name))
-    if array.ndim != 1:
-        raise InputError(f"{name} have shape {array.shape}; they must be a row of numbers")
-    array.setflags(write=False)
-    return array
-
-
-def _root(x: Array) -> Array:
-    """Return the square root of a magnitude, and 1 in place of 0."""
-    return np.where(x == 0, 1.0, np.sqrt(np.abs(x)))
-
-
 def _cosh(x: Array) -> Array:
     """Return cosh(sqrt(x)), which is cos(sqrt(-x)) for a negative x."""
     root = np.sqrt(np.abs(x))
     return np.where(x > 0, np.cosh(np.where(x > 0, root, 0.0)), np.cos(root))
 
 
+def _by_root(x: Array, hyperbolic: np.ufunc, circular: np.ufunc) -> Array:
+    """Return f(sqrt(x)) / sqrt(x): 1 at 0, and for a negative x the circular function's."""
+    root = np.where(x == 0, 1.0, np.sqrt(np.abs(x)))
+    below = np.where(x < 0, circular(root) / root, 1.0)
+    return np.where(x > 0, hyperbolic(np.where(x > 0, root, 0.0)) / root, below)
+
+
 def _sinhc(x: Array) -> Array:
-    """Return sinh(sqrt(x)) / sqrt(x); sin for a negative x, and 1 at 0."""
-    root = _root(x)
-    circular = np.where(x < 0, np.sin(root) / root, 1.0)
-    return np.where(x > 0, np.sinh(np.where(x > 0, root, 1.0)) / root, circular)
+    """Return sinh(sqrt(x)) / sqrt(x); sin for a negative x."""
+    return _by_root(x, np.sinh, np.sin)
 
 
 def _artanhc(x: Array) -> Array:
-    """Return artanh(sqrt(x)) / sqrt(x), for x below 1; arctan for a negative x, and 1 at 0."""
-    root = _root(x)
-    circular = np.where(x < 0, np.arctan(root) / root, 1.0)
-    return np.where(x > 0, np.arctanh(np.where(x > 0, root, 0.0)) / root, circular)
+    """Return artanh(sqrt(x)) / sqrt(x), for x below 1; arctan for a negative x."""
+    return _by_root(x, np.arctanh, np.arctan)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Protocol
 
 from numpy.typing import ArrayLike
 
@@ -37,11 +36,6 @@ Progress = Callable[[Iterable[int]], Iterable[int]]
 INTERVALS = 100
 
 
-class _HasCurve(Protocol):
-    @property
-    def curve(self) -> Curve: ...
-
-
 @dataclass(frozen=True)
 class _OwnTime:
     """A trajectory as a curve: u is its own time."""
@@ -58,7 +52,7 @@ class _OwnTime:
 
 def time_optimal(
     robot: RPSRobot,
-    path: Curve | _HasCurve | Trajectory,
+    path: Curve | Trajectory,
     *,
     limits: ActuatorLimits | None = None,
     wrench: ArrayLike | None = None,

@@ -62,13 +62,15 @@ class TimeSearch:
         self.profile: SpeedProfile | None = None
         self.linearised_at: Array | None = None  # u'^2 where limits are asked for
         self.mismatch = math.inf
-        self.step, self.slower = 1.0, 0
+        self.slower = 0
         self.excess = self.inactive = math.inf
 
     def advance(self) -> bool:
         """Do one round, and return whether it has converged."""
         u = self._points(_IMPOSED)
-        friction, slope = self._friction(u)
+        friction = slope = np.zeros((*u.shape, 3))
+        if self.linearised_at is not None:
+            friction, slope = self.dynamics.friction(u, self.linearised_at)
         terms = self.dynamics.terms(u)
         limits = self._limits(terms, friction, slope)
         found = fastest_profile(self.knots, limits, self.rest, self._guess(terms))
@@ -93,8 +95,7 @@ class TimeSearch:
 
     def motion(self) -> LimitedMotion:
         """Return the last motion."""
-        if self.profile is None:
-            raise self.failure()
+        assert self.profile is not None  # `advance` has been called
         return LimitedMotion(self.dynamics, self.profile)
 
     def failure(self) -> RPSPinError:
@@ -135,18 +136,13 @@ class TimeSearch:
         inertia = float(np.median(np.abs(terms.inertia).max(axis=-1)))
         reach = float(np.median(np.abs(terms.length_slope).max(axis=-1)))
         length = self.knots[-1]
-        sizes = [self.dynamics.limits.force * length / inertia if inertia > 0 else math.inf]
-        sizes.append((self.dynamics.limits.speed / reach) ** 2 if reach > 0 else math.inf)
+        limits = self.dynamics.limits
+        by_force = limits.force * length / inertia if inertia > 0 else math.inf
+        by_speed = (limits.speed / reach) ** 2 if reach > 0 else math.inf
         shape = np.ones_like(self.knots)
         for rests, way in zip(self.rest, (self.knots, length - self.knots), strict=True):
             shape *= np.minimum(1.0, 2 * way / length) if rests else 1.0
-        return min(sizes) * shape
-
-    def _friction(self, u: Array) -> tuple[Array, Array]:
-        """Return friction and its slope at the last motion; zero at first."""
-        if self.linearised_at is None:
-            return np.zeros((*u.shape, 3)), np.zeros((*u.shape, 3))
-        return self.dynamics.friction(u, self.linearised_at)
+        return min(by_force, by_speed) * shape
 
     def _linearise(self, found: SpeedProfile, u: Array, friction: Array, slope: Array) -> None:
         """Set the error of the linear friction, and the u'^2 about which it is linear next."""
@@ -159,9 +155,7 @@ class TimeSearch:
         wrong = np.abs(self.dynamics.friction(u, square)[0] - made_for).max()
         before, self.mismatch = self.mismatch, float(wrong / self.dynamics.limits.force)
         # If it does not converge, half of each step is taken.
-        self.step = 0.5 if self.mismatch > before / 2 else 1.0
-        first = self.linearised_at is None
-        self.linearised_at = square if first else about + self.step * (square - about)
+        self.linearised_at = (about + square) / 2 if self.mismatch > before / 2 else square
 
     def _linearise_slower(self) -> None:
         """Linearise friction about a slower motion: about a fast one it may exceed the limits."""
@@ -211,10 +205,8 @@ def _possible_excess(values: Array) -> Array:
     Between equal steps (m), half the larger second difference bounds it: an eighth of it does where
     the function is smooth, half of it where its slope jumps.
     """
-    bends = np.abs(np.diff(values, 2, axis=1))
-    bends = np.concatenate([bends[:, :1], bends, bends[:, -1:]], axis=1)
-    around = np.concatenate([bends[:, :1], bends, bends[:, -1:]], axis=1)
-    missed: Array = np.maximum(np.maximum(around[:, :-2], around[:, 2:]), bends) / 2
+    bends = np.pad(np.abs(np.diff(values, 2, axis=1)), ((0, 0), (2, 2), (0, 0)), "edge")
+    missed: Array = np.maximum(np.maximum(bends[:, :-2], bends[:, 2:]), bends[:, 1:-1]) / 2
     return missed
 
 
