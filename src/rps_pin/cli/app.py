@@ -12,17 +12,10 @@ from rich.markup import escape
 
 from rps_pin import __version__
 from rps_pin.cli.doctor import doctor
-from rps_pin.cli.lazy_group import LazyGroup
+from rps_pin.cli.lazy_group import SETTINGS, LazyGroup
 from rps_pin.errors import RPSPinError
 
-app = typer.Typer(
-    name="rps-pin",
-    cls=LazyGroup,
-    no_args_is_help=True,
-    rich_markup_mode="markdown",
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+app = typer.Typer(name="rps-pin", cls=LazyGroup, no_args_is_help=True, **SETTINGS)
 
 _ROBOT, _MOTION, _ANY, _MORE = "The 3-RPS", "Its motion", "Any mechanism", "More"
 for _panel, _name, _line in (
@@ -75,21 +68,15 @@ def run() -> None:
     """Run the command line."""
     try:
         app(prog_name="rps-pin")
-    except RPSPinError as error:
-        _complain(str(error))
-        sys.exit(1)
+        return
     except BrokenPipeError:  # the reader of the output ended: no message
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except RPSPinError as error:
+        message = str(error)
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        _complain(f"{where}{error.strerror or error}")
-        sys.exit(1)
-
-
-def _complain(message: str) -> None:
-    """Write an error to standard error, as one line."""
-    line = " ".join(message.split())
-    Console(stderr=True, soft_wrap=True).print(
-        f"[bold red]error:[/] {escape(line)}", highlight=False
-    )
+        message = f"{where}{error.strerror or error}"
+    line = escape(" ".join(message.split()))
+    Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {line}", highlight=False)
+    sys.exit(1)

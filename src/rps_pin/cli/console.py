@@ -44,6 +44,11 @@ NamedFolderOption = Annotated[
 ]
 
 
+def pose_option(words: str) -> Any:
+    """Return an option that takes a pose."""
+    return typer.Option(metavar="Z TILT_X TILT_Y", help=words)
+
+
 def load_robot(name_or_file: str) -> RPSRobot:
     """Return the robot of a preset's name or of a parameter file; print doubts about its units."""
     robot = robot_file.load_robot(name_or_file)

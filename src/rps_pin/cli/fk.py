@@ -21,10 +21,7 @@ def fk_command(
     ],
     near: Annotated[
         common.Three | None,
-        typer.Option(
-            metavar="Z TILT_X TILT_Y",
-            help="Only the pose that is reached from this one (m, rad, rad).",
-        ),
+        common.pose_option("Only the pose that is reached from this one (m, rad, rad)."),
     ] = None,
     robot: common.RobotOption = "sokolov",
     as_json: common.JsonOption = False,

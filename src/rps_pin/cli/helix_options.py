@@ -57,14 +57,8 @@ def chosen_helix(
     """Return the helix that the options describe."""
     if height is None:
         height = middle_height(robot.parameters, pitch)
-    return helix(
-        robot,
-        radius=radius,
-        pitch=pitch,
-        height=height,
-        branch=branch.value,
-        duration=duration,
-    )
+    sizes = {"radius": radius, "pitch": pitch, "height": height, "duration": duration}
+    return helix(robot, branch=branch.value, **sizes)
 
 
 def middle_height(parameters: RPSParameters, pitch: float) -> float:

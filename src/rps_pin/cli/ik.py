@@ -11,10 +11,7 @@ from rps_pin.rps.kinematics.legs import cone_angles, violations
 
 
 def ik_command(
-    pose: Annotated[
-        common.Three,
-        typer.Option(metavar="Z TILT_X TILT_Y", help="The pose: height (m), tilt (rad)."),
-    ],
+    pose: Annotated[common.Three, common.pose_option("The pose: height (m), tilt (rad).")],
     robot: common.RobotOption = "sokolov",
     as_json: common.JsonOption = False,
 ) -> None:

@@ -13,6 +13,13 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+#: Of the whole command line, and of each command.
+SETTINGS: dict[str, Any] = {
+    "rich_markup_mode": "markdown",
+    "pretty_exceptions_enable": False,
+    "context_settings": {"help_option_names": ["-h", "--help"]},
+}
+
 
 class LazyGroup(TyperGroup):
     """Commands that are known by name and one line: ``rps_pin.cli.NAME`` has ``NAME_command``."""
@@ -37,11 +44,6 @@ class LazyGroup(TyperGroup):
 def _imported(name: str) -> Any:
     """Return the command of a module, with the settings of the whole command line."""
     module = importlib.import_module(f"rps_pin.cli.{name}")
-    one = typer.Typer(
-        add_completion=False,
-        rich_markup_mode="markdown",
-        pretty_exceptions_enable=False,
-        context_settings={"help_option_names": ["-h", "--help"]},
-    )
+    one = typer.Typer(add_completion=False, **SETTINGS)
     one.command(name)(getattr(module, f"{name}_command"))
     return typer.main.get_command(one)

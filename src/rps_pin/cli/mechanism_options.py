@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import pinocchio as pin
 import typer
@@ -23,6 +23,15 @@ FileArgument = Annotated[
         autocompletion=names_or_files(mechanism_names),
     ),
 ]
+
+
+#: Values by joint name, each as ``--tau crank=1.5``; see `by_joint`.
+JointValues = list[str] | None
+
+
+def joint_values(words: str) -> Any:
+    """Return an option that takes values by joint name."""
+    return typer.Option(metavar="JOINT=VALUE", help=words)
 
 
 def load_mechanism(file: Path) -> tuple[ClosedLoopModel, Path]:

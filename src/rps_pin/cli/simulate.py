@@ -11,8 +11,8 @@ import typer
 
 from rps_pin.arrays import Array
 from rps_pin.cli import console as common
+from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.layer_options import LayersOption, write_page
-from rps_pin.cli.mechanism_options import FileArgument, by_joint, load_mechanism, shapes_of
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.errors import InputError
@@ -37,7 +37,7 @@ class Method(StrEnum):
 
 
 def simulate_command(
-    file: FileArgument,
+    file: options.FileArgument,
     duration: Annotated[float, typer.Option(help="Simulated time, s.")] = 1.0,
     step: Annotated[float, typer.Option(help="Time step, and time between two rows, s.")] = 1e-3,
     method: Annotated[
@@ -45,25 +45,16 @@ def simulate_command(
         typer.Option(help="Fixed steps of order 4, or adaptive with an error of 1e-12."),
     ] = Method.RK4,
     start: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="JOINT=VALUE",
-            help="Initial position of a joint, rad or m; the others start from home.",
-        ),
+        options.JointValues,
+        options.joint_values("Initial position of a joint, rad or m; the others start from home."),
     ] = None,
     speed: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="JOINT=VALUE",
-            help="Initial speed of an actuated joint, rad/s or m/s; default: 0.",
-        ),
+        options.JointValues,
+        options.joint_values("Initial speed of an actuated joint, rad/s or m/s; default: 0."),
     ] = None,
     tau: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="JOINT=VALUE",
-            help="Constant force of an actuated joint, N m or N; default: 0.",
-        ),
+        options.JointValues,
+        options.joint_values("Constant force of an actuated joint, N m or N; default: 0."),
     ] = None,
     hold: Annotated[
         bool, typer.Option("--hold", help="Add the forces that hold the initial position.")
@@ -88,10 +79,10 @@ def simulate_command(
     """
     from rps_pin.closed_loop.simulation.simulate import simulate
 
-    mechanism, file = load_mechanism(file)
+    mechanism, file = options.load_mechanism(file)
     q = mechanism.close(mechanism.home)
     if start:
-        q = mechanism.complete(by_joint(start, "--start"), q)
+        q = mechanism.complete(options.by_joint(start, "--start"), q)
     still = np.zeros(mechanism.model.nv)
     speeds = _of_actuated(mechanism, speed, "--speed")
     v = mechanism.velocity(q, speeds) if speeds.any() else still
@@ -111,7 +102,7 @@ def simulate_command(
     files = [folder / "simulation.csv"]
     motion.to_csv(files[0])
     files += save_figure(plot_simulation(motion, mechanism), folder, "simulation")
-    shapes = shapes_of(file, mechanism)
+    shapes = options.shapes_of(file, mechanism)
     files.append(write_page(folder, mechanism, motion, title, layers, shapes))
     summary = _summary(motion)
     if as_json:
@@ -126,9 +117,9 @@ def simulate_command(
     common.print_files(console, files)
 
 
-def _of_actuated(mechanism: ClosedLoopModel, pairs: list[str] | None, option: str) -> Array:
+def _of_actuated(mechanism: ClosedLoopModel, pairs: options.JointValues, option: str) -> Array:
     """Return values given by joint name in the order of the actuated joints, zero if not given."""
-    values = by_joint(pairs or [], option)
+    values = options.by_joint(pairs or [], option)
     names = list(mechanism.actuated)
     if mechanism.actuated_indices.size != len(names):
         raise InputError(f"{option}: the actuated joints have several coordinates each")

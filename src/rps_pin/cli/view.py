@@ -22,10 +22,7 @@ def view_command(
     robot: common.RobotOption = "sokolov",
     pose: Annotated[
         common.Three | None,
-        typer.Option(
-            metavar="Z TILT_X TILT_Y",
-            help="Show this pose (m, rad, rad) instead of the helix.",
-        ),
+        common.pose_option("Show this pose (m, rad, rad) instead of the helix."),
     ] = None,
     radius: helix.RadiusOption = helix.DEFAULT_RADIUS,
     pitch: helix.PitchOption = helix.DEFAULT_PITCH,

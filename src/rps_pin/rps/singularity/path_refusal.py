@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rps_pin.arrays import Array
-from rps_pin.errors import LimitViolation, SingularityError, UnreachableError
+from rps_pin.errors import SingularityError, UnreachableError
+from rps_pin.rps.kinematics.legs import cone_angles, violations
+from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_check import check_path
 from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck, SingularityEvent
@@ -85,29 +86,19 @@ def _unreachable(
     back = (e.time for e in found.limits if e.kind == "returns" and same(e) and e.time > event.time)
     times = np.linspace(event.time, next(back, found.duration), _LOOKS)
     poses = trajectory.sample(times).pose
-    looks = [_violations(robot, pose) for pose in poses]
-    worst = max(range(len(looks)), key=lambda i: _excess(looks[i], event))
+    p, legs = robot.parameters, robot.inverse_kinematics(poses, errors="mask")
+    cone = cone_angles(legs.angle, rotation(poses), p.spherical_rest_angle)
+    quantity = {"length": legs.length, "angle": legs.angle, "spherical joint": cone}[event.quantity]
+    beyond = (quantity[:, event.leg - 1] - event.limit) * (1 if event.side == "upper" else -1)
+    worst = int(beyond.argmax())
+    broken = violations(p, legs.length[worst], legs.angle[worst], cone[worst])
     more = f"; limits are left {len(events)} times in all" if len(events) > 1 else ""
     return UnreachableError(
         f"at {words.at(event.time)} of {found.duration:.6g}{words.unit} the {words.path} leaves "
         f"the workspace; at worst, at {words.at(times[worst])}, "
-        f"{'; '.join(map(str, looks[worst]))}{more}",
-        looks[worst],
+        f"{'; '.join(map(str, broken))}{more}",
+        broken,
     )
-
-
-def _violations(robot: RPSRobot, pose: Array) -> tuple[LimitViolation, ...]:
-    try:
-        robot.inverse_kinematics(pose)
-    except UnreachableError as error:
-        return error.violations
-    return ()
-
-
-def _excess(violations: tuple[LimitViolation, ...], event: LimitEvent) -> float:
-    """Return how far beyond the event's limit a pose is, m or rad; 0 if it keeps it."""
-    mine = (v for v in violations if (v.leg, v.quantity) == (event.leg, event.quantity))
-    return max((max(v.lower - v.value, v.value - v.upper) for v in mine), default=0.0)
 
 
 def _singular(

@@ -156,9 +156,7 @@ def largest_tilt_range(
         volumes = (z[i:] - z[i]) * area * least**2
         j = int(np.argmax(volumes))
         if volumes[j] > best.volume:
-            best = TiltRange(
-                shape, float(z[i]), float(z[i + j]), float(least[j]), float(volumes[j])
-            )
+            best = TiltRange(shape, *map(float, (z[i], z[i + j], least[j], volumes[j])))
     return best
 
 
