@@ -13,18 +13,8 @@ from rich.table import Table
 from rps_pin.cli import console as common
 from rps_pin.errors import InputError
 from rps_pin.paper import PaperComparison, paper_comparison
+from rps_pin.rps import workspace as space
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.rps.workspace import (
-    Reason,
-    Workspace,
-    boundary,
-    largest_tilt_range,
-    leg_grid,
-    save_mesh,
-    save_workspace,
-    volume,
-    workspace,
-)
 
 #: Lengths per leg of the surfaces in the figures.
 _DRAWN_POINTS = 18
@@ -54,16 +44,39 @@ def workspace_command(
     Example: `rps-pin workspace --points 101 -o results`
     """
     machine = common.load_robot(robot)
+    parameters = machine.parameters
     if not overwrite and (output / "workspace.h5").exists():
         raise InputError(f"{output / 'workspace.h5'} exists; --overwrite replaces it")
     output.mkdir(parents=True, exist_ok=True)
     console = common.text_console(as_json)
-    grid = leg_grid(machine.parameters, points)
-    found = workspace(machine, grid, progress=common.progress_bar(console, "direct kinematics"))
-    rows = paper_comparison() if machine.parameters.name == "micro" else ()
+    grid = space.leg_grid(parameters, points)
+    progress = common.progress_bar(console, "direct kinematics")
+    found = space.workspace(machine, grid, progress=progress)
+    rows = paper_comparison() if parameters.name == "micro" else ()
     summary = _summary(machine, found, rows)
     with console.status("writing the results"):
-        files = _write(output, machine, found, rows)
+        # Slow to import: only for commands that draw.
+        from rps_pin.plots import save_figure
+        from rps_pin.plots import workspace as plots
+
+        files = [output / "workspace.h5", output / "boundary.stl"]
+        space.save_workspace(found, files[0], overwrite=True)
+        space.save_mesh(space.boundary(found), files[1], overwrite=True)
+        # Matplotlib draws surfaces triangle by triangle: a coarser grid shows the same shape.
+        coarse = space.leg_grid(parameters, min(_DRAWN_POINTS, found.grid.shape[0]))
+        surface = space.workspace(machine, coarse)
+        modes = machine.assembly_modes([sum(parameters.leg_length_limits) / 2] * 3)
+        figures = {
+            "figure_2_assembly_modes": plots.plot_assembly_modes(parameters, modes),
+            "figure_3_theoretical": plots.plot_theoretical(parameters),
+            "figure_4_effective": plots.plot_effective(surface),
+            "figure_5_space": plots.plot_space(surface),
+            "figure_6_views": plots.plot_views(found),
+        }
+        if rows:
+            figures["base_radius"] = plots.plot_comparison(rows)
+        for name, figure in figures.items():
+            files += save_figure(figure, output, name)
     if as_json:
         common.print_json(summary | {"files": files})
         return
@@ -73,46 +86,13 @@ def workspace_command(
     common.print_files(console, files)
 
 
-def _write(
-    folder: Path,
-    robot: RPSRobot,
-    found: Workspace,
-    rows: tuple[PaperComparison, ...],
-) -> list[Path]:
-    """Write the results into a folder, in place of older ones; return the files."""
-    # Slow to import: only for commands that draw.
-    from rps_pin.plots import save_figure
-    from rps_pin.plots import workspace as plots
-
-    data, mesh = folder / "workspace.h5", folder / "boundary.stl"
-    save_workspace(found, data, overwrite=True)
-    save_mesh(boundary(found), mesh, overwrite=True)
-    parameters = robot.parameters
-    # Matplotlib draws surfaces triangle by triangle: a coarser grid shows the same shape.
-    coarse = workspace(robot, leg_grid(parameters, min(_DRAWN_POINTS, found.grid.shape[0])))
-    modes = robot.assembly_modes([sum(parameters.leg_length_limits) / 2] * 3)
-    figures = {
-        "figure_2_assembly_modes": plots.plot_assembly_modes(parameters, modes),
-        "figure_3_theoretical": plots.plot_theoretical(parameters),
-        "figure_4_effective": plots.plot_effective(coarse),
-        "figure_5_space": plots.plot_space(coarse),
-        "figure_6_views": plots.plot_views(found),
-    }
-    if rows:
-        figures["base_radius"] = plots.plot_comparison(rows)
-    files = [data, mesh]
-    for name, figure in figures.items():
-        files += save_figure(figure, folder, name)
-    return files
-
-
 def _summary(
-    robot: RPSRobot, found: Workspace, rows: tuple[PaperComparison, ...]
+    robot: RPSRobot, found: space.Workspace, rows: tuple[PaperComparison, ...]
 ) -> dict[str, Any]:
     inside = found.position[found.inside]
     if not len(inside):
         raise InputError("no point of the grid is inside the workspace")
-    size = volume(found)
+    size = space.volume(found)
     sides = np.stack([inside.min(axis=0), inside.max(axis=0)], axis=1).tolist()
     height = sides[2][1] - sides[2][0]
     return {
@@ -123,11 +103,11 @@ def _summary(
         "volume": size.position,
         "cylinder_volume": math.pi * robot.parameters.platform_radius**2 * height,
         "pose_volume": size.pose,
-        "full_tilt": largest_tilt_range(robot)._asdict(),
+        "full_tilt": space.largest_tilt_range(robot)._asdict(),
         "out": {
             reason.text: count
             for reason, count in found.counts().items()
-            if reason is not Reason.INSIDE and count
+            if reason is not space.Reason.INSIDE and count
         },
         "paper": [row._asdict() for row in rows],
     }

@@ -144,7 +144,7 @@ def _computed(
     except BaseException:
         pool.shutdown(kill_workers=True)
         raise
-    pool.shutdown()
+    pool.shutdown(kill_workers=False)
 
 
 def _cast_block(job: GridJob, names: Sequence[str], dtype: DType, block: Block) -> Fields:
