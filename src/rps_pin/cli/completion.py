@@ -31,14 +31,12 @@ def names_or_files(names: Callable[[], Iterable[str]]) -> Callable[[str], list[s
         folder, _, begun = incomplete.rpartition("/")
         place = Path(folder or ("/" if incomplete.startswith("/") else "."))
         prefix = f"{folder}/" if "/" in incomplete else ""
-        files = []
-        if place.is_dir():
-            for path in sorted(place.iterdir()):
-                if path.name.startswith(begun):
-                    if path.is_dir() and not path.name.startswith("."):
-                        files.append(f"{prefix}{path.name}/")
-                    elif path.suffix.lower() in _FILES:
-                        files.append(f"{prefix}{path.name}")
+        files = [
+            f"{prefix}{path.name}{'/' if path.is_dir() else ''}"
+            for path in sorted(place.glob("*"))
+            if path.name.startswith(begun)
+            and (path.suffix.lower() in _FILES or (path.is_dir() and path.name[0] != "."))
+        ]
         return known + files
 
     return complete

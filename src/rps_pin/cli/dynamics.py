@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from rps_pin.cli import console as common
-from rps_pin.cli.motion_report import print_exceeded, run_table, write_motion
+from rps_pin.cli.motion_report import print_motion, write_motion
 from rps_pin.errors import InputError
 from rps_pin.files import write_text
 from rps_pin.rps.dynamics.force_causes import force_causes
@@ -121,7 +121,4 @@ def dynamics_command(
         common.print_json(answer | summary.as_dict() | {"sizing": sheet.as_dict(), "files": files})
         return
     console.print(f"3-RPS [bold]{name}[/], {trajectory}")
-    console.print(sheet.table())
-    console.print(run_table(summary, path))
-    print_exceeded(console, summary)
-    common.print_files(console, files)
+    print_motion(console, sheet.table(), summary, path, files)

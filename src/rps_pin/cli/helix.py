@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
-from rps_pin.cli.motion_report import actuator_table, print_exceeded, run_table, write_motion
+from rps_pin.cli.motion_report import actuator_table, print_motion, write_motion
 from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 
 
@@ -61,7 +61,4 @@ def helix_command(
         f"3-RPS [bold]{name}[/], helix of radius {1e3 * path.radius:g} mm, "
         f"pitch {1e3 * path.pitch:g} mm, from {path.height:g} m"
     )
-    console.print(actuator_table(summary.actuators))
-    console.print(run_table(summary, path))
-    print_exceeded(console, summary)
-    common.print_files(console, files)
+    print_motion(console, actuator_table(summary.actuators), summary, path, files)

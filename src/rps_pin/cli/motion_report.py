@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from rps_pin.cli.console import table_of
+from rps_pin.cli.console import print_files, table_of
 from rps_pin.cli.layer_options import write_page
 from rps_pin.rps.dynamics.motion_csv import write_csv
 from rps_pin.rps.dynamics.motion_run import ActuatorSummary, MotionRun, MotionSummary
@@ -54,8 +54,10 @@ def actuator_table(actuators: tuple[ActuatorSummary, ...]) -> Table:
     return table_of(rows, *headers, right=slice(1, -1))
 
 
-def run_table(summary: MotionSummary, path: Trajectory) -> Table:
-    """Return duration, rates at the ends, accuracy, and the smallest distance to a singularity."""
+def print_motion(
+    console: Console, table: Table, summary: MotionSummary, path: Trajectory, files: list[Path]
+) -> None:
+    """Print a table of the actuators, then accuracy, distance to a singularity, limits, files."""
     starts, ends = end_states(path)
     z, tilt_x, tilt_y = summary.minimum_pose
     rows = {
@@ -69,10 +71,8 @@ def run_table(summary: MotionSummary, path: Trajectory) -> Table:
             f"z = {z:.6g} m, tilt = ({tilt_x:.4g}, {tilt_y:.4g}) rad"
         ),
     }
-    return table_of(rows.items())
-
-
-def print_exceeded(console: Console, summary: MotionSummary) -> None:
-    """Print a line for each actuator limit that the motion exceeds."""
+    console.print(table)
+    console.print(table_of(rows.items()))
     for sentence in summary.exceeded:
         console.print(f"[bold yellow]beyond a limit:[/] {sentence}")
+    print_files(console, files)

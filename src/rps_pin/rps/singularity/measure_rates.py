@@ -12,7 +12,6 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.kinematics.rates import (
     LegJacobians,
-    TipJacobians,
     jacobian_rates_of_legs,
     masked_leg_jacobians,
     tip_jacobian_rates,
@@ -35,9 +34,9 @@ def measure_rates(parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike) -
     """Return the signed measures and their exact time derivatives along a motion.
 
     With the gains' matrix M = K L^-T / sqrt(3), L L' = Q and Q the mean of the tips' squared speed
-    as a quadratic form of pose', the least gain sigma with M v = sigma u has, for x = L^-T v,
+    as a quadratic form of pose', the least gain sigma with M v = sigma u has, for w = L^-T v,
 
-        sigma' = u' K' x / sqrt(3) - sigma x' Q' x / 2.
+        sigma' = u' K' w / sqrt(3) - sigma w' Q' w / 2.
 
     Where two gains are equal it is the derivative of one of them. A leg without length has 0 for
     its measure's and for type II's value and rate.
@@ -61,15 +60,24 @@ def rates_of_legs(
 ) -> MeasureRates:
     """Return `measure_rates` of poses and rates (..., 3) whose legs are known."""
     h = parameters.platform_radius
-    tip = tip_jacobians(parameters, x)
+    tip, tip_rates = tip_jacobians(parameters, x), tip_jacobian_rates(parameters, x, dx)
     change = jacobian_rates_of_legs(parameters, x, dx, legs)
-    sigma, dsigma = _least_gain(tip, legs, change.length_jacobian, parameters, x, dx)
+    M, L = gain_matrix(tip, legs)
+    left, gains, right = np.linalg.svd(M)
+    sigma, u = gains[..., 2], left[..., :, 2]
+    w = np.linalg.solve(np.swapaxes(L, -1, -2), right[..., 2, :, None])[..., 0]  # L^-T v
+    moving = [np.einsum("...ij,...j->...i", matrix, w) for matrix in (*tip[2:], *tip_rates)]
+    # w' Q' w = 2/3 ((U w) . (U' w) + (W w) . (W' w))
+    w_dQ_w = 2 / 3 * (moving[0] * moving[2] + moving[1] * moving[3]).sum(axis=-1)
+    stretch = np.einsum("...i,...ij,...j->...", u, change.length_jacobian, w) / math.sqrt(3)
+    sign = np.where(np.linalg.det(M) < 0, -1.0, 1.0)
+    gain = np.stack([sign * sigma, sign * (stretch - sigma * w_dQ_w / 2)])
     regular = ~vanishing.any(axis=-1)
     beta = np.hypot(x[..., 1], x[..., 2])
     # d/dt cos(beta/2) = -sin(beta/2) / (2 beta) w . w'
     couple_rate = -np.sinc(beta / (2 * np.pi)) / 4 * (x[..., 1:] * dx[..., 1:]).sum(axis=-1)
     speed = np.einsum("...ij,...j->...i", legs.length_jacobian, dx)
-    least = np.where(regular, [sigma, dsigma], 0.0)
+    least = np.where(regular, gain, 0.0)
     couple = np.cos(beta / 2), couple_rate
     lengths = np.where(vanishing, 0.0, [legs.length, speed]) / h
     value, rate = (
@@ -77,26 +85,3 @@ def rates_of_legs(
         for k in range(2)
     )
     return MeasureRates(value, rate)
-
-
-def _least_gain(
-    tip: TipJacobians,
-    legs: LegJacobians,
-    K_rate: Array,
-    parameters: RPSParameters,
-    pose: Array,
-    rate: Array,
-) -> tuple[Array, Array]:
-    """Return the least gain with the sign of det K, and its time derivative (`measure_rates`)."""
-    M, L = gain_matrix(tip, legs)
-    left, gains, right = np.linalg.svd(M)
-    u, v = left[..., :, 2], right[..., 2, :]
-    x = np.linalg.solve(np.swapaxes(L, -1, -2), v[..., None])[..., 0]
-    dU, dW = tip_jacobian_rates(parameters, pose, rate)
-    moving = [np.einsum("...ij,...j->...i", matrix, x) for matrix in (*tip[2:], dU, dW)]
-    # x' Q' x = 2/3 ((U x) . (U' x) + (W x) . (W' x))
-    x_dQ_x = 2 / 3 * (moving[0] * moving[2] + moving[1] * moving[3]).sum(axis=-1)
-    sigma = gains[..., 2]
-    change = np.einsum("...i,...ij,...j->...", u, K_rate, x) / math.sqrt(3) - sigma * x_dQ_x / 2
-    sign = np.where(np.linalg.det(M) < 0, -1.0, 1.0)
-    return sign * sigma, sign * change

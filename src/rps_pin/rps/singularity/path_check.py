@@ -265,15 +265,10 @@ class _Findings:
 
 def _filled_signs(signs: Array) -> Array:
     """Give zeros the sign before them, or the first one after; columns are signals."""
-    filled = signs.copy()
-    for column in filled.T:
-        known = np.flatnonzero(column)
-        if known.size == 0:
-            column[:] = 1.0
-            continue
-        last = np.searchsorted(known, np.arange(column.size), side="right") - 1
-        column[:] = column[known[np.maximum(last, 0)]]
-    return filled
+    known = signs != 0
+    last = np.maximum.accumulate(np.where(known, np.arange(len(signs))[:, None], 0), axis=0)
+    filled = np.take_along_axis(signs, np.maximum(last, known.argmax(axis=0)), axis=0)
+    return np.where(filled == 0, 1.0, filled)
 
 
 def _apart(zeros: _Brackets, tolerance: float) -> tuple[_Brackets, _Brackets]:

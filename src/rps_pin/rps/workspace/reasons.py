@@ -51,14 +51,11 @@ class Reason(IntFlag):
             "ANGLE": "angle beyond its limits",
             "SPHERICAL": "spherical joint beyond its cone",
         }
-        parts = []
-        for reason in self:
-            name = str(reason.name)
-            if name.startswith("LEG_"):
-                parts.append(f"leg {name[4]} {words[name[6:]]}")
-            else:
-                parts.append(name.lower())
-        return ", ".join(parts)
+        names = [str(reason.name).split("_") for reason in self]
+        return ", ".join(
+            f"leg {name[1]} {words[name[2]]}" if name[0] == "LEG" else name[0].lower()
+            for name in names
+        )
 
 
 def broken_limits(
