@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -73,12 +74,10 @@ def singular_surface(
     poses = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     checked_tilt(poses)
 
-    def determinant(pose: Array) -> Array:
-        return signed_determinant(parameters, pose)
-
+    determinant = partial(signed_determinant, parameters)
     values = [determinant(poses[i : i + _CHUNK]) for i in range(0, len(poses), _CHUNK)]
-    shape = (len(axes[0]), len(axes[1]), len(axes[2]))
-    ends, triangles = zero_triangles(np.concatenate(values), shape)
+    first, second, third = map(len, axes)
+    ends, triangles = zero_triangles(np.concatenate(values), (first, second, third))
     low, high = poses[ends[:, 0]], poses[ends[:, 1]]
     share, _ = bisected(
         lambda part, i: determinant(low[i] + part[:, None] * (high - low)[i]) < 0,
