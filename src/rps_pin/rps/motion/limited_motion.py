@@ -7,10 +7,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Bools
 from rps_pin.errors import InputError
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.curve_dynamics import CurveDynamics, LimitUse
 from rps_pin.rps.motion.speed_profile import SpeedProfile
-from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.curve import TimedCurve
 
 #: A limit counts as reached within this part of it.
@@ -39,17 +37,8 @@ class LimitedMotion(TimedCurve):
 
     def __init__(self, dynamics: CurveDynamics, law: SpeedProfile) -> None:
         super().__init__(dynamics.curve, law)
+        self.robot, self.limits = dynamics.robot, dynamics.limits
         self._dynamics = dynamics
-
-    @property
-    def robot(self) -> RPSRobot:
-        """The robot."""
-        return self._dynamics.robot
-
-    @property
-    def limits(self) -> ActuatorLimits:
-        """The limits of its actuators."""
-        return self._dynamics.limits
 
     def __repr__(self) -> str:
         return f"LimitedMotion({self.curve!r}, {self.law!r})"

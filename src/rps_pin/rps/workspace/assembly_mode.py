@@ -76,8 +76,11 @@ class AssemblyMode:
         ways = forward_kinematics(length, self._start, *self._radii, errors="mask")
         return ways.angle, ways.reached
 
-    def angles(self, length: Array, block: Block = WHOLE) -> tuple[Array, Bools]:
-        """Return leg angles (..., 3) of a block of the grid, and whether there are any."""
+    def poses(self, length: Array, block: Block = WHOLE) -> tuple[Array, Bools]:
+        """Return poses (..., 3) of a block of the grid, m and rad, and whether there are any.
+
+        `length` are the points of the block. A pose is zero where lengths do not close.
+        """
         start, known = self._interpolated(block)
         solution = solve_angles(
             length, start, *self._radii, tolerance=self._tolerance, iterations=_ITERATIONS
@@ -90,14 +93,6 @@ class AssemblyMode:
         lost = ~found
         if lost.any():
             angle[lost], found[lost] = self.follow(length[lost])
-        return angle, found
-
-    def poses(self, length: Array, block: Block = WHOLE) -> tuple[Array, Bools]:
-        """Return poses (..., 3) of a block of the grid, m and rad, and whether there are any.
-
-        `length` are the points of the block. A pose is zero where lengths do not close.
-        """
-        angle, found = self.angles(length, block)
         pose = np.zeros(length.shape)
         if found.any():
             where = ... if found.all() else found  # the usual case copies nothing
