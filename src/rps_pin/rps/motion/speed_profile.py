@@ -51,9 +51,9 @@ class SpeedProfile:
     """
 
     def __init__(self, knots: ArrayLike, squared: ArrayLike, bump: ArrayLike) -> None:
-        self.knots = fixed_array(knots, "knots", (None,))
-        self.squared = fixed_array(squared, "squared rates", (None,))
-        self.bump = fixed_array(bump, "bumps", (None,))
+        self.knots = fixed_array(knots, "knots", (None,), "a row of numbers")
+        self.squared = fixed_array(squared, "squared rates", (None,), "a row of numbers")
+        self.bump = fixed_array(bump, "bumps", (None,), "a row of numbers")
         n = len(self.bump)
         if n == 0 or self.knots.shape != (n + 1,) or self.squared.shape != (n + 1,):
             raise InputError(
