@@ -9,14 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
+from rps_pin.rps.kinematics import rates
 from rps_pin.rps.kinematics.pose import checked_motion
-from rps_pin.rps.kinematics.rates import (
-    LegJacobians,
-    jacobian_rates_of_legs,
-    masked_leg_jacobians,
-    tip_jacobian_rates,
-    tip_jacobians,
-)
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measures import checked_tilt, gain_matrix
 
@@ -52,16 +46,17 @@ def measure_rates(parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike) -
         As `singularity_measures`.
     """
     x, dx, _ = checked_motion(pose, rate)
-    return rates_of_legs(parameters, checked_tilt(x), dx, *masked_leg_jacobians(parameters, x))
+    legs = rates.masked_leg_jacobians(parameters, x)
+    return rates_of_legs(parameters, checked_tilt(x), dx, *legs)
 
 
 def rates_of_legs(
-    parameters: RPSParameters, x: Array, dx: Array, legs: LegJacobians, vanishing: Bools
+    parameters: RPSParameters, x: Array, dx: Array, legs: rates.LegJacobians, vanishing: Bools
 ) -> MeasureRates:
     """Return `measure_rates` of poses and rates (..., 3) whose legs are known."""
     h = parameters.platform_radius
-    tip, tip_rates = tip_jacobians(parameters, x), tip_jacobian_rates(parameters, x, dx)
-    change = jacobian_rates_of_legs(parameters, x, dx, legs)
+    tip, tip_rates = rates.tip_jacobians(parameters, x), rates.tip_jacobian_rates(parameters, x, dx)
+    change = rates.jacobian_rates_of_legs(parameters, x, dx, legs)
     M, L = gain_matrix(tip, legs)
     left, gains, right = np.linalg.svd(M)
     sigma, u = gains[..., 2], left[..., :, 2]

@@ -70,14 +70,9 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.rps.kinematics import rates
 from rps_pin.rps.kinematics.legs import RADIAL, refuse_vanishing
 from rps_pin.rps.kinematics.pose import checked_pose, rotation
-from rps_pin.rps.kinematics.rates import (
-    LegJacobians,
-    TipJacobians,
-    masked_leg_jacobians,
-    tip_jacobians,
-)
 from rps_pin.rps.kinematics.samples import Errors, maskable, refuse
 from rps_pin.rps.parameters import RPSParameters
 
@@ -135,8 +130,8 @@ def singularity_measures(
         If a leg has no length.
     """
     x = checked_tilt(pose)
-    tip = tip_jacobians(parameters, x)
-    legs, vanishing = masked_leg_jacobians(parameters, x)
+    tip = rates.tip_jacobians(parameters, x)
+    legs, vanishing = rates.masked_leg_jacobians(parameters, x)
     if errors == "raise":
         refuse_vanishing(legs.length, vanishing)
     regular = ~vanishing.any(axis=-1)
@@ -168,7 +163,7 @@ def passive_conditioning(parameters: RPSParameters, pose: ArrayLike) -> Array:
     """
     x = checked_pose(pose)
     h = parameters.platform_radius
-    legs, _ = masked_leg_jacobians(parameters, x)
+    legs, _ = rates.masked_leg_jacobians(parameters, x)
     arm = RADIAL @ np.swapaxes(rotation(x), -1, -2)  # from the centre to each tip, over h
     upright = np.array([0.0, 0.0, 1.0])
     # A leg that turns moves its tip by d n: n = sin(phi) e_i + cos(phi) z.
@@ -200,26 +195,26 @@ def checked_tilt(pose: ArrayLike) -> Array:
 
 def signed_determinant(parameters: RPSParameters, pose: Array) -> Array:
     """Return `SingularityMeasures.determinant` alone, of checked poses; 0 with a vanishing leg."""
-    legs, vanishing = masked_leg_jacobians(parameters, pose)
-    determinant = _determinant(tip_jacobians(parameters, pose), legs)
+    legs, vanishing = rates.masked_leg_jacobians(parameters, pose)
+    determinant = _determinant(rates.tip_jacobians(parameters, pose), legs)
     return np.where(vanishing.any(axis=-1), 0.0, determinant)
 
 
-def gain_matrix(tip: TipJacobians, legs: LegJacobians) -> tuple[Array, Array]:
+def gain_matrix(tip: rates.TipJacobians, legs: rates.LegJacobians) -> tuple[Array, Array]:
     """Return M = K L^-T / sqrt(3) and L, L L' = Q: leg speeds per unit platform speed."""
     L = np.asarray(np.linalg.cholesky(_speed_form(tip)), dtype=np.float64)
     transposed = np.linalg.solve(L, np.swapaxes(legs.length_jacobian, -1, -2))
     return np.asarray(np.swapaxes(transposed, -1, -2) / math.sqrt(3), dtype=np.float64), L
 
 
-def _speed_form(tip: TipJacobians) -> Array:
+def _speed_form(tip: rates.TipJacobians) -> Array:
     """Return Q with pose' . Q pose' the mean of the tips' squared speed, shape (..., 3, 3)."""
     U, W = tip.radial_jacobian, tip.height_jacobian
     form: Array = (np.swapaxes(U, -1, -2) @ U + np.swapaxes(W, -1, -2) @ W) / 3
     return form
 
 
-def _determinant(tip: TipJacobians, legs: LegJacobians) -> Array:
+def _determinant(tip: rates.TipJacobians, legs: rates.LegJacobians) -> Array:
     """Return det K / sqrt(det Q) / 3^(3/2), the product of the gains with its sign."""
     size = np.sqrt(np.linalg.det(_speed_form(tip)))
     product: Array = np.linalg.det(legs.length_jacobian) / (3 * math.sqrt(3) * size)
