@@ -10,6 +10,7 @@ import asyncio
 import os
 import socket
 import threading
+from collections.abc import Mapping
 from typing import Self
 
 import tornado.httpserver
@@ -118,7 +119,10 @@ class LocalViewer:
             If the viewer is not running.
         """
         message = command.lower()
-        packed = umsgpack.packb(message)
+        self.deliver(message, umsgpack.packb(message))
+
+    def deliver(self, message: Mapping[str, object], packed: bytes) -> None:
+        """Pass a message, and the same in wire format, to the server's thread; see `send`."""
         if self._loop is None:
             raise RPSPinError("the viewer is not running: nothing can be shown")
         self._loop.call_soon_threadsafe(self._hub.publish, message, packed)
