@@ -223,7 +223,7 @@ def test_tracker_does_not_drift() -> None:
         (np.ones((2, 3)), r"must be \(3,\)"),
         (np.array([1.0, math.nan, 1.0]), "not finite"),
         (np.array([1.0, -1.0, 1.0]), "length of leg 2"),
-        ("far", "must be numbers"),
+        ("far", "must be 3 numbers"),
     ],
 )
 def test_tracker_refuses_bad_readings(reading: object, message: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from rps_pin.paper import formula_checks, mass_fit
@@ -44,24 +44,24 @@ class ColumnFits(NamedTuple):
     """The nearest path's, with one of its numbers moved; empty if its Eq. 29 is as printed."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Reproduction:
-    """All results; see the functions that compute them."""
+    """All results; what depends on no option is computed where it is left out."""
 
     quick: bool
-    checks: dict[int | str, float]
-    degree: int
+    checks: dict[int | str, float] = field(default_factory=formula_checks.formula_checks)
+    degree: int = field(default_factory=formula_checks.degree_of_eq_8)
     counts: dict[int, int]
-    misprints: dict[int, Misprint]
-    law: HelixLaw
-    balances: dict[str, float]
+    misprints: dict[int, Misprint] = field(default_factory=formula_misprints)
+    law: HelixLaw = field(default_factory=helix_law)
+    balances: dict[str, float] = field(default_factory=power_balances)
     modes: AssemblyModes
     workspace: Workspace
     coarse_workspace: Workspace
     """For drawing surfaces."""
-    cylinder: tuple[float, float]
+    cylinder: tuple[float, float] = field(default_factory=comparison.theoretical_reach)
     """See `theoretical_reach`."""
-    greatest_base_radius: float
+    greatest_base_radius: float = field(default_factory=comparison.greatest_base_radius)
     reach: tuple[comparison.PaperComparison, ...]
     """By base radius; the first is g = h."""
     runs: dict[Branch, MotionRun]
@@ -71,11 +71,11 @@ class Reproduction:
     """Every interpretation that has forces, the closest to Table 2 first."""
     fits: dict[str, ColumnFits]
     """By column of Table 2."""
-    approach: near.Approach
-    sampled: list[near.Sampled]
+    approach: near.Approach = field(default_factory=near.approach)
+    sampled: list[near.Sampled] = field(default_factory=near.sampled_across)
     probes: list[near.Probe]
     random: Agreement
-    helix: dict[str, Agreement]
+    helix: dict[str, Agreement] = field(default_factory=helix_agreement)
 
 
 def compute(*, quick: bool = False, track: Track = lambda items, _: items) -> Reproduction:
@@ -109,29 +109,19 @@ def compute(*, quick: bool = False, track: Track = lambda items, _: items) -> Re
     limits_of_length = comparison.with_length_limits_only(micro.parameters)
     return Reproduction(
         quick=quick,
-        checks=formula_checks.formula_checks(),
-        degree=formula_checks.degree_of_eq_8(),
         counts=formula_checks.solution_counts(200 if quick else 2000),
-        misprints=formula_misprints(),
-        law=helix_law(),
-        balances=power_balances(),
         modes=micro.assembly_modes([EQUAL_LENGTH] * 3),
         workspace=workspace(limits_of_length, leg_grid(micro.parameters, points)),
         coarse_workspace=workspace(limits_of_length, leg_grid(micro.parameters, min(points, 18))),
-        cylinder=comparison.theoretical_reach(),
-        greatest_base_radius=comparison.greatest_base_radius(),
         reach=reach,
         runs=runs,
         paths=paths,
         comparisons=compare(paths),
         fits=_fits(paths, quick, track),
-        approach=near.approach(),
-        sampled=near.sampled_across(),
         probes=near.height_probes(heights, progress=lambda each: track(each, "near a singularity")),
         random=random_agreement(
             5 if quick else 100, progress=lambda each: track(each, "three ways to the forces")
         ),
-        helix=helix_agreement(),
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,7 +11,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from rps_pin.arrays import Array
-from rps_pin.plots.style import LEG_COLOURS, STYLE
+from rps_pin.plots.style import LEG_COLOURS
 from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.robot import RPSRobot
 
@@ -26,23 +25,22 @@ def plot_mechanism(robot: RPSRobot) -> Figure:
     p, turn = robot.platform_placement(POSE)
     feet = robot.parameters.base_radius * RADIAL
     tips = p + robot.parameters.platform_radius * RADIAL @ turn.T  # Eq. 1
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.6, 4.9))
-        figure.subplots_adjust(left=0, right=1, bottom=0, top=0.93, wspace=0)
-        for column, (title, draw) in enumerate(
-            (("(a) joints and legs", _draw_joints), ("(b) vectors of leg 1", _draw_vectors))
-        ):
-            axes = figure.add_subplot(1, 2, column + 1, projection="3d")
-            assert isinstance(axes, Axes3D)  # what the projection "3d" makes
-            axes.add_collection3d(Poly3DCollection([feet], facecolor=(0.6, 0.6, 0.6, 0.25)))
-            axes.add_collection3d(Poly3DCollection([tips], facecolor=(0.9, 0.62, 0.0, 0.35)))
-            draw(axes, feet, tips, p)
-            _frame(axes, np.zeros(3), np.eye(3), 0.22, "XYZ")
-            axes.set(xlim=(-0.35, 0.5), ylim=(-0.425, 0.425), zlim=(0.0, 0.74))
-            axes.set_box_aspect((0.85, 0.85, 0.74), zoom=1.15)
-            axes.view_init(**_VIEW)
-            axes.set_axis_off()
-            axes.set_title(title, y=1.0)
+    figure = Figure(figsize=(9.6, 4.9))
+    figure.subplots_adjust(left=0, right=1, bottom=0, top=0.93, wspace=0)
+    for column, (title, draw) in enumerate(
+        (("(a) joints and legs", _draw_joints), ("(b) vectors of leg 1", _draw_vectors))
+    ):
+        axes = figure.add_subplot(1, 2, column + 1, projection="3d")
+        assert isinstance(axes, Axes3D)  # what the projection "3d" makes
+        axes.add_collection3d(Poly3DCollection([feet], facecolor=(0.6, 0.6, 0.6, 0.25)))
+        axes.add_collection3d(Poly3DCollection([tips], facecolor=(0.9, 0.62, 0.0, 0.35)))
+        draw(axes, feet, tips, p)
+        _frame(axes, np.zeros(3), np.eye(3), 0.22, "XYZ")
+        axes.set(xlim=(-0.35, 0.5), ylim=(-0.425, 0.425), zlim=(0.0, 0.74))
+        axes.set_box_aspect((0.85, 0.85, 0.74), zoom=1.15)
+        axes.view_init(**_VIEW)
+        axes.set_axis_off()
+        axes.set_title(title, y=1.0)
     return figure
 
 

@@ -12,14 +12,7 @@ from rps_pin.files import whole_file
 from rps_pin.paper import table_2_figures as table_2
 from rps_pin.paper.compute import Reproduction
 from rps_pin.paper.figure_1 import plot_mechanism
-from rps_pin.plots import STYLE, plot_forces, plot_lengths, plot_path
-from rps_pin.plots.workspace import (
-    plot_assembly_modes,
-    plot_effective,
-    plot_space,
-    plot_theoretical,
-    plot_views,
-)
+from rps_pin.plots import STYLE, plot_forces, plot_lengths, plot_path, workspace
 from rps_pin.rps.robot import RPSRobot
 
 _DOTS_PER_INCH = 80
@@ -30,11 +23,11 @@ def pictures(found: Reproduction) -> dict[str, Callable[[], Figure]]:
     micro = found.workspace.parameters
     return {
         "figure_1": lambda: plot_mechanism(RPSRobot.from_preset("sokolov")),
-        "figure_2": lambda: plot_assembly_modes(micro, found.modes),
-        "figure_3": lambda: plot_theoretical(micro),
-        "figure_4": lambda: plot_effective(found.coarse_workspace),
-        "figure_5": lambda: plot_space(found.coarse_workspace),
-        "figure_6": lambda: plot_views(found.workspace),
+        "figure_2": lambda: workspace.plot_assembly_modes(micro, found.modes),
+        "figure_3": lambda: workspace.plot_theoretical(micro),
+        "figure_4": lambda: workspace.plot_effective(found.coarse_workspace),
+        "figure_5": lambda: workspace.plot_space(found.coarse_workspace),
+        "figure_6": lambda: workspace.plot_views(found.workspace),
         "figure_7": lambda: plot_path(found.runs["+"]),
         "figure_8": lambda: plot_branches(found, plot_lengths),
         "figure_9": lambda: plot_branches(found, plot_forces),
@@ -64,14 +57,13 @@ def write_figures(
 
 def plot_branches(found: Reproduction, plot: Callable[..., Figure]) -> Figure:
     """Draw a quantity of Table 1's helix over time, the two branches side by side."""
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(10.4, 3.8), layout="constrained")
-        axes = figure.subplots(1, 2, sharey=True)
-        for one, (branch, run) in zip(axes, found.runs.items(), strict=True):
-            plot(run, one)
-            one.set_title(f"{one.get_title(loc='left')}, branch {branch}", loc="left")
-            one.get_legend().remove()
-        low, high = axes[0].get_ylim()
-        axes[0].set_ylim(low, high + 0.12 * (high - low))
-        axes[0].legend(loc="upper right", ncols=3, frameon=False)
+    figure = Figure(figsize=(10.4, 3.8), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
+    for one, (branch, run) in zip(axes, found.runs.items(), strict=True):
+        plot(run, one)
+        one.set_title(f"{one.get_title(loc='left')}, branch {branch}", loc="left")
+        one.get_legend().remove()
+    low, high = axes[0].get_ylim()
+    axes[0].set_ylim(low, high + 0.12 * (high - low))
+    axes[0].legend(loc="upper right", ncols=3, frameon=False)
     return figure

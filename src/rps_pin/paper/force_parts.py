@@ -12,14 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array
+from rps_pin.paper import interpretations as choices
 from rps_pin.paper import paper_data as paper
-from rps_pin.paper.interpretations import (
-    BODIES,
-    EQ_14,
-    GRAVITIES,
-    STANDARD_GRAVITY,
-    BodyInterpretation,
-)
 from rps_pin.paper.lagrange import lagrange_forces
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.trajectories.path import PathSample
@@ -82,7 +76,7 @@ def force_parts(robot: UnitRobot, motion: PathSample) -> ForceParts:
     unit = forces()
     mass = forces(platform_mass=2.0) - unit
     legs: dict[str, Any] = {"leg_mass": 1.0, "leg_inertia_about": "com"}
-    down = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+    down = np.array([0.0, 0.0, -choices.STANDARD_GRAVITY])
     weight = forces(gravity=down) - unit
     turning = forces(**legs, leg_inertia=1.0) - unit
     lever = forces(**legs, leg_com=1.0)
@@ -97,16 +91,18 @@ def force_parts(robot: UnitRobot, motion: PathSample) -> ForceParts:
     )
 
 
-def combined(parts: ForceParts, interpretation: BodyInterpretation) -> Array:
+def combined(parts: ForceParts, interpretation: choices.BodyInterpretation) -> Array:
     """Return the actuator forces (n, 3) of an interpretation of the bodies, N."""
-    bodies = BODIES[interpretation.bodies]
+    bodies = choices.BODIES[interpretation.bodies]
     lever = paper.LEG_COM_MM * 1e-3
     # Eq. 16 as printed: I_leg + m_leg r^2
     about_com = bodies.leg_mass * lever**2 if bodies.about == "com" else 0.0
     leg_inertia = paper.LEG_INERTIA + about_com
-    inertia = parts.inertia if interpretation.eq_14 == EQ_14[0] else parts.inertia_as_printed
+    right = interpretation.eq_14 == choices.EQ_14[0]
+    inertia = parts.inertia if right else parts.inertia_as_printed
     force: Array = bodies.platform_mass * parts.mass + inertia + leg_inertia * parts.leg_inertia
     if interpretation.gravity != "no gravity":
-        weighed = bodies.platform_mass if interpretation.gravity == GRAVITIES[0] else 1.0  # Eq. 19
+        as_meant = interpretation.gravity == choices.GRAVITIES[0]
+        weighed = bodies.platform_mass if as_meant else 1.0  # Eq. 19
         force = force + weighed * parts.weight + bodies.leg_mass * lever * parts.leg_weight
     return force

@@ -119,7 +119,7 @@ def _rates(
 
 def _energies(robot: RPSRobot, platform: PlatformMotion, legs: LegMotion) -> dict[int | str, float]:
     p = robot.parameters
-    found = energies(p, legs.length, legs.angle, legs.speed, legs.angle_rate)
+    found = energies(p, *legs[:4])
     spin = platform.angular_velocity
     eq_13 = (
         p.platform_mass * (platform.velocity**2).sum(axis=-1) / 2

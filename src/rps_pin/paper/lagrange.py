@@ -29,10 +29,9 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
 from rps_pin.paper.lagrange_terms import lagrange_terms
-from rps_pin.paper.lagrange_vectors import times
 from rps_pin.rps.kinematics.legs import leg_motion
 from rps_pin.rps.kinematics.pose import checked_motion
-from rps_pin.rps.kinematics.rates import accepted_gains
+from rps_pin.rps.kinematics.rates import accepted_gains, times
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 
@@ -98,14 +97,7 @@ def lagrange_forces(
     """
     motion = checked_motion(pose, rate, acceleration)
     legs = leg_motion(*motion, parameters.platform_radius, parameters.base_radius)
-    terms = lagrange_terms(
-        parameters,
-        legs.length,
-        legs.angle,
-        legs.speed,
-        legs.angle_rate,
-        as_printed=as_printed,
-    )
+    terms = lagrange_terms(parameters, *legs[:4], as_printed=as_printed)
     x_acceleration = np.concatenate([legs.acceleration, legs.angle_acceleration], axis=-1)
     effort = times(terms.mass_matrix, x_acceleration) + terms.coriolis + terms.gravity
     multipliers = _multipliers(parameters, legs.length, terms.constraint_jacobian, effort, max_gain)

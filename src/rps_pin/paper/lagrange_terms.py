@@ -38,16 +38,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.paper.lagrange_vectors import (
-    MovingVectors,
-    leg_vectors,
-    platform_vectors,
-    skew,
-    times,
-    tip_vectors,
-)
+from rps_pin.paper import lagrange_vectors as vectors
 from rps_pin.rps.kernels import leg_equations
 from rps_pin.rps.kinematics.leg_equations import checked_lengths
+from rps_pin.rps.kinematics.rates import times
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.validation import choice, one_shape, real_array
 
@@ -112,9 +106,7 @@ def lagrange_terms(
     """
     d, phi, dd, dphi = _checked(length, angle, speed, angle_rate)
     printed = _printed(as_printed)
-    rate = np.concatenate([dd, dphi], axis=-1)
-    tips = tip_vectors(parameters.base_radius, d, phi, dd, dphi)
-    r = platform_vectors(tips, parameters.platform_radius, rate)
+    rate, r = _moving(parameters, d, phi, dd, dphi)
     mass, coriolis = _platform_inertia_terms(parameters, r, rate, "eq_14" in printed)
     _add_legs_inertia_terms(parameters, d, dd, dphi, mass, coriolis)
     gravity = -_weighed_mass(parameters, printed) * times(
@@ -125,20 +117,12 @@ def lagrange_terms(
 
 
 def energies(
-    parameters: RPSParameters,
-    length: ArrayLike,
-    angle: ArrayLike,
-    speed: ArrayLike,
-    angle_rate: ArrayLike,
-    *,
-    as_printed: Collection[str] = (),
+    parameters: RPSParameters, *coordinates: ArrayLike, as_printed: Collection[str] = ()
 ) -> Energies:
     """Return the energies of Eq. 13, 16, 19 and 21. Arguments and errors as `lagrange_terms`."""
-    d, phi, dd, dphi = _checked(length, angle, speed, angle_rate)
+    d, phi, dd, dphi = _checked(*coordinates)
     printed = _printed(as_printed)
-    rate = np.concatenate([dd, dphi], axis=-1)
-    tips = tip_vectors(parameters.base_radius, d, phi, dd, dphi)
-    r = platform_vectors(tips, parameters.platform_radius, rate)
+    rate, r = _moving(parameters, d, phi, dd, dphi)
     platform, _ = _platform_inertia_terms(parameters, r, rate, "eq_14" in printed)
     legs, unused = np.zeros_like(platform), np.zeros_like(rate)
     _add_legs_inertia_terms(parameters, d, dd, dphi, legs, unused)
@@ -149,7 +133,7 @@ def energies(
         (rate * times(platform, rate)).sum(axis=-1) / 2,
         (rate * times(legs, rate)).sum(axis=-1) / 2,
         -_weighed_mass(parameters, printed) * (r.value[..., 0, :] @ parameters.gravity),
-        -(moments * (leg_vectors(phi).along @ parameters.gravity)).sum(axis=-1),
+        -(moments * (vectors.leg_vectors(phi).along @ parameters.gravity)).sum(axis=-1),
     )
 
 
@@ -176,6 +160,15 @@ def constraints(parameters: RPSParameters, length: ArrayLike, angle: ArrayLike) 
 
 
 # Inner workings -----------------------------------------------------------------------------------
+
+
+def _moving(
+    parameters: RPSParameters, d: Array, phi: Array, dd: Array, dphi: Array
+) -> tuple[Array, vectors.MovingVectors]:
+    """Return the coordinates' rate, shape (..., 6), and the platform's vectors r."""
+    rate = np.concatenate([dd, dphi], axis=-1)
+    tips = vectors.tip_vectors(parameters.base_radius, d, phi, dd, dphi)
+    return rate, vectors.platform_vectors(tips, parameters.platform_radius, rate)
 
 
 def _printed(as_printed: Collection[str]) -> frozenset[str]:
@@ -217,7 +210,7 @@ def _weighed_mass(parameters: RPSParameters, printed: frozenset[str]) -> float:
 
 
 def _platform_inertia_terms(
-    parameters: RPSParameters, r: MovingVectors, rate: Array, literal: bool
+    parameters: RPSParameters, r: vectors.MovingVectors, rate: Array, literal: bool
 ) -> tuple[Array, Array]:
     """Return the platform's M (..., 6, 6) and c (..., 6): Eq. 13."""
     inertia = parameters.platform_inertia
@@ -237,7 +230,9 @@ def _platform_inertia_terms(
     return mass, coriolis
 
 
-def _printed_turning_terms(inertia: Array, r: MovingVectors, rate: Array) -> tuple[Array, Array]:
+def _printed_turning_terms(
+    inertia: Array, r: vectors.MovingVectors, rate: Array
+) -> tuple[Array, Array]:
     """Return M and c of Omega' (R I R) Omega/2: Eq. 14 as printed.
 
     Omega = sum_a r_a x r_a'/2 over the axes r = (u, v, n), the columns of R; with Omega = W x' and
@@ -247,7 +242,7 @@ def _printed_turning_terms(inertia: Array, r: MovingVectors, rate: Array) -> tup
     """
     axes, by_x, by_x_rate = (part[..., 1:, :, :] for part in (r.value[..., None], *r[1:]))
     velocity = (by_x @ rate[..., None, :, None])[..., 0]
-    cross, cross_rate = skew(axes[..., 0]), skew(velocity)
+    cross, cross_rate = vectors.skew(axes[..., 0]), vectors.skew(velocity)
     W = (cross @ by_x).sum(axis=-3) / 2
     turned, moved = (cross @ by_x_rate).sum(axis=-3) / 2, (cross_rate @ by_x).sum(axis=-3) / 2
     # d/dt W = (r' x r_x + r x r_x')/2, and dOmega/dx = (-r' x r_x + r x r_x')/2.
@@ -295,6 +290,6 @@ def _add_legs_inertia_terms(
 def _legs_gravity(parameters: RPSParameters, d: Array, phi: Array) -> Array:
     """Return the derivatives of the legs' potential energy, shape (..., 6): Eq. 21 and rods."""
     p = parameters
-    s, t = leg_vectors(phi)
+    s, t = vectors.leg_vectors(phi)
     moment = p.leg_mass * p.leg_com + p.rod_mass * (d - p.rod_com)
     return np.concatenate([-p.rod_mass * (s @ p.gravity), -moment * (t @ p.gravity)], axis=-1)

@@ -22,6 +22,7 @@ import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.rps.kinematics.legs import RADIAL
+from rps_pin.rps.kinematics.rates import times
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -121,9 +122,3 @@ def skew(vector: Array) -> Array:
     matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
     matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
     return matrix
-
-
-def times(matrix: Array, vector: Array) -> Array:
-    """Return the product of matrices (..., m, n) and vectors (..., n), shape (..., m)."""
-    product: Array = (matrix @ vector[..., None])[..., 0]
-    return product

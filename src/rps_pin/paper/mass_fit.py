@@ -90,8 +90,7 @@ def fit_mass(path: PathInterpretation, parts: ForceParts, printed: ForceRange) -
     """Return the platform's mass that brings a path nearest to a column of Table 2."""
 
     def miss(log_mass: float) -> float:
-        forces = _forces(parts, math.exp(log_mass), paper.LEG_MASS)
-        return closest_labels(force_range(forces), printed)[2]
+        return _fit(path, parts, printed, math.exp(log_mass), paper.LEG_MASS).distance
 
     tried = np.log(_MASSES)
     best = int(np.argmin([miss(x) for x in tried]))
@@ -108,8 +107,7 @@ def fit_both_masses(start: MassFit, parts: ForceParts, printed: ForceRange) -> M
     heaviest = paper.LEG_INERTIA / (1e-3 * paper.LEG_COM_MM) ** 2
 
     def miss(masses: Array) -> float:
-        forces = _forces(parts, masses[0], masses[1])
-        return closest_labels(force_range(forces), printed)[2]
+        return _fit(start.path, parts, printed, masses[0], masses[1]).distance
 
     found = minimize(
         miss,
@@ -123,21 +121,14 @@ def fit_both_masses(start: MassFit, parts: ForceParts, printed: ForceRange) -> M
 
 def moved_paths(path: PathInterpretation, *, quick: bool = False) -> list[MovedPath]:
     """Return a path with Eq. 29 corrected, with z_0, r_h or p_h moved; `quick` moves z_0 only."""
-    given = {"z_0": path.height, "r_h": path.helix_radius, "p_h": path.helix_pitch}
+    given = {"r_h": path.helix_radius, "p_h": path.helix_pitch, "z_0": path.height}
     moves = {"z_0": MOVES["z_0"]} if quick else MOVES
     robot = UnitRobot(path.base_radius, path.platform_radius)
     rows = []
     for name, changes in moves.items():
         for by in changes:
-            numbers = given | {name: given[name] + by}
-            helix = PaperHelix(
-                path.platform_radius,
-                numbers["r_h"],
-                numbers["p_h"],
-                numbers["z_0"],
-                branch=path.branch,
-                eq_5=path.eq_5,
-            )
+            numbers = (given | {name: given[name] + by}).values()
+            helix = PaperHelix(path.platform_radius, *numbers, branch=path.branch, eq_5=path.eq_5)
             check = check_path(robot, helix, tolerance=1e-6, least_steps=500)
             if any(event.kind != "grazes" for event in check.singularities):
                 rows.append(MovedPath(name, by, None))

@@ -180,12 +180,12 @@ def _of_statements(found: Reproduction) -> dict[str, Any]:
 
 def _of_table_2(found: Reproduction, best: Comparison) -> dict[str, Any]:
     force = np.concatenate([run.force for run in found.runs.values()])
-    largest_printed = np.abs(paper.THIS_STUDY.numbers()).max()
+    largest_printed = paper.THIS_STUDY.largest
     ratio = best.relabelled.numbers() / paper.THIS_STUDY.numbers()
-    regular = [(probe, probe.forces) for probe in found.probes if probe.forces is not None]
-    strong = [p.nearest for p, ranges in regular if np.abs(ranges.numbers()).max() > 100.0]
+    regular = [probe for probe in found.probes if probe.forces]
+    strong = [p.nearest for p in regular if p.forces and p.forces.largest > 100.0]
     # By the largest distance among probes of 100 N or more; if none was tried, by the smallest.
-    reached = max(strong) if strong else min(p.nearest for p, _ in regular)
+    reached = max(strong) if strong else min(p.nearest for p in regular)
     return {
         "clean_forces": f"{force.min():.2f} to {force.max():.2f}",
         "largest_printed": largest_printed,
@@ -195,7 +195,7 @@ def _of_table_2(found: Reproduction, best: Comparison) -> dict[str, Any]:
         "weight": (paper.PLATFORM_MASS + 3 * paper.LEG_MASS) * STANDARD_GRAVITY,
         "crossings": {branch: _crossings(found, branch) for branch in "+-"},
         "probe_distance": 10 ** math.ceil(math.log10(reached)),
-        "probe_best": min(p.distance for p, _ in regular if p.branch == "+"),
+        "probe_best": min(p.distance for p in regular if p.branch == "+"),
         "best_path": _words(best.path),
         "best_bodies": tables.bodies_words(best),
         "ratio_low": ratio.min(),

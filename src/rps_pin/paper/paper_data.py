@@ -49,6 +49,11 @@ class ForceRange(NamedTuple):
         """Return the six numbers, shape (6,): the least three, then the greatest three."""
         return np.array([*self.least, *self.greatest])
 
+    @property
+    def largest(self) -> float:
+        """The largest size of a force, N."""
+        return float(np.abs(self.numbers()).max())
+
 
 #: Table 2, "Sokolov, 2003": with moving rods, by virtual work.
 SOKOLOV = ForceRange((-329.0, 11.0, -422.0), (509.0, 95.0, 426.0))

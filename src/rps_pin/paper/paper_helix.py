@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, ComplexArray
 from rps_pin.errors import InputError
-from rps_pin.paper.paper_data import (
-    BRAKE_START,
-    END,
-    HELIX_HEIGHT,
-    HELIX_PITCH,
-    HELIX_RADIUS,
-    PRINTED_TIMES,
-    RAMP_END,
-    ROOT,
-)
+from rps_pin.paper import paper_data as paper
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.helix import Branch, HelixPath, helix
 from rps_pin.trajectories.path import PathSample, Trajectory, checked_times
@@ -36,12 +26,12 @@ def printed_turn(t: ArrayLike) -> tuple[Array, Array, Array]:
     The last branch is pi (-2 - 9 pi^2 + 4 (1 + sqrt(1 + 9 pi^2)) t^2 - 4 t^2) / sqrt(1 + 9 pi^2):
     phi jumps where it begins.
     """
-    return _turn(t, _printed_branch)
+    return _turn(t, _PRINTED)
 
 
 def corrected_turn(t: ArrayLike) -> tuple[Array, Array, Array]:
     """Return the same with 4 (1 + sqrt(1 + 9 pi^2)) t instead of ... t^2 in the last branch."""
-    return _turn(t, _corrected_branch)
+    return _turn(t, _CORRECTED)
 
 
 class PaperHelix:
@@ -82,7 +72,7 @@ class PaperHelix:
                 f"r_h = {radius:g} m exceeds h = {platform_radius:g} m: the centre of the platform "
                 "does not reach the helix"
             )
-        self.duration = END
+        self.duration = paper.END
         self.jumps = eq_29 == "printed"
         self._height, self._climb = height, pitch / (2 * math.pi)
         self._turn = printed_turn if self.jumps else corrected_turn
@@ -95,16 +85,12 @@ class PaperHelix:
         """Return pose, rate and acceleration at times t of shape (...), s; exact."""
         phi, dphi, ddphi = self._turn(checked_times(t, self.duration))
         first, slope = self._alpha
-        alpha, dalpha, ddalpha = first + slope * phi, slope * dphi, slope * ddphi
-        # w = beta (-sin(alpha), cos(alpha)), and dw/dalpha = -beta (cos(alpha), sin(alpha)).
-        w = self._tilt * np.stack([-np.sin(alpha), np.cos(alpha)], axis=-1)
-        by_alpha = -self._tilt * np.stack([np.cos(alpha), np.sin(alpha)], axis=-1)
-        dw = by_alpha * dalpha[..., None]
-        ddw = by_alpha * ddalpha[..., None] - w * (dalpha**2)[..., None]
+        # As a complex number, w is i beta exp(i alpha), and w' = i alpha' w.
+        w, turning = 1j * self._tilt * np.exp(1j * (first + slope * phi)), 1j * slope * dphi
         return PathSample(
             _pose(self._height + self._climb * phi, w),
-            _pose(self._climb * dphi, dw),
-            _pose(self._climb * ddphi, ddw),
+            _pose(self._climb * dphi, turning * w),
+            _pose(self._climb * ddphi, (1j * slope * ddphi + turning**2) * w),
         )
 
 
@@ -112,9 +98,9 @@ def regular_helix(robot: RPSRobot, branch: Branch = "+") -> HelixPath:
     """Return Table 1's helix with z_0 = 0.4 m instead of 0.4 mm: it meets no singularity."""
     return helix(
         robot,
-        radius=1e-3 * HELIX_RADIUS,
-        pitch=1e-3 * HELIX_PITCH,
-        height=HELIX_HEIGHT,
+        radius=1e-3 * paper.HELIX_RADIUS,
+        pitch=1e-3 * paper.HELIX_PITCH,
+        height=paper.HELIX_HEIGHT,
         branch=branch,
     )
 
@@ -137,8 +123,9 @@ def smooth_parts(path: PaperHelix) -> tuple[PartOfPath, ...]:
     """Return the parts in which a helix does not jump: two if Eq. 29 is as printed."""
     if path.jumps:
         # The first ends on the middle branch's side of the jump.
-        return PartOfPath(path, 0.0, BRAKE_START - 1e-12), PartOfPath(path, BRAKE_START, END)
-    return (PartOfPath(path, 0.0, END),)
+        brake = paper.BRAKE_START
+        return PartOfPath(path, 0.0, brake - 1e-12), PartOfPath(path, brake, paper.END)
+    return (PartOfPath(path, 0.0, paper.END),)
 
 
 class HelixLaw(NamedTuple):
@@ -166,13 +153,13 @@ def helix_law() -> HelixLaw:
     def rate(t: float) -> float:
         return float(corrected_turn(t)[1])
 
-    end = float(brentq(rate, BRAKE_START, 6.0, xtol=1e-14))
+    end = float(brentq(rate, paper.BRAKE_START, 6.0, xtol=1e-14))
     times = np.linspace(0.0, end, 20_001)
     phi, _, _ = corrected_turn(times)
-    radius, climb = HELIX_RADIUS, HELIX_PITCH / (2 * math.pi)
+    radius, climb = paper.HELIX_RADIUS, paper.HELIX_PITCH / (2 * math.pi)
     path = np.stack([radius * np.cos(phi), radius * np.sin(phi), climb * phi], axis=-1)
     speed = np.linalg.norm(np.gradient(path, times, axis=0, edge_order=2), axis=-1)
-    rising = times < RAMP_END - 0.01
+    rising = times < paper.RAMP_END - 0.01
     ramp = np.polynomial.polynomial.polyfit(times[rising], speed[rising], 1)[1]
     last = printed_turn(end)
     return HelixLaw(
@@ -180,35 +167,26 @@ def helix_law() -> HelixLaw:
         float(corrected_turn(end)[0]),
         float(speed.max()),
         float(ramp),
-        float(corrected_turn(PRINTED_TIMES[2])[0]),
+        float(corrected_turn(paper.PRINTED_TIMES[2])[0]),
         float(last[0]),
         float(last[1]),
     )
 
 
-def _pose(z: Array, tilt: Array) -> Array:
-    return np.concatenate([z[..., None], tilt], axis=-1)
+def _pose(z: Array, tilt: ComplexArray) -> Array:
+    return np.stack([z, tilt.real, tilt.imag], axis=-1)
 
 
-def _turn(
-    t: ArrayLike, last_branch: Callable[[Array], tuple[Array, Array, Array]]
-) -> tuple[Array, Array, Array]:
+#: Eq. 29's phi in its three branches, without pi / sqrt(1 + 9 pi^2): coefficients of 1, t and t^2.
+_RISING, _STEADY = (0.0, 0.0, 4.0), (-1.0, 4.0, 0.0)
+_PRINTED = (-2 - 9 * math.pi**2, 0.0, 4 * (1 + paper.ROOT) - 4)
+_CORRECTED = (-2 - 9 * math.pi**2, 4 * (1 + paper.ROOT), -4.0)
+
+
+def _turn(t: ArrayLike, last: tuple[float, float, float]) -> tuple[Array, Array, Array]:
+    """Return phi and its first and second time derivatives, of Eq. 29 with a last branch."""
     times = np.asarray(t, dtype=np.float64)
-    rising, falling = times < RAMP_END, times >= BRAKE_START
-    first = (4 * times**2, 8 * times, np.full_like(times, 8.0))
-    middle = (4 * times - 1, np.full_like(times, 4.0), np.zeros_like(times))
-    phi, rate, acceleration = (
-        math.pi / ROOT * np.select([rising, falling], [one, three], two)
-        for one, two, three in zip(first, middle, last_branch(times), strict=True)
-    )
-    return phi, rate, acceleration
-
-
-def _printed_branch(t: Array) -> tuple[Array, Array, Array]:
-    slope = 4 * (1 + ROOT) - 4
-    return -2 - 9 * math.pi**2 + slope * t**2, 2 * slope * t, np.full_like(t, 2 * slope)
-
-
-def _corrected_branch(t: Array) -> tuple[Array, Array, Array]:
-    first = 4 * (1 + ROOT)
-    return -2 - 9 * math.pi**2 + first * t - 4 * t**2, first - 8 * t, np.full_like(t, -8.0)
+    branches = math.pi / paper.ROOT * np.array([_RISING, _STEADY, last])
+    branch = 1 * (times >= paper.RAMP_END) + (times >= paper.BRAKE_START)
+    a, b, c = np.moveaxis(branches[branch], -1, 0)
+    return a + b * times + c * times**2, b + 2 * c * times, 2 * c

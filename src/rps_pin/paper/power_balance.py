@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array
 from rps_pin.paper.lagrange_terms import energies
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
@@ -30,20 +29,15 @@ def power_balances(samples: int = 200) -> dict[str, float]:
         ("Eq. 16 as printed", given.replace(leg_inertia_about="com"), ()),
         ("Eq. 19 as printed", given, ("eq_19",)),
     ]
+    step = 1e-5
+    after, before = (robot.motion(*path.sample(times + s))[1] for s in (step, -step))
     found = {}
     for name, parameters, printed in variants:
-
-        def energy(
-            t: Array, p: RPSParameters = parameters, as_: tuple[str, ...] = printed
-        ) -> Array:
-            legs = robot.motion(*path.sample(t))[1]
-            parts = energies(
-                p, legs.length, legs.angle, legs.speed, legs.angle_rate, as_printed=as_
-            )
-            return np.asarray(np.sum(parts, axis=0))
-
-        step = 1e-5
-        change = (energy(times + step) - energy(times - step)) / (2 * step)
+        end, start = (
+            np.sum(energies(parameters, *legs[:4], as_printed=printed), axis=0)
+            for legs in (after, before)
+        )
+        change = (end - start) / (2 * step)
         found[name] = float(np.abs(change - power).max() / np.abs(power).max())
     return found
 

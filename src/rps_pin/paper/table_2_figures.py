@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,7 +11,7 @@ from rps_pin.paper.comparison import force_range
 from rps_pin.paper.compute import COLUMNS, Reproduction
 from rps_pin.paper.mass_fit import forces_of_fit
 from rps_pin.paper.near_singularity import Approach, Probe
-from rps_pin.plots.style import LEG_COLOURS, STYLE
+from rps_pin.plots.style import LEG_COLOURS
 
 _SIZE = (6.4, 3.8)
 _BLACK, _GREY = "#000000", "#999999"
@@ -21,41 +20,34 @@ _DISTANCE, _FORCE = "distance to the singularity (1)", "largest $|F_i|$ (N)"
 
 def plot_approach(found: Approach) -> Figure:
     """Draw the largest force over the distance to the singularity, both logarithmic."""
-    with matplotlib.rc_context(STYLE):
-        axes = _axes("Into the first crossing of $z_0$ = 0.4 mm", _DISTANCE, _FORCE)
-        axes.loglog(found.distance, found.force, ".", color=LEG_COLOURS[0], label="computed")
-        line = found.force[-1] * found.distance[-1] / found.distance
-        axes.loglog(found.distance, line, "--", color=_BLACK, lw=1, label="slope -1")
-        return _with_legend(axes)
+    axes = _axes("Into the first crossing of $z_0$ = 0.4 mm", _DISTANCE, _FORCE)
+    axes.loglog(found.distance, found.force, ".", color=LEG_COLOURS[0], label="computed")
+    line = found.force[-1] * found.distance[-1] / found.distance
+    axes.loglog(found.distance, line, "--", color=_BLACK, lw=1, label="slope -1")
+    return _with_legend(axes)
 
 
 def plot_probes(probes: list[Probe]) -> Figure:
     """Draw the largest force over the smallest distance of paths that do not cross."""
-    with matplotlib.rc_context(STYLE):
-        title = "$r_h$ = 75 mm, $p_h$ = 50 mm, Table 1's masses"
-        axes = _axes(title, "smallest distance to a singularity (1)", _FORCE)
-        for branch, colour, mark in zip("+-", LEG_COLOURS, "os", strict=False):
-            kept = [(p, p.forces) for p in probes if p.branch == branch and p.forces is not None]
-            largest = [np.abs(forces.numbers()).max() for _, forces in kept]
-            nearest = [p.nearest for p, _ in kept]
-            axes.loglog(nearest, largest, mark, color=colour, label=f"branch {branch}")
-        table = float(np.abs(paper.THIS_STUDY.numbers()).max())
-        axes.axhline(table, color=_BLACK, lw=1, ls=":", label="Table 2's largest")
-        return _with_legend(axes)
+    title = "$r_h$ = 75 mm, $p_h$ = 50 mm, Table 1's masses"
+    axes = _axes(title, "smallest distance to a singularity (1)", _FORCE)
+    for branch, colour, mark in zip("+-", LEG_COLOURS, "os", strict=False):
+        kept = [(p.nearest, p.forces.largest) for p in probes if p.branch == branch and p.forces]
+        axes.loglog(*np.transpose(kept), mark, color=colour, label=f"branch {branch}")
+    axes.axhline(paper.THIS_STUDY.largest, color=_BLACK, lw=1, ls=":", label="Table 2's largest")
+    return _with_legend(axes)
 
 
 def plot_interpretations(found: Reproduction) -> Figure:
     """Draw every interpretation that has forces: its distance to Table 2, its largest force."""
-    with matplotlib.rc_context(STYLE):
-        title = "Every interpretation that has forces, legs in any order"
-        axes = _axes(title, _FORCE, "distance to Table 2 (1)")
-        for form, colour, mark in zip(("corrected", "printed"), LEG_COLOURS, ".x", strict=False):
-            kept = [row for row in found.comparisons if row.path.eq_29 == form]
-            largest = [float(np.abs(row.forces.numbers()).max()) for row in kept]
-            distance = [row.distance_relabelled for row in kept]
-            axes.loglog(largest, distance, mark, ms=4, color=colour, label=f"Eq. 29 {form}")
-        axes.axhline(1.0, color=_BLACK, lw=1, ls=":", label="no forces at all")
-        return _with_legend(axes)
+    title = "Every interpretation that has forces, legs in any order"
+    axes = _axes(title, _FORCE, "distance to Table 2 (1)")
+    for form, colour, mark in zip(("corrected", "printed"), LEG_COLOURS, ".x", strict=False):
+        rows = [row for row in found.comparisons if row.path.eq_29 == form]
+        kept = [(row.forces.largest, row.distance_relabelled) for row in rows]
+        axes.loglog(*np.transpose(kept), mark, ms=4, color=colour, label=f"Eq. 29 {form}")
+    axes.axhline(1.0, color=_BLACK, lw=1, ls=":", label="no forces at all")
+    return _with_legend(axes)
 
 
 def plot_table_2(found: Reproduction) -> Figure:
@@ -69,45 +61,43 @@ def plot_table_2(found: Reproduction) -> Figure:
         ("its path, the mass fitted", found.fits["This study"].fits[0].forces, LEG_COLOURS[1]),
         ("$z_0$ = 0.4 m, mm, as printed", clean, LEG_COLOURS[2]),
     ]
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(8.4, 3.8), layout="constrained")
-        axes = figure.add_subplot()
-        for k, (name, ranges, colour) in enumerate(bars):
-            place = np.arange(3) + 0.15 * (k - 2)
-            least, greatest = np.array(ranges.least), np.array(ranges.greatest)
-            # A range of less than 8 N would not be seen.
-            middle, span = (least + greatest) / 2, np.maximum(greatest - least, 8.0)
-            axes.bar(place, span, 0.12, bottom=middle - span / 2, color=colour, label=name)
-        axes.set_ylim(-480, 560)
-        axes.axhline(0.0, color=_BLACK, lw=0.8)
-        axes.set_xticks(range(3), [f"$d_{leg}$ of Table 2" for leg in (1, 2, 3)])
-        axes.set_ylabel("least to greatest force (N)")
-        axes.set_title("Table 2 beside interpretations of Table 1", loc="left")
-        figure.legend(loc="outside right center", frameon=False)
+    figure = Figure(figsize=(8.4, 3.8), layout="constrained")
+    axes = figure.add_subplot()
+    for k, (name, ranges, colour) in enumerate(bars):
+        place = np.arange(3) + 0.15 * (k - 2)
+        least, greatest = np.array(ranges.least), np.array(ranges.greatest)
+        # A range of less than 8 N would not be seen.
+        middle, span = (least + greatest) / 2, np.maximum(greatest - least, 8.0)
+        axes.bar(place, span, 0.12, bottom=middle - span / 2, color=colour, label=name)
+    axes.set_ylim(-480, 560)
+    axes.axhline(0.0, color=_BLACK, lw=0.8)
+    axes.set_xticks(range(3), [f"$d_{leg}$ of Table 2" for leg in (1, 2, 3)])
+    axes.set_ylabel("least to greatest force (N)")
+    axes.set_title("Table 2 beside interpretations of Table 1", loc="left")
+    figure.legend(loc="outside right center", frameon=False)
     return figure
 
 
 def plot_fit(found: Reproduction) -> Figure:
     """Draw the forces of the path that comes closest, its mass fitted, with Table 2's ranges."""
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(10.4, 3.8), layout="constrained")
-        for axes, (column, printed) in zip(
-            figure.subplots(1, 2, sharey=True), COLUMNS.items(), strict=True
-        ):
-            fit = found.fits[column].fits[0]
-            result = next(one for one in found.paths if one.interpretation == fit.path)
-            assert result.parts is not None  # it was fitted
-            force = forces_of_fit(result.parts, fit)
-            for leg, (colour, style) in enumerate(zip(LEG_COLOURS, ("-", "--", "-."), strict=True)):
-                label = f"$d_{leg + 1}$"
-                axes.plot(result.times, force[:, leg], style, color=colour, label=label)
-                for end in (printed.least[leg], printed.greatest[leg]):
-                    axes.axhline(end, color=colour, lw=1.0, ls=":")
-            axes.margins(x=0)
-            axes.set_xlabel("time (s)")
-            axes.set_title(f"{column}: m = {fit.platform_mass:.1f} kg", loc="left")
-        figure.axes[0].set_ylabel("force (N); dotted: Table 2")
-        figure.axes[0].legend(loc="lower right", frameon=False, ncols=3)
+    figure = Figure(figsize=(10.4, 3.8), layout="constrained")
+    for axes, (column, printed) in zip(
+        figure.subplots(1, 2, sharey=True), COLUMNS.items(), strict=True
+    ):
+        fit = found.fits[column].fits[0]
+        result = next(one for one in found.paths if one.interpretation == fit.path)
+        assert result.parts is not None  # it was fitted
+        force = forces_of_fit(result.parts, fit)
+        for leg, (colour, style) in enumerate(zip(LEG_COLOURS, ("-", "--", "-."), strict=True)):
+            label = f"$d_{leg + 1}$"
+            axes.plot(result.times, force[:, leg], style, color=colour, label=label)
+            for end in (printed.least[leg], printed.greatest[leg]):
+                axes.axhline(end, color=colour, lw=1.0, ls=":")
+        axes.margins(x=0)
+        axes.set_xlabel("time (s)")
+        axes.set_title(f"{column}: m = {fit.platform_mass:.1f} kg", loc="left")
+    figure.axes[0].set_ylabel("force (N); dotted: Table 2")
+    figure.axes[0].legend(loc="lower right", frameon=False, ncols=3)
     return figure
 
 

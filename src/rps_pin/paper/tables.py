@@ -9,8 +9,6 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import chain
 
-import numpy as np
-
 from rps_pin.paper.comparison import OUT_OF_REACH, SINGULAR, Comparison, PathResult, distance
 from rps_pin.paper.compute import COLUMNS, Reproduction
 from rps_pin.paper.interpretations import BODIES, PathInterpretation
@@ -98,7 +96,7 @@ def paths(found: Reproduction) -> str:
     for (height, helix, law), results in groups.items():
         fate = Counter(result.refused for result in results)
         mine = [r for r in found.comparisons if _group(r.path) == (height, helix, law)]
-        peaks = [float(np.abs(r.forces.numbers()).max()) for r in mine]
+        peaks = [r.forces.largest for r in mine]
         rows.append(
             [
                 f"0.4 {height}",

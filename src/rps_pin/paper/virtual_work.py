@@ -27,15 +27,9 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
-from rps_pin.paper.lagrange_vectors import times
+from rps_pin.rps.kinematics import rates
 from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.kinematics.pose import checked_motion, platform_motion
-from rps_pin.rps.kinematics.rates import (
-    LegJacobians,
-    accepted_gains,
-    jacobian_rates_of_legs,
-    leg_jacobians,
-)
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 
@@ -95,11 +89,11 @@ def virtual_work_forces(
     """
     motion = checked_motion(pose, rate, acceleration)
     needed = pose_forces(parameters, *motion).total
-    legs = leg_jacobians(parameters, motion[0])
+    legs = rates.leg_jacobians(parameters, motion[0])
     # Tilts made lengths by h, on both sides.
     units = np.array([1.0, *2 * [1 / parameters.platform_radius]])
     scaled = legs.length_jacobian * units
-    accepted_gains(
+    rates.accepted_gains(
         scaled,
         max_gain,
         "the actuators cannot hold the platform here{where}: it could move {gain:.3g} times as "
@@ -130,7 +124,7 @@ def pose_forces(
         If a leg has no length.
     """
     x, dx, ddx = checked_motion(pose, rate, acceleration)
-    legs = leg_jacobians(parameters, x)
+    legs = rates.leg_jacobians(parameters, x)
     return PoseForces(
         _platform_force(parameters, x, dx, ddx), *_leg_forces(parameters, x, dx, ddx, legs)
     )
@@ -149,19 +143,19 @@ def _platform_force(parameters: RPSParameters, x: Array, dx: Array, ddx: Array) 
     # Velocities are linear in the rate: those of unit rates are the partial velocities.
     at, still = np.broadcast_arrays(x[..., None, :], np.zeros((3, 3)))
     unit = platform_motion(at, np.broadcast_to(np.eye(3), at.shape), still, h)
-    return times(unit.velocity, force) + times(unit.angular_velocity, moment)
+    return rates.times(unit.velocity, force) + rates.times(unit.angular_velocity, moment)
 
 
 def _leg_forces(
-    parameters: RPSParameters, x: Array, dx: Array, ddx: Array, legs: LegJacobians
+    parameters: RPSParameters, x: Array, dx: Array, ddx: Array, legs: rates.LegJacobians
 ) -> tuple[Array, Array]:
     """Return Q of the cylinders and of the rods."""
     p = parameters
     K, N = legs.length_jacobian, legs.angle_jacobian
-    change = jacobian_rates_of_legs(p, x, dx, legs)
-    speed, turning = times(K, dx), times(N, dx)
-    speed_rate = times(K, ddx) + times(change.length_jacobian, dx)
-    turning_rate = times(N, ddx) + times(change.angle_jacobian, dx)
+    change = rates.jacobian_rates_of_legs(p, x, dx, legs)
+    speed, turning = rates.times(K, dx), rates.times(N, dx)
+    speed_rate = rates.times(K, ddx) + rates.times(change.length_jacobian, dx)
+    turning_rate = rates.times(N, ddx) + rates.times(change.angle_jacobian, dx)
     cosine, sine = np.cos(legs.angle), np.sin(legs.angle)
     inwards, up = -(RADIAL @ p.gravity), p.gravity[2]
     # s = -cos(phi) e + sin(phi) z and t = sin(phi) e + cos(phi) z
@@ -177,6 +171,6 @@ def _leg_forces(
     rod_moment = lever * across + p.rod_inertia * turning_rate
     to_angle, to_length = np.swapaxes(N, -1, -2), np.swapaxes(K, -1, -2)
     return (
-        times(to_angle, cylinder_moment),
-        times(to_length, along) + times(to_angle, rod_moment),
+        rates.times(to_angle, cylinder_moment),
+        rates.times(to_length, along) + rates.times(to_angle, rod_moment),
     )

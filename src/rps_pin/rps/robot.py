@@ -16,19 +16,11 @@ from rps_pin.rps.dynamics.actuator_forces import actuator_forces
 from rps_pin.rps.dynamics.force_equations import ForceTerms
 from rps_pin.rps.dynamics.friction import friction_effects
 from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes, assembly_modes
 from rps_pin.rps.kinematics.forward_kinematics import forward_kinematics
 from rps_pin.rps.kinematics.inverse_kinematics import inverse_kinematics, reachable_motion
 from rps_pin.rps.kinematics.legs import LegMotion, Legs
-from rps_pin.rps.kinematics.pose import (
-    PlatformMotion,
-    checked_motion,
-    checked_pose,
-    platform_motion,
-    position,
-    quaternion,
-    rotation,
-)
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.urdf import LEGS, ball_frames, build_urdf
@@ -134,8 +126,8 @@ class RPSRobot:
         InputError
             If the pose has the wrong shape or is not finite.
         """
-        x = checked_pose(pose)
-        return position(x, self.parameters.platform_radius), rotation(x)
+        x = poses.checked_pose(pose)
+        return poses.position(x, self.parameters.platform_radius), poses.rotation(x)
 
     def inverse_kinematics(self, pose: ArrayLike, *, errors: Errors = "raise") -> Legs:
         """Return leg lengths and angles in closed form: Eq. 1, 4 and 6.
@@ -231,7 +223,7 @@ class RPSRobot:
         acceleration: ArrayLike,
         *,
         errors: Errors = "raise",
-    ) -> tuple[PlatformMotion, LegMotion]:
+    ) -> tuple[poses.PlatformMotion, LegMotion]:
         """Return how the platform and the legs move, in closed form.
 
         Parameters
@@ -246,9 +238,9 @@ class RPSRobot:
         InputError, UnreachableError
             As `inverse_kinematics`.
         """
-        x, dx, ddx = checked_motion(pose, rate, acceleration)
+        x, dx, ddx = poses.checked_motion(pose, rate, acceleration)
         legs = reachable_motion(self.parameters, x, dx, ddx)
-        return platform_motion(x, dx, ddx, self.parameters.platform_radius), legs
+        return poses.platform_motion(x, dx, ddx, self.parameters.platform_radius), legs
 
     @maskable(pose=1, rate=1, acceleration=1)
     def state(
@@ -280,10 +272,10 @@ class RPSRobot:
             As `inverse_kinematics`.
         """
         platform, legs = self.motion(pose, rate, acceleration)
-        return self.state_of(checked_motion(pose, rate, acceleration)[0], platform, legs)
+        return self.state_of(poses.checked_motion(pose, rate, acceleration)[0], platform, legs)
 
     def state_of(
-        self, pose: Array, platform: PlatformMotion, legs: LegMotion
+        self, pose: Array, platform: poses.PlatformMotion, legs: LegMotion
     ) -> tuple[Array, Array, Array]:
         """Return `state` of poses (..., 3) whose `motion` is known."""
         x, model = pose, self.mechanism.model
@@ -298,7 +290,7 @@ class RPSRobot:
         spin = platform.angular_velocity
         pull = (to_body @ platform.acceleration[..., None])[..., 0] - np.cross(spin, linear)
         i, j = self._free_q, self._free_v
-        q[..., i : i + 7] = np.concatenate([platform.position, quaternion(x)], axis=-1)
+        q[..., i : i + 7] = np.concatenate([platform.position, poses.quaternion(x)], axis=-1)
         v[..., j : j + 6] = np.concatenate([linear, spin], axis=-1)
         a[..., j : j + 6] = np.concatenate([pull, platform.angular_acceleration], axis=-1)
 

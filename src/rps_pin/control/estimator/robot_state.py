@@ -7,16 +7,15 @@ from __future__ import annotations
 
 from rps_pin.control.estimator.leg_geometry import LegGeometry
 from rps_pin.numerics.compiled import compiled
-from rps_pin.rps.kernels import platform
-from rps_pin.rps.kernels.legs import across_leg, along_leg, leg_acceleration
-from rps_pin.rps.kernels.tips import Ring, at_legs, tip_accelerations, tip_rates, tip_slopes, tips
+from rps_pin.rps.kernels import legs, platform
+from rps_pin.rps.kernels import tips as ring
 from rps_pin.rps.kinematics.tracking import Triple
 
 #: q (13), v (12), a (12): of legs 1, 2, 3 revolute and prismatic joint, then of the platform
 #: (placement with quaternion; velocity and spatial acceleration in platform axes).
 RobotState = tuple[float, ...]
 #: Of rho and z_i; see `rps_pin.rps.kernels.tips`.
-_Rings = tuple[Ring, Ring]
+_Rings = tuple[ring.Ring, ring.Ring]
 
 
 @compiled
@@ -25,7 +24,7 @@ def robot_state(geometry: LegGeometry, rate: Triple, acceleration: Triple, h: fl
     (z, x, y), (d1, d2, d3), (phi1, phi2, phi3), _, tilt = geometry
     _, dx, dy = rate
     _, ddx, ddy = acceleration
-    centre, _ = tips(z, x, y, tilt, h)
+    centre, _ = ring.tips(z, x, y, tilt, h)
     rates, accelerations = _tip_motion(geometry, rate, acceleration, h)
     (w1, w2, w3), (s1, s2, s3), (dw1, dw2, dw3), (ds1, ds2, ds3) = _leg_motions(
         geometry, rates, accelerations
@@ -65,19 +64,11 @@ def _tip_motion(
     _, x, y = geometry.pose
     dz, dx, dy = rate
     ddz, ddx, ddy = acceleration
-    slopes = tip_slopes(x, y, geometry.tilt)
+    slopes = ring.tip_slopes(x, y, geometry.tilt)
     motion = (x, y, dx, dy, ddx, ddy)
-    return tip_rates(slopes, dz, h * dx, h * dy), tip_accelerations(motion, ddz, geometry.tilt, h)
-
-
-@compiled
-def _in_leg_axes(geometry: LegGeometry, rings: _Rings) -> tuple[Triple, Triple]:
-    """Return vectors of the tips along and across the legs."""
-    (r1, r2, r3), (z1, z2, z3) = at_legs(rings[0]), at_legs(rings[1])
-    c1, c2, c3, s1, s2, s3 = geometry.direction
-    along = (along_leg(c1, s1, r1, z1), along_leg(c2, s2, r2, z2), along_leg(c3, s3, r3, z3))
-    across = (across_leg(c1, s1, r1, z1), across_leg(c2, s2, r2, z2), across_leg(c3, s3, r3, z3))
-    return along, across
+    return ring.tip_rates(slopes, dz, h * dx, h * dy), ring.tip_accelerations(
+        motion, ddz, geometry.tilt, h
+    )
 
 
 @compiled
@@ -85,11 +76,10 @@ def _leg_motions(
     geometry: LegGeometry, rates: _Rings, accelerations: _Rings
 ) -> tuple[Triple, Triple, Triple, Triple]:
     """Return phi', d', phi'' and d''."""
-    d1, d2, d3 = geometry.length
-    (s1, s2, s3), (t1, t2, t3) = _in_leg_axes(geometry, rates)
-    (a1, a2, a3), (b1, b2, b3) = _in_leg_axes(geometry, accelerations)
-    w1, w2, w3 = t1 / d1, t2 / d2, t3 / d3
-    ds1, dw1 = leg_acceleration(s1, w1, d1, a1, b1)
-    ds2, dw2 = leg_acceleration(s2, w2, d2, a2, b2)
-    ds3, dw3 = leg_acceleration(s3, w3, d3, a3, b3)
+    (d1, d2, d3), (c1, c2, c3, sine_1, sine_2, sine_3) = geometry.length, geometry.direction
+    (r1, r2, r3), (z1, z2, z3) = ring.at_legs(rates[0]), ring.at_legs(rates[1])
+    (a1, a2, a3), (b1, b2, b3) = ring.at_legs(accelerations[0]), ring.at_legs(accelerations[1])
+    s1, w1, ds1, dw1 = legs.leg_motion(c1, sine_1, d1, (r1, z1), (a1, b1))
+    s2, w2, ds2, dw2 = legs.leg_motion(c2, sine_2, d2, (r2, z2), (a2, b2))
+    s3, w3, ds3, dw3 = legs.leg_motion(c3, sine_3, d3, (r3, z3), (a3, b3))
     return (w1, w2, w3), (s1, s2, s3), (dw1, dw2, dw3), (ds1, ds2, ds3)

@@ -8,6 +8,7 @@ those of the robot itself, without its payload: of platform, cylinders and rods.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,13 +16,19 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.rps.dynamics.actuator_forces import ForceShare, forces_of
 from rps_pin.rps.dynamics.force_equations import ForceTerms, inertia_entries, vector_entries
-from rps_pin.rps.dynamics.friction import has_friction
-from rps_pin.rps.dynamics.loads import Payload, checked_wrench
+from rps_pin.rps.dynamics.friction import FRICTION, has_friction
+from rps_pin.rps.dynamics.loads import checked_wrench
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.robot import RPSRobot
 
-_NO_GRAVITY = (0.0, 0.0, 0.0)
+_NO_VECTOR = (0.0, 0.0, 0.0)
+#: Changes of `ForceTerms` that leave friction, or the bodies, out.
+_NO_FRICTION: dict[str, Any] = dict.fromkeys(FRICTION, 0.0)
+_NO_BODIES: dict[str, Any] = {
+    **dict.fromkeys(["platform_mass", "leg_moment", "leg_inertia", "rod_mass"], 0.0),
+    **{"platform_moment": _NO_VECTOR, "platform_inertia": (0.0,) * 6},
+}
 
 
 @dataclass(frozen=True)
@@ -82,56 +89,30 @@ def force_causes(
     x, dx, ddx = checked_motion(pose, rate, acceleration)
     load = None if wrench is None else checked_wrench(wrench, x.shape[:-1])
     still = np.zeros_like(x)
-    bodies = _without_friction(ForceTerms.of(robot.parameters))
-    weightless = replace(bodies, gravity=_NO_GRAVITY)
+    bodies = replace(ForceTerms.of(robot.parameters), **_NO_FRICTION)
+    weightless = replace(bodies, gravity=_NO_VECTOR)
+    bodiless = replace(robot.force_terms, **_NO_BODIES)
     shares = {
         "gravity": ForceShare(bodies, still, still, None),
         "inertia": ForceShare(weightless, still, ddx, None),
         "coriolis": ForceShare(weightless, dx, still, None),
     }
     if has_friction(robot.parameters):
-        shares["friction"] = ForceShare(_massless(robot.force_terms), dx, still, None)
+        shares["friction"] = ForceShare(bodiless, dx, still, None)
     if robot.payload is not None:
-        shares["payload"] = ForceShare(
-            _only_payload(robot.force_terms, robot.payload), dx, ddx, None
+        carried = replace(
+            replace(bodiless, **_NO_FRICTION),
+            platform_mass=robot.payload.mass,
+            platform_moment=vector_entries(robot.payload.first_moment),
+            platform_inertia=inertia_entries(robot.payload.inertia_about_platform),
         )
+        shares["payload"] = ForceShare(carried, dx, ddx, None)
     if load is not None:
-        shares["external"] = ForceShare(_massless(weightless), still, still, load)
+        shares["external"] = ForceShare(replace(weightless, **_NO_BODIES), still, still, load)
     found, suspect = forces_of(list(shares.values()), x, robot.parameters)
     if suspect.any() or not np.isfinite(found).all():
         robot.actuator_forces(x, dx, ddx, wrench=wrench)  # raises where there are no forces
     parts = dict(zip(shares, found, strict=True))
     return ForceCauses(
         **{field.name: parts.get(field.name, still) for field in fields(ForceCauses)}
-    )
-
-
-def _without_friction(terms: ForceTerms) -> ForceTerms:
-    return replace(
-        terms,
-        prismatic_damping=0.0,
-        prismatic_friction=0.0,
-        revolute_damping=0.0,
-        revolute_friction=0.0,
-    )
-
-
-def _massless(terms: ForceTerms) -> ForceTerms:
-    return replace(
-        terms,
-        platform_mass=0.0,
-        platform_moment=(0.0, 0.0, 0.0),
-        platform_inertia=(0.0,) * 6,
-        leg_moment=0.0,
-        leg_inertia=0.0,
-        rod_mass=0.0,
-    )
-
-
-def _only_payload(terms: ForceTerms, payload: Payload) -> ForceTerms:
-    return replace(
-        _without_friction(_massless(terms)),
-        platform_mass=payload.mass,
-        platform_moment=vector_entries(payload.first_moment),
-        platform_inertia=inertia_entries(payload.inertia_about_platform),
     )

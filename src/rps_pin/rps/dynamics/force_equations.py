@@ -190,21 +190,17 @@ def _leg_forces(
 ) -> tuple[Array, Array]:
     """Return F_rod and M/d of the legs, shape (3, n) each, N."""
     d, cosine, sine = block.length, block.cosine, block.sine
-    radial, height = (tips.at_legs(ring) for ring in rates)
-    speed = legs.along_leg(cosine, sine, radial, height)
-    angle_rate = legs.across_leg(cosine, sine, radial, height) / d
-    radial, height = (tips.at_legs(ring) for ring in changes)
-    along = legs.along_leg(cosine, sine, radial, height)
-    across = legs.across_leg(cosine, sine, radial, height)
-    acceleration, angle_acceleration = legs.leg_acceleration(speed, angle_rate, d, along, across)
+    velocity, change = ([tips.at_legs(ring) for ring in pair] for pair in (rates, changes))
+    motion = legs.leg_motion(cosine, sine, d, velocity, change)
+    speed, angle_rate, acceleration, angle_acceleration = motion
     outwards, downwards = (RADIAL @ terms.gravity)[:, None], terms.gravity[2]
     fall = legs.across_leg(cosine, sine, outwards, downwards)
     moment = forces.cylinder_moment(terms.leg_moment, terms.leg_inertia, angle_acceleration, fall)
     force = np.zeros_like(d)
     if terms.rod_mass:
         weight = legs.along_leg(cosine, sine, outwards, downwards)
-        motion = angle_rate, angle_acceleration, acceleration
-        force = forces.rod_force(terms.rod_mass, terms.rod_com, d, motion, weight)
+        turning = angle_rate, angle_acceleration, acceleration
+        force = forces.rod_force(terms.rod_mass, terms.rod_com, d, turning, weight)
         coriolis = 2.0 * speed * angle_rate
         moment += forces.rod_moment(
             terms.rod_mass, d - terms.rod_com, coriolis, angle_acceleration, fall

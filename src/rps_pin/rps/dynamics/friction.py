@@ -13,11 +13,13 @@ from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.urdf import LEGS
 
 _KINDS = ("prismatic", "revolute")
+#: Names of the parameters of friction that are zero without it.
+FRICTION = tuple(f"{kind}_{what}" for kind in _KINDS for what in ("damping", "friction"))
 
 
 def has_friction(p: RPSParameters) -> bool:
     """Return whether a robot's joints have any friction."""
-    return any(getattr(p, f"{kind}_{what}") for kind in _KINDS for what in ("damping", "friction"))
+    return any(getattr(p, name) for name in FRICTION)
 
 
 def friction_effects(model: pin.Model, p: RPSParameters) -> JointEffects | None:

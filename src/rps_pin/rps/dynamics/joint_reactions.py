@@ -28,14 +28,8 @@ from rps_pin.rps.dynamics.force_equations import platform_wrench
 from rps_pin.rps.dynamics.loads import checked_wrench
 from rps_pin.rps.kernels import platform
 from rps_pin.rps.kernels.forces import friction_force
+from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.legs import ACROSS, RADIAL, LegMotion
-from rps_pin.rps.kinematics.pose import (
-    PlatformMotion,
-    checked_motion,
-    components,
-    stacked,
-    tilt_of,
-)
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
@@ -124,7 +118,7 @@ def joint_reactions(
     InputError, UnreachableError, SingularityError
         As `RPSRobot.actuator_forces`.
     """
-    x, dx, ddx = checked_motion(pose, rate, acceleration)
+    x, dx, ddx = poses.checked_motion(pose, rate, acceleration)
     actuator = robot.actuator_forces(x, dx, ddx, wrench=wrench)
     motion, legs = robot.motion(x, dx, ddx)
     axes = _leg_axes(legs.angle)
@@ -177,19 +171,19 @@ def _point_acceleration(legs: LegMotion, distance: Array, *, sliding: bool) -> A
 
 
 def _platform_wrench(
-    robot: RPSRobot, pose: Array, motion: PlatformMotion, wrench: Array | None
+    robot: RPSRobot, pose: Array, motion: poses.PlatformMotion, wrench: Array | None
 ) -> tuple[Array, Array]:
     """Return what the legs must exert on platform and payload, about its centre, base axes."""
     load = None if wrench is None else np.moveaxis(wrench, -1, 0)
-    x, y, tilt = tilt_of(pose)
+    x, y, tilt = poses.tilt_of(pose)
     vectors = motion.acceleration, motion.angular_velocity, motion.angular_acceleration
     a, omega, alpha = (_vector(vector) for vector in vectors)
     force, moment = platform_wrench(robot.force_terms, (x, y, tilt), (a, omega, alpha), load)
-    return stacked(*force), stacked(*platform.to_base(x, y, tilt, moment))
+    return poses.stacked(*force), poses.stacked(*platform.to_base(x, y, tilt, moment))
 
 
 def _vector(vectors: Array) -> platform.Vector:
-    x, y, z = components(vectors)
+    x, y, z = poses.components(vectors)
     return x, y, z
 
 

@@ -178,9 +178,9 @@ def run_motion(
     """
     time = sample_times(trajectory.duration, sample_rate)
     path_check = require_clear(robot, trajectory)
-    pose, rate, acceleration = trajectory.sample(time)
-    platform, legs = robot.motion(pose, rate, acceleration)
-    q, v, a = robot.state_of(pose, platform, legs)
+    motion = trajectory.sample(time)
+    platform, legs = robot.motion(*motion)
+    q, v, a = robot.state_of(motion.pose, platform, legs)
     n = len(time)
     force, reaction = np.empty((n, 3)), np.empty((n, 3, 3))
     gap, residual, conditioning = np.empty(n), np.empty(n), np.empty(n)
@@ -189,44 +189,19 @@ def run_motion(
         try:
             result = robot.inverse_dynamics(q[i], v[i], a[i], wrench=wrench)
         except SingularityError as error:
-            raise SingularityError(
-                f"at t = {time[i]:.6g} s the motion meets a singularity: {error}",
-                error.condition,
-                error.limit,
-            ) from None
+            raise singular_sample(time[i], error) from None
         before, side = side, result.orientation
         if before * side < 0:
-            raise SingularityError(
-                f"between t = {time[i - 1]:.6g} s and {time[i]:.6g} s the motion crosses a "
-                "singularity: no actuator forces carry the robot through it",
-                math.inf,
-                robot.mechanism.max_condition,
-            )
+            raise crossed_singularity(time[i - 1], time[i], robot)
         force[i] = result.tau
         reaction[i] = result.constraint_forces.reshape(3, 3)
         largest = max(np.abs(result.tau).max(), np.abs(result.constraint_forces).max())
         residual[i] = result.residual / largest if largest > 0 else result.residual
         conditioning[i] = 1 / result.condition
         gap[i] = robot.mechanism.loop_gap(q[i])
-    return MotionRun(
-        time=time,
-        pose=pose,
-        rate=rate,
-        acceleration=acceleration,
-        position=platform.position,
-        configuration=q,
-        generalised_velocity=v,
-        generalised_acceleration=a,
-        length=legs.length,
-        speed=legs.speed,
-        leg_acceleration=legs.acceleration,
-        force=force,
-        reaction=reaction,
-        loop_gap=gap,
-        residual=residual,
-        passive_conditioning=conditioning,
-        path_check=path_check,
-    )
+    of_legs = legs.length, legs.speed, legs.acceleration
+    solved = force, reaction, gap, residual, conditioning
+    return MotionRun(time, *motion, platform.position, q, v, a, *of_legs, *solved, path_check)
 
 
 def summarise(run: MotionRun, robot: RPSRobot) -> MotionSummary:
@@ -245,6 +220,22 @@ def summarise(run: MotionRun, robot: RPSRobot) -> MotionSummary:
         minimum_pose=(z, tilt_x, tilt_y),
         passive_conditioning_min=float(run.passive_conditioning.min()),
         exceeded=tuple(_exceeded(run, robot)),
+    )
+
+
+def singular_sample(time: float, error: SingularityError) -> SingularityError:
+    """Return the error of a motion that is singular at a sample."""
+    text = f"at t = {time:.6g} s the motion meets a singularity: {error}"
+    return SingularityError(text, error.condition, error.limit)
+
+
+def crossed_singularity(before: float, after: float, robot: RPSRobot) -> SingularityError:
+    """Return the error of a motion that crosses a singularity between two samples."""
+    return SingularityError(
+        f"between t = {before:.6g} s and {after:.6g} s the motion crosses a singularity: no "
+        "actuator forces carry the robot through it",
+        math.inf,
+        robot.mechanism.max_condition,
     )
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, SingularityError, UnreachableError
-from rps_pin.rps.dynamics.motion_run import sample_times
+from rps_pin.rps.dynamics.motion_run import crossed_singularity, sample_times, singular_sample
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, ActuatorSizing, Margin, SizingSheet
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.measures import singularity_measures
@@ -89,20 +89,12 @@ def size_motion(
         As `size_trajectory`.
     """
     times = _checked_time(time)
-    x = real_array(pose, "pose", (3,))
-    if x.shape != (len(times), 3):
-        raise InputError(f"pose has shape {x.shape}; with these times it must be {len(times), 3}")
+    x = _samples(pose, "pose", len(times))
     force = robot.actuator_forces(x, rate, acceleration, wrench=wrench, errors="mask")
     _refuse_bad_samples(robot, times, x, np.ma.getmaskarray(force)[:, 0])
     legs = robot.motion(x, rate, acceleration)[1]
-    return size_actuators(
-        times,
-        np.asarray(force),
-        legs.speed,
-        legs.length,
-        ActuatorLimits.of(robot.parameters) if limits is None else limits,
-        threshold,
-    )
+    limits = ActuatorLimits.of(robot.parameters) if limits is None else limits
+    return size_actuators(times, np.asarray(force), legs.speed, legs.length, limits, threshold)
 
 
 def size_actuators(
@@ -123,14 +115,10 @@ def size_actuators(
     times = _checked_time(time)
     if not 0 < threshold < 1:
         raise InputError(f"threshold = {threshold}: it must be between 0 and 1")
-    arrays = []
-    for name, value in (("force", force), ("speed", speed), ("length", length)):
-        array = real_array(value, name, (3,))
-        if array.shape != (len(times), 3):
-            raise InputError(f"{name} has shape {array.shape}; it must be {len(times), 3}")
-        arrays.append(array)
+    given = (("force", force), ("speed", speed), ("length", length))
+    arrays = [_samples(value, name, len(times)) for name, value in given]
     actuators = tuple(
-        _sizing(leg, times, tuple(array[:, leg] for array in arrays), limits, threshold)
+        _sizing(leg, times, [array[:, leg] for array in arrays], limits, threshold)
         for leg in range(3)
     )
     return SizingSheet(actuators, limits, threshold, times, arrays[0], arrays[1])
@@ -140,11 +128,7 @@ def size_actuators(
 
 
 def _sizing(
-    leg: int,
-    time: Array,
-    series: tuple[Array, ...],
-    limits: ActuatorLimits,
-    threshold: float,
+    leg: int, time: Array, series: list[Array], limits: ActuatorLimits, threshold: float
 ) -> ActuatorSizing:
     """Return one actuator's demands from its force, speed and length, shape (n,) each."""
     force, speed, length = series
@@ -154,19 +138,13 @@ def _sizing(
     peak = int(np.abs(force).argmax())
     peaks = [float(np.abs(values).max()) for values in (force, speed, power)]
     shortest, longest = float(length.min()), float(length.max())
-    margins = [
-        Margin(name, value, limit, limit - value, unit)
-        for name, value, limit, unit in (
-            ("force", peaks[0], limits.force, "N"),
-            ("speed", peaks[1], limits.speed, "m/s"),
-            ("power", peaks[2], limits.power, "W"),
-        )
-    ]
-    margins.append(
-        Margin("shortest leg", shortest, limits.length[0], shortest - limits.length[0], "m")
-    )
-    margins.append(
-        Margin("longest leg", longest, limits.length[1], limits.length[1] - longest, "m")
+    low, high = limits.length
+    margins = (
+        Margin("force", peaks[0], limits.force, limits.force - peaks[0], "N"),
+        Margin("speed", peaks[1], limits.speed, limits.speed - peaks[1], "m/s"),
+        Margin("power", peaks[2], limits.power, limits.power - peaks[2], "W"),
+        Margin("shortest leg", shortest, low, shortest - low, "m"),
+        Margin("longest leg", longest, high, high - longest, "m"),
     )
     # The square of a linear function has the mean (a^2 + a b + b^2) / 3.
     a, b = force[:-1], force[1:]
@@ -186,7 +164,7 @@ def _sizing(
         duty=time_above(np.abs(force), threshold * peaks[0], time) / duration,
         length_min=shortest,
         length_max=longest,
-        margins=tuple(margins),
+        margins=margins,
     )
 
 
@@ -208,6 +186,13 @@ def time_above(values: Array, level: float, time: Array) -> float:
     mixed = a * b < 0
     share = np.maximum(a, b) / np.where(mixed, np.abs(a) + np.abs(b), 1.0)
     return float((np.diff(time) * np.where(mixed, share, (a + b > 0))).sum())
+
+
+def _samples(value: ArrayLike, name: str, count: int) -> Array:
+    array = real_array(value, name, (3,))
+    if array.shape != (count, 3):
+        raise InputError(f"{name} has shape {array.shape}; with these times it must be {count, 3}")
+    return array
 
 
 def _checked_time(time: ArrayLike) -> Array:
@@ -234,18 +219,9 @@ def _refuse_bad_samples(robot: RPSRobot, time: Array, pose: Array, refused: Bool
                 f"at t = {time[first]:.6g} s: {error}", error.violations
             ) from None
         except SingularityError as error:
-            raise SingularityError(
-                f"at t = {time[first]:.6g} s the motion meets a singularity: {error}",
-                error.condition,
-                error.limit,
-            ) from None
+            raise singular_sample(time[first], error) from None
     sign = np.sign(singularity_measures(robot.parameters, pose).determinant)
     crossing = sign[:-1] * sign[1:] < 0
     if crossing.any():
         i = int(np.argmax(crossing))
-        raise SingularityError(
-            f"between t = {time[i]:.6g} s and {time[i + 1]:.6g} s the motion crosses a "
-            "singularity: no actuator forces carry the robot through it",
-            math.inf,
-            robot.mechanism.max_condition,
-        )
+        raise crossed_singularity(time[i], time[i + 1], robot)

@@ -146,14 +146,28 @@ class SizingSheet:
 
     def table(self) -> Table:
         """Return the sheet as a table for a terminal; limits that are broken are marked."""
-        return _table(self)
+        table = Table(title="Actuator sizing")
+        table.add_column("")
+        for actuator in self.actuators:
+            table.add_column(f"actuator {actuator.actuator}", justify="right")
+        for label, name in _ROWS.items():
+            table.add_row(label, *(f"{getattr(each, name):.4g}" for each in self.actuators))
+        label = f"time above {self.threshold:.0%} of peak force"
+        table.add_row(label, *(f"{each.duty:.1%}" for each in self.actuators), end_section=True)
+        for margins in zip(*(each.margins for each in self.actuators), strict=True):
+            if math.isfinite(margins[0].margin):
+                label = f"{margins[0].quantity}: margin to {margins[0].limit:.4g} {margins[0].unit}"
+                broken = "[bold red]{:.4g} BROKEN[/]"
+                cells = [
+                    ("{:.4g}" if each.kept else broken).format(each.margin) for each in margins
+                ]
+                table.add_row(label, *cells)
+        return table
 
     def text(self, width: int = 100) -> str:
         """Return the table as plain text."""
-        console = Console(file=io.StringIO(), width=width, color_system=None)
-        console.print(self.table())
-        written = console.file
-        assert isinstance(written, io.StringIO)
+        written = io.StringIO()
+        Console(file=written, width=width, color_system=None).print(self.table())
         return written.getvalue()
 
     def __str__(self) -> str:
@@ -161,47 +175,21 @@ class SizingSheet:
 
 
 def _plain(actuator: ActuatorSizing) -> dict[str, Any]:
-    data = {name: value for name, value in vars(actuator).items() if name != "margins"}
-    data["stroke"] = actuator.stroke
-    data["margins"] = [
-        {
-            "quantity": margin.quantity,
-            "value": margin.value,
-            "limit": margin.limit if math.isfinite(margin.limit) else None,
-            "margin": margin.margin if math.isfinite(margin.margin) else None,
-            "unit": margin.unit,
-            "kept": margin.kept,
-        }
-        for margin in actuator.margins
+    margins = [
+        {name: None if value == math.inf else value for name, value in one.items()}
+        for one in (margin._asdict() | {"kept": margin.kept} for margin in actuator.margins)
     ]
-    return data
+    return vars(actuator) | {"stroke": actuator.stroke, "margins": margins}
 
 
-def _table(sheet: SizingSheet) -> Table:
-    table = Table(title="Actuator sizing")
-    table.add_column("")
-    for actuator in sheet.actuators:
-        table.add_column(f"actuator {actuator.actuator}", justify="right")
-    rows = [
-        ("peak force (N)", "force_peak"),
-        ("RMS force (N)", "force_rms"),
-        ("peak speed (m/s)", "speed_peak"),
-        ("peak power (W)", "power_peak"),
-        ("mean power (W)", "power_mean"),
-        ("energy driven (J)", "energy_driven"),
-        ("energy regenerated (J)", "energy_regenerated"),
-        ("stroke (m)", "stroke"),
-    ]
-    for label, name in rows:
-        table.add_row(label, *(f"{getattr(each, name):.4g}" for each in sheet.actuators))
-    label = f"time above {sheet.threshold:.0%} of peak force"
-    table.add_row(label, *(f"{each.duty:.1%}" for each in sheet.actuators), end_section=True)
-    for index, margin in enumerate(sheet.actuators[0].margins):
-        if math.isfinite(margin.margin):
-            cells = [_margin_cell(each.margins[index]) for each in sheet.actuators]
-            table.add_row(f"{margin.quantity}: margin to {margin.limit:.4g} {margin.unit}", *cells)
-    return table
-
-
-def _margin_cell(margin: Margin) -> str:
-    return f"{margin.margin:.4g}" if margin.kept else f"[bold red]{margin.margin:.4g} BROKEN[/]"
+#: Rows of the table: labels, and attributes of `ActuatorSizing`.
+_ROWS = {
+    "peak force (N)": "force_peak",
+    "RMS force (N)": "force_rms",
+    "peak speed (m/s)": "speed_peak",
+    "peak power (W)": "power_peak",
+    "mean power (W)": "power_mean",
+    "energy driven (J)": "energy_driven",
+    "energy regenerated (J)": "energy_regenerated",
+    "stroke (m)": "stroke",
+}

@@ -12,10 +12,15 @@ one leg; arrays may hold all three.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number, sqrt
 from rps_pin.rps.kernels.platform import Vector
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions
+
+#: Of a tip, radial and up.
+Pair = Sequence[Number]
 
 
 @kernel
@@ -47,6 +52,19 @@ def leg_acceleration(
         along + d * (angle_rate * angle_rate),
         (across - 2.0 * speed * angle_rate) / d,
     )
+
+
+@kernel
+def leg_motion(
+    cosine: Number, sine: Number, d: Number, velocity: Pair, acceleration: Pair
+) -> tuple[Number, Number, Number, Number]:
+    """Return d', phi', d'' and phi'' for a tip's velocity and acceleration, radial and up."""
+    speed = along_leg(cosine, sine, velocity[0], velocity[1])
+    angle_rate = across_leg(cosine, sine, velocity[0], velocity[1]) / d
+    along = along_leg(cosine, sine, acceleration[0], acceleration[1])
+    across = across_leg(cosine, sine, acceleration[0], acceleration[1])
+    push, turn = leg_acceleration(speed, angle_rate, d, along, across)
+    return speed, angle_rate, push, turn
 
 
 @kernel

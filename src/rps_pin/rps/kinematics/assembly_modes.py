@@ -30,18 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.errors import InputError
 from rps_pin.rps.kernels import leg_equations as eq
-from rps_pin.rps.kinematics.leg_equations import (
-    WITHIN,
-    checked_lengths,
-    checked_radii,
-    closing_tolerance,
-    cosines_determinant,
-    determinant,
-    jacobian,
-    newton,
-    placement_from_angles,
-    residuals,
-)
+from rps_pin.rps.kinematics import leg_equations as equations
 
 #: The triple each candidate belongs to, (m,), and its tips w and z, (3, m) each.
 Candidates = tuple[Indices, Array, Array]
@@ -128,8 +117,8 @@ def assembly_modes(length: ArrayLike, base_radius: float, platform_radius: float
         If the lengths have the wrong shape, a number is not finite and positive, or a leg is longer
         than 100 (g + h): there rounding would hide solutions.
     """
-    lengths = checked_lengths(length)
-    g, h = checked_radii(base_radius, platform_radius)
+    lengths = equations.checked_lengths(length)
+    g, h = equations.checked_radii(base_radius, platform_radius)
     if lengths.max(initial=0.0) > longest_leg(g, h):
         raise InputError(
             f"a leg is {lengths.max():.6g} m long; all solutions can be found up to "
@@ -166,52 +155,31 @@ def eliminant(length: Array, cosine: Array, base_radius: float, platform_radius:
     base_radius, platform_radius
         The paper's g and h, m.
     """
-    line = _lines(np.moveaxis(length, -1, 0), cosine, base_radius, platform_radius)
-    a, b, c, d = line.alpha, line.beta, line.gamma, line.delta
+    lines = _lines(np.moveaxis(length, -1, 0), cosine, base_radius, platform_radius)
+    _, _, n, _, _, r2, q2, a, b, c, d = lines
     # (alpha + beta r)^2 - q^2 (gamma + delta r)^2 = A + B r; times itself at -r.
-    even = a * a + b * b * line.r2 - line.q2 * (c * c + d * d * line.r2)
-    odd = 2 * (a * b - line.q2 * c * d)
-    value: Array = (even * even - line.r2 * odd * odd) / line.n**4
+    even = a * a + b * b * r2 - q2 * (c * c + d * d * r2)
+    odd = 2 * (a * b - q2 * c * d)
+    value: Array = (even * even - r2 * odd * odd) / n**4
     return value
 
 
 # From lengths to polished solutions ---------------------------------------------------------------
 
 
-class _Lines(NamedTuple):
-    """Equations of legs 2 and 3 for an angle of leg 1; see the module's docstring."""
+def _lines(d: Array, x: Array, g: float, h: float) -> tuple[Array, ...]:
+    """Return the equations of legs 2 and 3 for an angle of leg 1; see the module's docstring.
 
-    m1: Array
-    z1: Array
-    n: Array
-    e2: Array
-    e3: Array
-    r2: Array
-    q2: Array
-    alpha: Array
-    beta: Array
-    gamma: Array
-    delta: Array
-
-
-def _lines(d: Array, x: Array, g: float, h: float) -> _Lines:
+    m_1, z_1, N, e_2, e_3, r^2, q^2, alpha, beta, gamma, delta.
+    """
     k12, k23, k31 = eq.constants(d, g, h)
     m1, z1 = 3 * g - d[0] * x, d[0] * np.sqrt((1 - x) * (1 + x))
     e2, e3 = 3 * g * m1 + k12, 3 * g * m1 + k31
     n = m1 * m1 + 4 * z1 * z1
-    return _Lines(
-        m1=m1,
-        z1=z1,
-        n=n,
-        e2=e2,
-        e3=e3,
-        r2=d[1] ** 2 * n - e2 * e2,
-        q2=d[2] ** 2 * n - e3 * e3,
-        alpha=(3 * g * n - e2 * m1) * (3 * g * n - e3 * m1) - 8 * z1 * z1 * e2 * e3 + k23 * n * n,
-        beta=6 * z1 * (g * n - m1 * e3),
-        gamma=6 * z1 * (g * n - m1 * e2),
-        delta=4 * z1 * z1 - 2 * m1 * m1,
-    )
+    r2, q2 = d[1] ** 2 * n - e2 * e2, d[2] ** 2 * n - e3 * e3
+    alpha = (3 * g * n - e2 * m1) * (3 * g * n - e3 * m1) - 8 * z1 * z1 * e2 * e3 + k23 * n * n
+    beta, gamma = 6 * z1 * (g * n - m1 * e3), 6 * z1 * (g * n - m1 * e2)
+    return m1, z1, n, e2, e3, r2, q2, alpha, beta, gamma, 4 * z1 * z1 - 2 * m1 * m1
 
 
 def _solutions(length: Array, g: float, h: float) -> tuple[Array, Indices]:
@@ -295,15 +263,15 @@ def _candidates(length: Array, x: Array, g: float, h: float) -> Candidates:
     """Return what the first leg's cosines x, (n, 8), make of the other legs."""
     owner, column = np.nonzero(~np.isnan(x))
     d, cosine = length[owner].T, x[owner, column]
-    line = _lines(d, cosine, g, h)
-    r, q = np.sqrt(np.maximum(line.r2, 0.0)), np.sqrt(np.maximum(line.q2, 0.0))
+    m1, z1, n, e2, e3, r2, q2, alpha, beta, gamma, delta = _lines(d, cosine, g, h)
+    r, q = np.sqrt(np.maximum(r2, 0.0)), np.sqrt(np.maximum(q2, 0.0))
     sign_r, sign_q = np.array([[1.0], [1.0], [-1.0], [-1.0]]), np.array([[1.0], [-1.0]] * 2)
     r, q = sign_r * r, sign_q * q
-    gap = np.abs(line.alpha + line.beta * r + line.gamma * q + line.delta * r * q)
-    gap /= 3 * h * h * line.n**2
+    gap = np.abs(alpha + beta * r + gamma * q + delta * r * q)
+    gap /= 3 * h * h * n**2
     choice, which = np.nonzero((gap < _NEARLY_CLOSED) | (gap == gap.min(axis=0)))
     r, q = r[choice, which], q[choice, which]
-    m1, z1, n, e2, e3 = (values[which] for values in line[:5])
+    m1, z1, n, e2, e3 = (values[which] for values in (m1, z1, n, e2, e3))
     w = np.stack([3 * g - m1, (m1 * e2 - 2 * z1 * r) / n, (m1 * e3 - 2 * z1 * q) / n])
     z = np.stack([z1, (2 * z1 * e2 + m1 * r) / n, (2 * z1 * e3 + m1 * q) / n])
     return owner[which], *_on_circles(length[owner[which]].T, w, z)
@@ -312,17 +280,17 @@ def _candidates(length: Array, x: Array, g: float, h: float) -> Candidates:
 def _polished(length: Array, owner: Indices, w: Array, z: Array, g: float, h: float) -> Candidates:
     """Return the candidates that Newton's method turns into solutions."""
     d = length[owner].T
-    tolerance = closing_tolerance(d, g, h)
+    tolerance = equations.closing_tolerance(d, g, h)
     # Stop at the tolerance: beside a double solution, more steps would lead away again. Then take
     # as many as make it better.
-    newton(d, w, z, g, h, 0.5 * tolerance / WITHIN, _STEPS)
+    equations.newton(d, w, z, g, h, 0.5 * tolerance / equations.WITHIN, _STEPS)
     error = eq.largest(eq.distance_errors(w, z, g, h))
     closed = np.flatnonzero(error <= tolerance)
     owner, d, w, z, error = owner[closed], d[:, closed], w[:, closed], z[:, closed], error[closed]
     better = np.flatnonzero(error > _ROUNDING * (g + h))
     for _ in range(_POLISHING_STEPS):
         w_next, z_next = w[:, better], z[:, better]
-        newton(d[:, better], w_next, z_next, g, h, 0.0, 1)
+        equations.newton(d[:, better], w_next, z_next, g, h, 0.0, 1)
         error_next = eq.largest(eq.distance_errors(w_next, z_next, g, h))
         gain = error_next < error[better]
         better = better[gain]
@@ -341,16 +309,16 @@ def _twins(length: Array, owner: Indices, w: Array, z: Array, g: float, h: float
     """
     d = length[owner].T
     angle = np.arctan2(z, w)
-    det = cosines_determinant(d, w, z, g, h)
+    det = equations.cosines_determinant(d, w, z, g, h)
     near = np.abs(det) < _FOLD_BELOW
     owner, d, angle = owner[near], d[:, near], angle[:, near]
     if not len(owner):
         return owner, d, d
-    u, sigma, v = np.linalg.svd(jacobian(d.T, angle.T, g, h))
+    u, sigma, v = np.linalg.svd(equations.jacobian(d.T, angle.T, g, h))
     left, small, right = u[:, :, 2], sigma[:, 2], v[:, 2, :]
     step = 1e-4
     ahead, behind = (
-        np.einsum("nij,nj->ni", jacobian(d.T, angle.T + side * step * right, g, h), right)
+        np.einsum("nij,nj->ni", equations.jacobian(d.T, angle.T + side * step * right, g, h), right)
         for side in (1, -1)
     )
     curvature = np.einsum("ni,ni->n", left, ahead - behind) / (2 * step)
@@ -364,7 +332,7 @@ def _twins(length: Array, owner: Indices, w: Array, z: Array, g: float, h: float
 def _flat(length: Array, g: float, h: float) -> Candidates:
     """Return the solutions with all tips on the base plane: highly singular, so tried directly."""
     w = length.T[:, :, None] * _SIDES[:, None, :]
-    tolerance = closing_tolerance(length.T, g, h)
+    tolerance = equations.closing_tolerance(length.T, g, h)
     closed = eq.largest(eq.distance_errors(w, 0 * w, g, h)) <= tolerance[:, None]
     owner, side = np.nonzero(closed)
     w = w[:, owner, side]
@@ -385,7 +353,7 @@ def _distinct(
     first = np.where(raised[0] != 0, raised[0], np.where(raised[1] != 0, raised[1], raised[2]))
     height = z.sum(axis=0)
     z = np.where(np.where(np.abs(height) > 1e-9 * size, height, first) < 0, -z, z)
-    det = cosines_determinant(d, w, z, g, h)
+    det = equations.cosines_determinant(d, w, z, g, h)
 
     # Flat ones first, then the best closed, so that of those that coincide the best is kept.
     error = eq.largest(eq.distance_errors(w, z, g, h))
@@ -451,9 +419,9 @@ def _described(length: Array, angle: Array, mirror: Indices, g: float, h: float)
     exists = mirror >= 0
     d = np.broadcast_to(length[:, None], angle.shape)[exists]
     phi = angle[exists]
-    place = placement_from_angles(d, phi, g, h)
-    det = determinant(d, phi, g, h)
-    residual = np.abs(residuals(d, phi, g, h)).max(axis=-1, initial=0.0)
+    place = equations.placement_from_angles(d, phi, g, h)
+    det = equations.determinant(d, phi, g, h)
+    residual = np.abs(equations.residuals(d, phi, g, h)).max(axis=-1, initial=0.0)
 
     def padded(values: NDArray[Any], fill: float | bool) -> NDArray[Any]:
         whole = np.full((*exists.shape, *values.shape[1:]), fill)

@@ -10,6 +10,7 @@ or crosses to where the lengths no longer tell which way the platform goes. It i
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,20 +18,15 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from rps_pin.arrays import Array, Bools
-from rps_pin.errors import ClosureError, InputError, SingularityError
+from rps_pin.errors import ClosureError, SingularityError
 from rps_pin.rps.kernels.continuation import follow_legs, newton_step
+from rps_pin.rps.kinematics import leg_equations as equations
 from rps_pin.rps.kinematics.assembly_modes import assembly_modes, longest_leg
-from rps_pin.rps.kinematics.leg_equations import (
-    checked_lengths,
-    checked_radii,
-    placement_from_angles,
-    residuals,
-)
 from rps_pin.rps.kinematics.legs import geometry_of_pose, refuse_vanishing
 from rps_pin.rps.kinematics.pose import checked_pose
 from rps_pin.rps.kinematics.samples import Errors, maskable, refuse
 from rps_pin.rps.kinematics.tracking import LegDirections, Lengths, condition_of, follow, pose_of
-from rps_pin.validation import one_shape, positive_number, whole_number
+from rps_pin.validation import one_shape, positive_number, real_vector, whole_number
 
 #: Largest condition number of Eq. 8's Jacobian through which a pose is followed.
 CONDITION_LIMIT = 1e6
@@ -96,9 +92,11 @@ def forward_kinematics(
     UnreachableError
         If a leg has no length in a pose of `near`.
     """
-    g, h = checked_radii(base_radius, platform_radius)
+    g, h = equations.checked_radii(base_radius, platform_radius)
     limit = positive_number(condition_limit, "condition_limit")
-    wanted, start = one_shape(length=checked_lengths(length), near=checked_pose(near, "near"))
+    wanted, start = one_shape(
+        length=equations.checked_lengths(length), near=checked_pose(near, "near")
+    )
     shape = wanted.shape
     goal = wanted.reshape(-1, 3)
     begin, *legs = (array.reshape(-1, 3) for array in _legs_of(start, g, h))
@@ -112,7 +110,8 @@ def forward_kinematics(
         d = goal[i]
         asked = f"leg lengths ({d[0]:.6g}, {d[1]:.6g}, {d[2]:.6g}) m{where}"
         if d.max() <= longest_leg(g, h) and not len(assembly_modes(d, g, h).angle):
-            best = least_squares(_residuals_of, angle[i], args=(d, g, h))
+            off = partial(equations.residuals, d, base_radius=g, platform_radius=h)
+            best = least_squares(off, angle[i])
             gap = float(np.abs(best.fun).max())
             return ClosureError(
                 f"{asked} cannot close: no pose of the platform has them; nearest to the one "
@@ -130,7 +129,7 @@ def forward_kinematics(
     if errors == "raise":
         refuse(~reached.reshape(batch), error)
     there = np.where(reached[:, None], goal, begin + fraction[:, None] * (goal - begin))
-    found = placement_from_angles(there, angle, g, h).pose
+    found = equations.placement_from_angles(there, angle, g, h).pose
     return ForwardKinematics(
         found.reshape(shape),
         angle.reshape(shape),
@@ -154,9 +153,7 @@ def start_of(
     SingularityError
         If its condition is above the limit.
     """
-    pose = checked_pose(near, "near")
-    if pose.shape != (3,):
-        raise InputError(f"near has shape {pose.shape}; it must be (3,)")
+    pose = real_vector(near, 3, "near")
     (d1, d2, d3), (c1, c2, c3), (s1, s2, s3) = (array.tolist() for array in _legs_of(pose, g, h))
     d, directions = (d1, d2, d3), (c1, c2, c3, s1, s2, s3)
     condition = condition_of(d, directions, g, h)
@@ -211,7 +208,7 @@ class EncoderTracker:
         condition_limit: float = CONDITION_LIMIT,
         most_steps: int = 100,
     ) -> None:
-        self._g, self._h = checked_radii(base_radius, platform_radius)
+        self._g, self._h = equations.checked_radii(base_radius, platform_radius)
         self._limit = positive_number(condition_limit, "condition_limit")
         self._most = whole_number(most_steps, "most_steps")
         self._pose = np.empty(3)
@@ -327,19 +324,9 @@ def follow_many(
     return direction, done, condition
 
 
-def _residuals_of(angle: Array, length: Array, g: float, h: float) -> Array:
-    return residuals(length, angle, g, h)
-
-
 def _reading(length: ArrayLike) -> Lengths:
     """Return a reading as three floats, checked."""
-    if type(length) is np.ndarray and length.shape == (3,) and length.dtype == np.float64:
-        d1, d2, d3 = length.tolist()
-    else:
-        array = checked_lengths(length)
-        if array.shape != (3,):
-            raise InputError(f"length has shape {array.shape}; it must be (3,)")
-        d1, d2, d3 = array.tolist()
-    if not (0 < d1 < math.inf and 0 < d2 < math.inf and 0 < d3 < math.inf):
-        checked_lengths(length)
+    d1, d2, d3 = real_vector(length, 3, "length").tolist()
+    if not (d1 > 0 and d2 > 0 and d3 > 0):
+        equations.checked_lengths(length)
     return d1, d2, d3

@@ -11,16 +11,7 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.errors import UnreachableError
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips
-from rps_pin.rps.kinematics.legs import (
-    LegGeometry,
-    LegMotion,
-    Legs,
-    geometry_of_pose,
-    leg_motion,
-    refuse_vanishing,
-    violations,
-    within_limits,
-)
+from rps_pin.rps.kinematics import legs as leg_kinematics
 from rps_pin.rps.kinematics.pose import checked_pose, tilt_of
 from rps_pin.rps.kinematics.samples import Errors, check_errors_option, refuse
 from rps_pin.rps.parameters import RPSParameters
@@ -28,26 +19,28 @@ from rps_pin.rps.parameters import RPSParameters
 
 def inverse_kinematics(
     parameters: RPSParameters, pose: ArrayLike, *, errors: Errors = "raise"
-) -> Legs:
+) -> leg_kinematics.Legs:
     """Return leg lengths and angles; see `RPSRobot.inverse_kinematics`."""
     check_errors_option(errors)
     x = checked_pose(pose)
-    legs = geometry_of_pose(x, parameters.base_radius, parameters.platform_radius)
+    legs = leg_kinematics.geometry_of_pose(x, parameters.base_radius, parameters.platform_radius)
     reachable = _reachable(parameters, x, legs, errors)
-    return Legs(legs.length, legs.angle, reachable & ~legs.vanishing.any(axis=-1))
+    return leg_kinematics.Legs(legs.length, legs.angle, reachable & ~legs.vanishing.any(axis=-1))
 
 
 def reachable_motion(
     parameters: RPSParameters, pose: Array, rate: Array, acceleration: Array
-) -> LegMotion:
+) -> leg_kinematics.LegMotion:
     """Return how the legs move, or refuse a pose beyond their limits."""
     g, h = parameters.base_radius, parameters.platform_radius
-    legs = geometry_of_pose(pose, g, h)
+    legs = leg_kinematics.geometry_of_pose(pose, g, h)
     _reachable(parameters, pose, legs, "raise")
-    return leg_motion(pose, rate, acceleration, h, g, legs)
+    return leg_kinematics.leg_motion(pose, rate, acceleration, h, g, legs)
 
 
-def spherical_angles(parameters: RPSParameters, pose: Array, legs: LegGeometry) -> Array:
+def spherical_angles(
+    parameters: RPSParameters, pose: Array, legs: leg_kinematics.LegGeometry
+) -> Array:
     """Return the angle between each leg and its joint's rest axis, shape (..., 3 legs), rad."""
     x, y, tilt = tilt_of(pose)
     rest = math.cos(parameters.spherical_rest_angle), math.sin(parameters.spherical_rest_angle)
@@ -61,15 +54,17 @@ def spherical_angles(parameters: RPSParameters, pose: Array, legs: LegGeometry) 
     return np.moveaxis(angles, 0, -1)
 
 
-def _reachable(parameters: RPSParameters, pose: Array, legs: LegGeometry, errors: Errors) -> Bools:
+def _reachable(
+    parameters: RPSParameters, pose: Array, legs: leg_kinematics.LegGeometry, errors: Errors
+) -> Bools:
     """Return whether each pose keeps its limits, or refuse the first that does not."""
     if errors == "raise":
-        refuse_vanishing(legs.length, legs.vanishing)
+        leg_kinematics.refuse_vanishing(legs.length, legs.vanishing)
     length, angle, cone = legs.length, legs.angle, spherical_angles(parameters, pose, legs)
-    reachable = within_limits(parameters, length, angle, cone)
+    reachable = leg_kinematics.within_limits(parameters, length, angle, cone)
 
     def error(first: tuple[int, ...], where: str) -> UnreachableError:
-        broken = violations(parameters, length[first], angle[first], cone[first])
+        broken = leg_kinematics.violations(parameters, length[first], angle[first], cone[first])
         z, tilt_x, tilt_y = pose[first]
         return UnreachableError(
             f"pose z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad{where} is out of "

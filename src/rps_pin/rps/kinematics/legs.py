@@ -168,12 +168,7 @@ def leg_motion(
     moving = (x, y, dx, dy, ddx, ddy)
     changes = [at_legs(one) for one in ring.tip_accelerations(moving, ddz, tilt, h)]
     d, cosine, sine, _ = legs
-    speed = kernels.along_leg(cosine, sine, *rates)
-    angle_rate = kernels.across_leg(cosine, sine, *rates) / d
-    along = kernels.along_leg(cosine, sine, *changes)
-    across = kernels.across_leg(cosine, sine, *changes)
-    accelerations = kernels.leg_acceleration(speed, angle_rate, d, along, across)
-    return LegMotion(d, legs.angle, speed, angle_rate, *accelerations)
+    return LegMotion(d, legs.angle, *kernels.leg_motion(cosine, sine, d, rates, changes))
 
 
 def rest_axes(rest_angle: float) -> Array:

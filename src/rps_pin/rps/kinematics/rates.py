@@ -12,7 +12,6 @@ messages, 0 to 2 in arrays.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,14 +22,8 @@ from rps_pin.closed_loop.constraints.system import MAX_CONDITION
 from rps_pin.errors import InputError, SingularityError
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips as ring
+from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.legs import at_legs, leg_geometry, refuse_vanishing
-from rps_pin.rps.kinematics.pose import (
-    checked_motion,
-    checked_pose,
-    components,
-    platform_motion,
-    tilt_of,
-)
 from rps_pin.rps.kinematics.samples import Errors, check_errors_option, maskable, refuse
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.validation import one_shape, real_array
@@ -124,9 +117,9 @@ def tip_jacobians(parameters: RPSParameters, pose: ArrayLike) -> TipJacobians:
     InputError
         If the pose has the wrong shape or is not finite.
     """
-    x = checked_pose(pose)
-    h, z = parameters.platform_radius, components(x)[0]
-    tilt_x, tilt_y, tilt = tilt_of(x)
+    x = poses.checked_pose(pose)
+    h, z = parameters.platform_radius, poses.components(x)[0]
+    tilt_x, tilt_y, tilt = poses.tilt_of(x)
     radial, height = ring.tips(z, tilt_x, tilt_y, tilt, h)
     slopes = ring.tip_slopes(tilt_x, tilt_y, tilt)
     return TipJacobians(at_legs(radial), at_legs(height), *_by_pose(slopes, h, by_z=1.0))
@@ -152,9 +145,9 @@ def tip_jacobian_rates(
     InputError
         If an argument has the wrong shape or is not finite.
     """
-    x, dx, _ = checked_motion(pose, rate)
-    tilt_x, tilt_y, tilt = tilt_of(x)
-    _, tilt_x_rate, tilt_y_rate = components(dx)
+    x, dx, _ = poses.checked_motion(pose, rate)
+    tilt_x, tilt_y, tilt = poses.tilt_of(x)
+    _, tilt_x_rate, tilt_y_rate = poses.components(dx)
     slope_rates = ring.tip_slope_rates(tilt_x, tilt_y, tilt_x_rate, tilt_y_rate, tilt)
     return _by_pose(slope_rates, parameters.platform_radius, by_z=0.0)
 
@@ -206,7 +199,7 @@ def leg_jacobian_rates(
     InputError, UnreachableError
         As `leg_jacobians`.
     """
-    x, dx, _ = checked_motion(pose, rate)
+    x, dx, _ = poses.checked_motion(pose, rate)
     legs = leg_jacobians(parameters, x)
     return jacobian_rates_of_legs(parameters, x, dx, legs)
 
@@ -233,7 +226,7 @@ def jacobian_rates_of_legs(
     changes = tip_jacobian_rates(parameters, pose, rate)
     lever = np.maximum(legs.length, 1e-9 * parameters.base_radius)[..., None]
     K, N = legs.length_jacobian, legs.angle_jacobian
-    speed, turning = _times(K, rate)[..., None], _times(N, rate)[..., None]
+    speed, turning = times(K, rate)[..., None], times(N, rate)[..., None]
     cosine, sine = np.cos(legs.angle)[..., None], np.sin(legs.angle)[..., None]
     return LegJacobianRates(
         # (cos)' = -sin phi', (sin)' = cos phi'; sin d(rho) + cos d(z) = d N.
@@ -278,8 +271,9 @@ def pose_rate(
     SingularityError
         If K is too near a singular matrix: the gain and its limit are in the message.
     """
-    x, speed = one_shape(pose=checked_pose(pose), leg_speed=checked_legs(leg_speed))
-    return _solved(parameters, x, lambda _: speed, errors, max_gain)
+    speeds = real_array(leg_speed, "leg_speed", (3,), "legs 1, 2, 3")
+    x, speed = one_shape(pose=poses.checked_pose(pose), leg_speed=speeds)
+    return _solved(parameters, masked_leg_jacobians(parameters, x), speed, errors, max_gain)
 
 
 def pose_acceleration(
@@ -308,16 +302,14 @@ def pose_acceleration(
         As `pose_rate`.
     """
     x, dx, acceleration = one_shape(
-        pose=checked_pose(pose),
-        rate=checked_pose(rate, "rate"),
-        leg_acceleration=checked_legs(leg_acceleration, "leg_acceleration"),
+        pose=poses.checked_pose(pose),
+        rate=poses.checked_pose(rate, "rate"),
+        leg_acceleration=real_array(leg_acceleration, "leg_acceleration", (3,), "legs 1, 2, 3"),
     )
-
-    def right_side(legs: LegJacobians) -> Array:
-        change = jacobian_rates_of_legs(parameters, x, dx, legs)
-        return acceleration - _times(change.length_jacobian, dx)
-
-    return _solved(parameters, x, right_side, errors, max_gain)
+    legs = masked_leg_jacobians(parameters, x)
+    change = jacobian_rates_of_legs(parameters, x, dx, legs[0])
+    needed = acceleration - times(change.length_jacobian, dx)
+    return _solved(parameters, legs, needed, errors, max_gain)
 
 
 # The platform -------------------------------------------------------------------------------------
@@ -341,21 +333,18 @@ def platform_twist(
     InputError
         If an argument has the wrong shape or is not finite.
     """
-    motion = platform_motion(*checked_motion(pose, rate, acceleration), parameters.platform_radius)
+    given = poses.checked_motion(pose, rate, acceleration)
+    motion = poses.platform_motion(*given, parameters.platform_radius)
     # omega = R omega_platform, and omega' = R omega_platform' since omega x omega = 0.
-    twist = np.concatenate(
-        [motion.velocity, _times(motion.rotation, motion.angular_velocity)], axis=-1
-    )
-    twist_rate = np.concatenate(
-        [motion.acceleration, _times(motion.rotation, motion.angular_acceleration)], axis=-1
-    )
     commanded = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 0.0])
-    return PlatformTwist(
-        commanded * twist,
-        (1 - commanded) * twist,
-        commanded * twist_rate,
-        (1 - commanded) * twist_rate,
-    )
+    parts = []
+    for linear, angular in (
+        (motion.velocity, motion.angular_velocity),
+        (motion.acceleration, motion.angular_acceleration),
+    ):
+        twist = np.concatenate([linear, times(motion.rotation, angular)], axis=-1)
+        parts += [commanded * twist, (1 - commanded) * twist]
+    return PlatformTwist(*parts)
 
 
 # Inner workings -----------------------------------------------------------------------------------
@@ -368,20 +357,21 @@ def _by_pose(slopes: ring.Slopes, h: float, by_z: float) -> tuple[Array, Array]:
     return np.stack([zero, rho_x, rho_y], axis=-1), np.stack([zero + by_z, z_x, z_y], axis=-1)
 
 
-def _times(matrix: Array, vector: Array) -> Array:
+def times(matrix: Array, vector: Array) -> Array:
+    """Return matrices (..., m, n) times vectors (..., n)."""
     product: Array = np.einsum("...ij,...j->...i", matrix, vector)
     return product
 
 
 def _solved(
     parameters: RPSParameters,
-    pose: Array,
-    right_side: Callable[[LegJacobians], Array],
+    masked: tuple[LegJacobians, Bools],
+    right_side: Array,
     errors: Errors,
     max_gain: float,
 ) -> PoseDerivative:
     """Solve K x = right side, with the tilts made lengths by h."""
-    legs, vanishing = masked_leg_jacobians(parameters, pose)
+    legs, vanishing = masked
     if errors == "raise":
         refuse_vanishing(legs.length, vanishing)
     units = np.array([1.0, *2 * [1 / parameters.platform_radius]])
@@ -394,7 +384,7 @@ def _solved(
         errors,
     )
     regular = np.where(determined[..., None, None], scaled, np.eye(3))
-    right = np.where(determined[..., None], right_side(legs), 0.0)
+    right = np.where(determined[..., None], right_side, 0.0)
     return PoseDerivative(units * np.linalg.solve(regular, right[..., None])[..., 0], determined)
 
 
@@ -435,8 +425,3 @@ def accepted_gains(
     if errors == "raise":
         refuse(~accepted, error)
     return accepted
-
-
-def checked_legs(value: ArrayLike, name: str = "leg_speed") -> Array:
-    """Return one number for each leg as finite numbers of shape (..., 3)."""
-    return real_array(value, name, (3,), "legs 1, 2, 3")

@@ -120,113 +120,78 @@ def poses_from(
     solve = _solver(given)
     arrays = {name: real_array(value, name) for name, value in given.items()}
     q = dict(zip(arrays, one_shape(**arrays), strict=True))
+    known = q | {"alpha": -q["gamma"]} if "gamma" in q else q
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is out of reach
-        found = solve(h, q | {"alpha": -q["gamma"]} if "gamma" in q else q)
+        if "z_1" in q:
+            known = _slopes(h, *q.values())
+        found = solve(h, known)
 
-    scale = h if found.unit == "m" else 1.0
-    slack = _ROUNDING * (found.upper - found.lower) + _LAST_DIGITS * scale
+    slack = _ROUNDING * (found.upper - found.lower) + _LAST_DIGITS * (h if found.unit else 1.0)
     reached = (found.value >= found.lower - slack) & (found.value <= found.upper + slack)
-    exists = reached[..., None] & found.isolated
+    exists = np.ones(found.tilt.shape[:-1], dtype=bool) & reached[..., None] & found.isolated
     tilt = np.where(exists[..., None], found.tilt, 0.0)
-    solutions = PoseSolutions(_pose(found.z[..., None], tilt), exists, found.continuum)
+    height = np.broadcast_to(known["z"][..., None, None], (*exists.shape, 1))
     if errors == "raise":
         refuse(~exists.any(axis=-1), partial(_error, q, found))
-    return solutions
+    pose = np.concatenate([height, tilt], axis=-1)
+    return PoseSolutions(pose, exists, np.zeros(reached.shape, dtype=bool) | found.continuum)
 
 
 class _Branches(NamedTuple):
     """Solutions of three quantities, and the condition under which they exist."""
 
-    z: Array
     tilt: Array  # (..., k, 2)
-    #: The quantity that decides: name, unit, value, and its range.
+    #: The quantity that decides: name, unit, value (...), and its range.
     name: str
     unit: str
     value: Array
-    lower: Array
-    upper: Array
-    isolated: Bools  # (..., k)
-    continuum: Bools  # (...)
+    lower: Array | float
+    upper: Array | float
+    isolated: Bools | bool = True  # (..., k)
+    continuum: Bools | bool = False  # (...)
 
 
 _Quantities = dict[str, Array]
 _Solver = Callable[[float, _Quantities], _Branches]
 
 
-def _all_isolated(value: Array, count: int) -> tuple[Bools, Bools]:
-    return np.ones((*value.shape, count), dtype=bool), np.zeros(value.shape, dtype=bool)
-
-
 def _from_angles(h: float, q: _Quantities) -> _Branches:
     tilt = _tilt(q["alpha"], q["beta"])[..., None, :]
-    zero = np.zeros_like(q["z"])
-    return _Branches(q["z"], tilt, "", "", zero, zero, zero, *_all_isolated(zero, 1))
+    return _Branches(tilt, "", "", np.zeros_like(q["z"]), 0.0, 0.0)
 
 
 def _from_centre(h: float, q: _Quantities) -> _Branches:
     shift = np.hypot(q["x"], q["y"])
     half_phi = np.arctan2(q["y"] + 0.0, q["x"]) / 2  # + 0.0: phi is pi, not -pi, at y = -0
     # p_x = r cos(phi), p_y = r sin(phi): r = h sin^2(beta/2), alpha = pi/2 - phi/2
-    plus = _tilt(np.pi / 2 - half_phi, _beta(shift / h))
-    return _Branches(
-        q["z"],
-        np.stack([plus, -plus], axis=-2),
-        "hypot(x, y)",
-        "m",
-        shift,
-        np.zeros_like(shift),
-        np.full_like(shift, h),
-        *_all_isolated(shift, 2),
-    )
+    tilt = _both_signs(np.pi / 2 - half_phi, shift / h)
+    return _Branches(tilt, "hypot(x, y)", "m", shift, 0.0, h)
 
 
-def _from_shift_and_alpha(name: str) -> _Solver:
-    def solve(h: float, q: _Quantities) -> _Branches:
-        shift, alpha = q[name], q["alpha"]
-        # p_x = -h cos(2 alpha) sin^2(beta/2), p_y = h sin(2 alpha) sin^2(beta/2)
-        slope = -np.cos(2 * alpha) if name == "x" else np.sin(2 * alpha)
-        blind = np.abs(slope) <= _ROUNDING  # the tilt does not move the centre this way
-        share = np.where(blind, 0.0, shift / h / np.where(blind, 1.0, slope))
-        plus = _tilt(alpha, _beta(share))
-        continuum = blind & (np.abs(shift) <= _ROUNDING * h)
-        return _Branches(
-            q["z"],
-            np.stack([plus, -plus], axis=-2),
-            name,
-            "m",
-            shift,
-            np.minimum(h * slope, 0.0),
-            np.maximum(h * slope, 0.0),
-            np.repeat(~continuum[..., None], 2, axis=-1),
-            continuum,
-        )
-
-    return solve
+def _from_shift_and_alpha(h: float, q: _Quantities) -> _Branches:
+    alpha = q["alpha"]
+    # p_x = -h cos(2 alpha) sin^2(beta/2), p_y = h sin(2 alpha) sin^2(beta/2)
+    name, slope = ("x", -np.cos(2 * alpha)) if "x" in q else ("y", np.sin(2 * alpha))
+    shift, lower, upper = q[name], np.minimum(h * slope, 0.0), np.maximum(h * slope, 0.0)
+    blind = np.abs(slope) <= _ROUNDING  # the tilt does not move the centre this way
+    share = np.where(blind, 0.0, shift / h / np.where(blind, 1.0, slope))
+    continuum = blind & (np.abs(shift) <= _ROUNDING * h)
+    tilt, isolated = _both_signs(alpha, share), ~continuum[..., None]
+    return _Branches(tilt, name, "m", shift, lower, upper, isolated, continuum)
 
 
-def _from_shift_and_beta(name: str) -> _Solver:
-    def solve(h: float, q: _Quantities) -> _Branches:
-        shift, beta = q[name], q["beta"]
-        reach = h * np.sin(beta / 2) ** 2
-        ratio = np.clip(shift, -reach, reach) / np.where(reach == 0, 1.0, reach)
-        if name == "x":  # p_x = -reach cos(2 alpha)
-            a = np.arccos(-ratio)
-            twice_alpha = np.stack([a, -a, a + 2 * np.pi, -a + 2 * np.pi], axis=-1)
-        else:  # p_y = reach sin(2 alpha)
-            a = np.arcsin(ratio)
-            twice_alpha = np.stack([a, np.pi - a, a + 2 * np.pi, 3 * np.pi - a], axis=-1)
-        return _Branches(
-            q["z"],
-            _tilt(twice_alpha / 2, beta[..., None]),
-            name,
-            "m",
-            shift,
-            0.0 - reach,
-            reach,
-            *_all_isolated(shift, 4),
-        )
-
-    return solve
+def _from_shift_and_beta(h: float, q: _Quantities) -> _Branches:
+    name, beta = "x" if "x" in q else "y", q["beta"]
+    reach = h * np.sin(beta / 2) ** 2
+    ratio = np.clip(q[name], -reach, reach) / np.where(reach == 0, 1.0, reach)
+    if name == "x":  # p_x = -reach cos(2 alpha)
+        a = np.arccos(-ratio)
+        twice_alpha = np.stack([a, -a, a + 2 * np.pi, -a + 2 * np.pi], axis=-1)
+    else:  # p_y = reach sin(2 alpha)
+        a = np.arcsin(ratio)
+        twice_alpha = np.stack([a, np.pi - a, a + 2 * np.pi, 3 * np.pi - a], axis=-1)
+    tilt = _tilt(twice_alpha / 2, beta[..., None])
+    return _Branches(tilt, name, "m", q[name], 0.0 - reach, reach)
 
 
 def _from_slopes(h: float, q: _Quantities) -> _Branches:
@@ -236,40 +201,26 @@ def _from_slopes(h: float, q: _Quantities) -> _Branches:
     # (u_z, v_z) = -sin(beta) (cos(alpha), sin(alpha)), so w = beta (v_z, -u_z) / sin(beta)
     axis = np.stack([v_z, -u_z], axis=-1) / np.where(flat, 1.0, sine)[..., None]
     beta = np.arcsin(np.minimum(sine, 1.0))[..., None]
-    return _Branches(
-        q["z"],
-        np.stack([beta * axis, (np.pi - beta) * axis], axis=-2),
-        "hypot(u_z, v_z)",
-        "",
-        sine,
-        np.zeros_like(sine),
-        np.ones_like(sine),
-        np.stack([np.ones_like(flat), ~flat], axis=-1),
-        flat,
-    )
+    tilt = np.stack([beta * axis, (np.pi - beta) * axis], axis=-2)
+    isolated = np.stack([np.ones_like(flat), ~flat], axis=-1)
+    return _Branches(tilt, "hypot(u_z, v_z)", "", sine, 0.0, 1.0, isolated, flat)
 
 
-def _from_tip_heights(h: float, q: _Quantities) -> _Branches:
-    z_1, z_2, z_3 = q["z_1"], q["z_2"], q["z_3"]
-    return _from_slopes(
-        h,
-        {
-            "z": z_1 / 3 + z_2 / 3 + z_3 / 3,  # Eq. 20
-            "u_z": ((z_1 - z_2) + (z_1 - z_3)) / (3 * h),  # third components of Eq. 2
-            "v_z": (z_2 - z_3) / (np.sqrt(3) * h),
-        },
-    )
+def _slopes(h: float, z_1: Array, z_2: Array, z_3: Array) -> _Quantities:
+    """Return height and slopes of the tips' heights: Eq. 20, and third components of Eq. 2."""
+    u_z, v_z = ((z_1 - z_2) + (z_1 - z_3)) / (3 * h), (z_2 - z_3) / (np.sqrt(3) * h)
+    return {"z": z_1 / 3 + z_2 / 3 + z_3 / 3, "u_z": u_z, "v_z": v_z}
 
 
 _SOLVERS: dict[frozenset[str], _Solver] = {
     frozenset({"z", "alpha", "beta"}): _from_angles,
     frozenset({"z", "x", "y"}): _from_centre,
-    frozenset({"z", "x", "alpha"}): _from_shift_and_alpha("x"),
-    frozenset({"z", "y", "alpha"}): _from_shift_and_alpha("y"),
-    frozenset({"z", "x", "beta"}): _from_shift_and_beta("x"),
-    frozenset({"z", "y", "beta"}): _from_shift_and_beta("y"),
+    frozenset({"z", "x", "alpha"}): _from_shift_and_alpha,
+    frozenset({"z", "y", "alpha"}): _from_shift_and_alpha,
+    frozenset({"z", "x", "beta"}): _from_shift_and_beta,
+    frozenset({"z", "y", "beta"}): _from_shift_and_beta,
     frozenset({"z", "u_z", "v_z"}): _from_slopes,
-    frozenset({"z_1", "z_2", "z_3"}): _from_tip_heights,
+    frozenset({"z_1", "z_2", "z_3"}): _from_slopes,
 }
 
 
@@ -300,12 +251,13 @@ def _error(
         f"{name} = {values[first]:.6g} {units.get(name, 'm')}".rstrip()
         for name, values in q.items()
     )
-    if found.continuum[first]:
+    if np.broadcast_to(found.continuum, found.value.shape)[first]:
         return InputError(
             f"{asked}{where}: this holds for every beta, so it determines no pose; give another "
             f"quantity than {found.name} or alpha"
         )
-    value, lower, upper = (float(x[first]) for x in (found.value, found.lower, found.upper))
+    ends = np.broadcast_arrays(found.value, found.lower, found.upper)
+    value, lower, upper = (float(end[first]) for end in ends)
     unit = f" {found.unit}" if found.unit else ""
     return UnreachableError(
         f"no pose has {asked}{where}: {found.name} would be {value:.6g}{unit}; it can be "
@@ -319,15 +271,10 @@ def _tilt(alpha: Array, beta: Array) -> Array:
     return np.stack([-beta * np.sin(alpha), beta * np.cos(alpha)], axis=-1)
 
 
-def _beta(share: Array) -> Array:
-    """Return the tilt whose sin^2(beta/2) is the given share of its largest value, 0 to 1.
+def _both_signs(alpha: Array, share: Array) -> Array:
+    """Return both tilts about alpha whose sin^2(beta/2) is a share, 0 to 1; shape (..., 2, 2).
 
     Shares beyond that are not reached, and are told apart by the caller.
     """
-    tilt: Array = 2 * np.arcsin(np.sqrt(np.clip(share, 0.0, 1.0)))
-    return tilt
-
-
-def _pose(z: Array, tilt: Array) -> Array:
-    height = np.broadcast_to(z[..., None], (*tilt.shape[:-1], 1))
-    return np.concatenate([height, tilt], axis=-1)
+    plus = _tilt(alpha, 2 * np.arcsin(np.sqrt(np.clip(share, 0.0, 1.0))))
+    return np.stack([plus, -plus], axis=-2)
