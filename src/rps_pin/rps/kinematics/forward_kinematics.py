@@ -326,7 +326,9 @@ def follow_many(
 
 def _reading(length: ArrayLike) -> Lengths:
     """Return a reading as three floats, checked."""
-    d1, d2, d3 = real_vector(length, 3, "length").tolist()
-    if not (d1 > 0 and d2 > 0 and d3 > 0):
+    if not (type(length) is np.ndarray and length.shape == (3,) and length.dtype == np.float64):
+        length = real_vector(length, 3, "length")
+    d1, d2, d3 = length.tolist()
+    if not (0 < d1 < math.inf and 0 < d2 < math.inf and 0 < d3 < math.inf):
         equations.checked_lengths(length)
     return d1, d2, d3
