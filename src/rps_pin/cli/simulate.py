@@ -14,7 +14,6 @@ from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.layer_options import LayersOption, write_page
 from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.errors import InputError
 
 _MOST_NOTES = 3
@@ -104,7 +103,18 @@ def simulate_command(
     files += save_figure(plot_simulation(motion, mechanism), folder, "simulation")
     shapes = options.shapes_of(file, mechanism)
     files.append(write_page(folder, mechanism, motion, title, layers, shapes))
-    summary = _summary(motion)
+    energy, work = motion.energy, np.abs(motion.work).max()
+    scale = max(float(motion.kinetic.max()), float(np.ptp(motion.potential)), float(work), 1e-300)
+    summary: dict[str, Any] = {
+        "duration": float(motion.time[-1]),
+        "rows": len(motion.time),
+        "largest_gap": float(motion.gap.max()),
+        "kinetic_peak": float(motion.kinetic.max()),
+        "energy_change": float(energy[-1] - energy[0]),
+        "work": float(motion.work[-1]),
+        "energy_balance": float(np.abs(motion.energy_balance).max() / scale),
+        "limits_passed": [str(passed) for passed in motion.limits_passed],
+    }
     if as_json:
         common.print_json({"mechanism": mechanism.name} | summary | {"files": files})
         return
@@ -127,18 +137,3 @@ def _of_actuated(mechanism: ClosedLoopModel, pairs: options.JointValues, option:
         if name not in names:
             raise InputError(f"{option}: no actuated joint {name!r}; there are: {', '.join(names)}")
     return np.array([values.get(name, 0.0) for name in names])
-
-
-def _summary(motion: Simulation) -> dict[str, Any]:
-    energy, work = motion.energy, np.abs(motion.work).max()
-    scale = max(float(motion.kinetic.max()), float(np.ptp(motion.potential)), float(work), 1e-300)
-    return {
-        "duration": float(motion.time[-1]),
-        "rows": len(motion.time),
-        "largest_gap": float(motion.gap.max()),
-        "kinetic_peak": float(motion.kinetic.max()),
-        "energy_change": float(energy[-1] - energy[0]),
-        "work": float(motion.work[-1]),
-        "energy_balance": float(np.abs(motion.energy_balance).max() / scale),
-        "limits_passed": [str(passed) for passed in motion.limits_passed],
-    }

@@ -82,7 +82,16 @@ def workspace_command(
         return
     console.print(_table(summary))
     if rows:
-        console.print(_comparison_table(rows))
+        texts = (
+            (
+                f"{1e3 * row.base_radius:g}",
+                *(f"{1e3 * low:.2f} to {1e3 * high:.2f}" for low, high in (row.x, row.y)),
+                "yes" if row.holds else f"no: {1e3 * row.reach:.2f} mm",
+            )
+            for row in rows
+        )
+        headers = ("g (mm)", "p_x (mm)", "p_y (mm)", "within the paper's 2.5 mm")
+        console.print(common.table_of(texts, *headers))
     common.print_files(console, files)
 
 
@@ -132,15 +141,3 @@ def _table(summary: dict[str, Any]) -> Table:
         *(("out", f"{count}: {reason}") for reason, count in summary["out"].items()),
     ]
     return common.table_of(rows)
-
-
-def _comparison_table(rows: tuple[PaperComparison, ...]) -> Table:
-    texts = (
-        (
-            f"{1e3 * row.base_radius:g}",
-            *(f"{1e3 * low:.2f} to {1e3 * high:.2f}" for low, high in (row.x, row.y)),
-            "yes" if row.holds else f"no: {1e3 * row.reach:.2f} mm",
-        )
-        for row in rows
-    )
-    return common.table_of(texts, "g (mm)", "p_x (mm)", "p_y (mm)", "within the paper's 2.5 mm")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from rps_pin.files import whole_file
+from rps_pin.files import write_text
 from rps_pin.paper.compute import Reproduction
 from rps_pin.paper.figures import write_figures
 from rps_pin.paper.page import render
@@ -40,6 +40,5 @@ def write(
     pictures = write_figures(found, beside, track)
     interpretations = beside / "interpretations.csv"
     for path, text in ((interpretations, interpretations_csv(found)), (page, render(found))):
-        with whole_file(path) as scratch:
-            scratch.write_text(text, "utf-8")
+        write_text(path, text)
     return [page, *pictures, interpretations]

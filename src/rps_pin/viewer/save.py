@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
-from rps_pin.files import whole_file
+from rps_pin.files import whole_file, write_text
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number
 from rps_pin.viewer.files.browser import in_own_thread
@@ -62,8 +62,7 @@ def save_html(
     """
     target = checked_target(path)
     text, _ = _page(what, motion, title, frame_rate, visual=visual, layers=layers, hidden=hidden)
-    with whole_file(target) as scratch:
-        scratch.write_text(text, encoding="utf-8")
+    write_text(target, text)
 
 
 def save_png(

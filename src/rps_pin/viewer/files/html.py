@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
-from rps_pin.files import whole_file
+from rps_pin.files import write_text
 from rps_pin.viewer.files.page import inline_script, licences, own_file, page, viewer_library
 from rps_pin.viewer.motion import FRAME_RATE, Motion
 from rps_pin.viewer.scene.scene import Scene
@@ -69,8 +69,7 @@ def write_html(
     scene = Scene(model, visual, recorder, motion.configurations)
     if motion.duration > 0.0:
         scene.animate(motion, frame_rate=frame_rate)
-    with whole_file(target) as scratch:
-        scratch.write_text(recorded_page(recorder, scene, motion, title), encoding="utf-8")
+    write_text(target, recorded_page(recorder, scene, motion, title))
 
 
 def checked_target(path: str | os.PathLike[str]) -> Path:
