@@ -67,17 +67,11 @@ def tip_vectors(
     """
     s, t = leg_vectors(angle)
     d, dd, dphi = length[..., None], speed[..., None], angle_rate[..., None]
-    jacobian = np.zeros((*length.shape, 3, 6))
-    jacobian_rate = np.zeros_like(jacobian)
-    by_length, by_angle = s, d * t
-    # s' = phi' t and t' = -phi' s
-    by_length_rate, by_angle_rate = dphi * t, dd * t - d * dphi * s
-    for leg in range(3):
-        jacobian[..., leg, :, leg] = by_length[..., leg, :]
-        jacobian[..., leg, :, 3 + leg] = by_angle[..., leg, :]
-        jacobian_rate[..., leg, :, leg] = by_length_rate[..., leg, :]
-        jacobian_rate[..., leg, :, 3 + leg] = by_angle_rate[..., leg, :]
-    return MovingVectors(base_radius * RADIAL + d * s, jacobian, jacobian_rate)
+    # By (d, phi), and its time derivative with s' = phi' t and t' = -phi' s.
+    by_leg = (s, d * t), (dphi * t, dd * t - d * dphi * s)
+    own = np.eye(3)[:, None, :]  # a tip moves with its own leg only
+    jacobians = (np.concatenate([part[..., None] * own for part in pair], -1) for pair in by_leg)
+    return MovingVectors(base_radius * RADIAL + d * s, *jacobians)
 
 
 def platform_vectors(tips: MovingVectors, platform_radius: float, rate: Array) -> MovingVectors:

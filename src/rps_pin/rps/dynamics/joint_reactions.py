@@ -125,9 +125,7 @@ def joint_reactions(
     p = robot.parameters
     weight = np.einsum("...ji,j->...i", axes, p.gravity)  # gravity in leg axes
     rod = p.rod_mass * (_point_acceleration(legs, legs.length - p.rod_com, sliding=True) - weight)
-    cylinder = p.leg_mass * (
-        _point_acceleration(legs, np.full_like(legs.length, p.leg_com), sliding=False) - weight
-    )
+    cylinder = p.leg_mass * (_point_acceleration(legs, p.leg_com, sliding=False) - weight)
     sliding = friction_force(
         legs.speed, p.prismatic_damping, p.prismatic_friction, p.friction_speed
     )
@@ -161,10 +159,10 @@ def _leg_axes(angle: Array) -> Array:
     return np.stack([along, np.broadcast_to(-ACROSS, along.shape), upwards], axis=-1)
 
 
-def _point_acceleration(legs: LegMotion, distance: Array, *, sliding: bool) -> Array:
+def _point_acceleration(legs: LegMotion, distance: Array | float, *, sliding: bool) -> Array:
     """Return the acceleration of a point of cylinder or rod, in leg axes, (..., 3 legs, 3)."""
     speed, push = (legs.speed, legs.acceleration) if sliding else (0.0, 0.0)
-    acceleration = np.zeros((*distance.shape, 3))
+    acceleration = np.zeros((*legs.length.shape, 3))
     acceleration[..., 0] = push - distance * legs.angle_rate**2
     acceleration[..., 2] = distance * legs.angle_acceleration + 2 * speed * legs.angle_rate
     return acceleration

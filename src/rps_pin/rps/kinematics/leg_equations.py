@@ -114,8 +114,7 @@ def solve_angles(
         d = np.ascontiguousarray(flat[part].T)
         w, z = d * cosine[part].T, d * sine[part].T
         newton(d, w, z, g, h, tolerance, iterations)
-        for leg in range(3):
-            np.arctan2(z[leg], w[leg], out=angle[part, leg])
+        angle[part] = np.arctan2(z, w).T
         residual[part] = eq.largest(eq.distance_errors(w, z, g, h))
         det[part] = cosines_determinant(d, w, z, g, h)
     batch = shape[:-1]
