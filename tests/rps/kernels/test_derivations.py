@@ -234,18 +234,15 @@ def test_legs_and_their_derivatives(pose: Any) -> None:
                 legs.across_leg(cosine, sine, radial, height) / d,
             )
 
+        second = change(speeds, (*pose, dz, dx, dy), (dz, dx, dy, ddz, ddx, ddy))
+        velocity = radial, height
         radial, height = (tips.at_legs(ring)[leg] for ring in accelerations)
-        near(
-            legs.leg_acceleration(
-                speed,
-                angle_rate,
-                d,
-                legs.along_leg(cosine, sine, radial, height),
-                legs.across_leg(cosine, sine, radial, height),
-            ),
-            change(speeds, (*pose, dz, dx, dy), (dz, dx, dy, ddz, ddx, ddy)),
-            1e-10,
+        along, across = (
+            part(cosine, sine, radial, height) for part in (legs.along_leg, legs.across_leg)
         )
+        near(legs.leg_acceleration(speed, angle_rate, d, along, across), second, 1e-10)
+        motion = legs.leg_motion(cosine, sine, d, velocity, (radial, height))
+        near(motion, (speed, angle_rate, *second), 1e-10)
 
 
 @pytest.mark.parametrize("rest", [0.0, 0.7, -0.4])

@@ -45,7 +45,7 @@ def shaped(numbers: list[Any], like: Any) -> Any:
     return numbers.pop(0)
 
 
-V3, SLOPES, MATRIX = (0.0,) * 3, (0.0,) * 6, (0.0,) * 9
+V2, V3, SLOPES, MATRIX = (0.0,) * 2, (0.0,) * 3, (0.0,) * 6, (0.0,) * 9
 ROWS, RINGS = (V3,) * 3, (V3,) * 4
 
 #: The forms of each kernel's arguments. Those called TILT get the functions of a tilt at hand.
@@ -77,6 +77,7 @@ FORMS: dict[Kernel, tuple[Any, ...]] = {
     legs.along_leg: (0.0,) * 4,
     legs.across_leg: (0.0,) * 4,
     legs.leg_acceleration: (0.0,) * 5,
+    legs.leg_motion: (0.0, 0.0, 0.0, V2, V2),
     legs.rest_axis: (0.0, 0.0, TILT, 0.0, 0.0),
     legs.rest_axis_rate: (0.0, 0.0, 0.0, 0.0, TILT, 0.0, 0.0),
     legs.cone_cosine: (0.0,) * 4,
