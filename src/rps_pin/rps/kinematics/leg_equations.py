@@ -103,10 +103,12 @@ def solve_angles(
     g, h = checked_radii(base_radius, platform_radius)
     positive_number(tolerance, "tolerance", "m")
     whole_number(iterations, "iterations")
-    lengths, first = one_shape(length=checked_lengths(length), start=real_array(start, "start"))
+    first = real_array(start, "start")
+    lengths, _ = one_shape(length=checked_lengths(length), start=first)
     shape = lengths.shape
-    flat, first = lengths.reshape(-1, 3), first.reshape(-1, 3)
-    cosine, sine = np.cos(first), np.sin(first)
+    flat = lengths.reshape(-1, 3)
+    # Of the start as it is given: it may be one number for all triples.
+    cosine, sine = (np.broadcast_to(f(first), shape).reshape(-1, 3) for f in (np.cos, np.sin))
     angle = np.empty_like(flat)
     residual, det = np.empty(len(flat)), np.empty(len(flat))
     for begin in range(0, len(flat), _BLOCK):
