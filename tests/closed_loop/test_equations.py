@@ -44,6 +44,16 @@ def test_rates_of_open_gaps_are_their_derivatives(make) -> None:
     np.testing.assert_allclose(errors.acceleration, second_derivative(gap), rtol=0, atol=1e-7)
 
 
+@pytest.mark.parametrize("row", range(9))
+def test_a_gap_that_is_no_number_is_the_largest(row: int) -> None:
+    """In whichever closure: Python's `max` keeps one in the first closure only."""
+    equations = three_rps().system.equations
+    gaps = np.ones(9)
+    assert equations.largest_gap(gaps) == pytest.approx(np.sqrt(3))
+    gaps[row] = np.nan
+    assert np.isnan(equations.largest_gap(gaps))
+
+
 def two_bodies() -> ClosedLoopModel:
     """Two free bodies, welded at odd places and orientations, and a turntable to drive."""
     return ClosedLoopModel.from_urdf(

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rps_pin import RPSParameters, RPSRobot, SingularityError
+from rps_pin import InputError, RPSParameters, RPSRobot, SingularityError
+from rps_pin.rps.dynamics.actuator_forces import BLOCK
 from rps_pin.rps.dynamics.force_causes import force_causes
 from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.kinematics.legs import PoseLegs, legs_of_pose
 from tests import strategies
 from tests.reference import newton_euler as ne
 from tests.strategies import Motion, relative_error
@@ -87,3 +89,43 @@ def test_singular_samples_are_refused() -> None:
     with pytest.raises(SingularityError, match="sample 1 of 2"):
         force_causes(robot, [[0.4, 0, 0], [0, 0, 0]], still, still)
     assert force_causes(robot, [0.4, 0, 0], still, still).total.shape == (3,)
+
+
+def legs_of(robot: RPSRobot, pose: Array) -> PoseLegs:
+    return legs_of_pose(pose, robot.parameters.base_radius, robot.parameters.platform_radius)
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (4, 5), (0,), (BLOCK // 2, 3)])
+def test_legs_that_are_known_give_the_same_parts_and_motion(shape: tuple[int, ...]) -> None:
+    robot = RPSRobot.from_preset("micro").with_payload(Payload(0.5, (0.01, 0.0, 0.02)))
+    rng = np.random.default_rng(8)
+    pose = [0.225, 0.0, 0.0] + [0.005, 0.05, 0.05] * rng.uniform(-1, 1, (*shape, 3))
+    rate, acceleration = rng.normal(size=(2, *shape, 3))
+    legs = legs_of(robot, pose)
+    known = force_causes(robot, pose, rate, acceleration, legs=legs).parts()
+    for name, part in force_causes(robot, pose, rate, acceleration).parts().items():
+        np.testing.assert_allclose(known[name], part, rtol=1e-12, atol=1e-12)
+    found = robot.motion(pose, rate, acceleration, legs=legs)
+    for one, same in zip(found, robot.motion(pose, rate, acceleration), strict=True):
+        for values, expected in zip(one, same, strict=True):
+            np.testing.assert_array_equal(values, expected)
+
+
+def test_legs_of_masked_samples_are_left_out() -> None:
+    robot, still = RPSRobot.from_preset("micro"), np.zeros(3)
+    pose = np.array([[0.223, 0.0, 0.0], [5.0, 0.0, 0.0], [0.225, 0.01, 0.02]])
+    legs = legs_of(robot, pose)
+    masked = force_causes(robot, pose, still, still, legs=legs, errors="mask").total
+    np.testing.assert_array_equal(np.isnan(masked).all(axis=-1), [False, True, False])
+    np.testing.assert_allclose(masked[::2], force_causes(robot, pose[::2], still, still).total)
+    moved = robot.motion(pose, still, still, legs=legs, errors="mask")[1].length
+    np.testing.assert_array_equal(moved[::2], legs.geometry.length[::2])
+    assert np.isnan(moved[1]).all()
+
+
+def test_legs_of_other_poses_are_refused() -> None:
+    robot, still = RPSRobot.from_preset("micro"), np.zeros(3)
+    legs = legs_of(robot, np.array([[0.223, 0.0, 0.0]] * 2))
+    for function in (robot.motion, lambda *motion, legs: force_causes(robot, *motion, legs=legs)):
+        with pytest.raises(InputError, match=r"shape \(2, 3\).*shape \(3,\)"):
+            function([0.223, 0.0, 0.0], still, still, legs=legs)

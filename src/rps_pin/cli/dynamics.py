@@ -110,7 +110,8 @@ def dynamics_command(
 
         title = f"3-RPS {name} along {trajectory.name}"
         files = write_motion(folder, "dynamics", title, machine, run)
-        causes = force_causes(machine, run.pose, run.rate, run.acceleration, wrench=wrench)
+        motion = run.pose, run.rate, run.acceleration
+        causes = force_causes(machine, *motion, wrench=wrench, legs=run.legs)
         files += save_figure(plot_force_causes(run.time, causes), folder, "forces_by_cause")
         files += save_figure(plot_sizing(sheet), folder, "force_over_speed")
         files.append(folder / "sizing.json")

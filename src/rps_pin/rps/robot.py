@@ -20,7 +20,7 @@ from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes, assembly_modes
 from rps_pin.rps.kinematics.forward_kinematics import forward_kinematics
 from rps_pin.rps.kinematics.inverse_kinematics import inverse_kinematics, reachable_motion
-from rps_pin.rps.kinematics.legs import LegMotion, Legs
+from rps_pin.rps.kinematics.legs import LegMotion, Legs, PoseLegs, check_legs
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.urdf import LEGS, ball_frames, build_urdf
@@ -215,13 +215,14 @@ class RPSRobot:
             return found.pose
         return np.ma.MaskedArray(found.pose, np.repeat(~found.reached[..., None], 3, axis=-1))
 
-    @maskable(pose=1, rate=1, acceleration=1)
+    @maskable("legs", pose=1, rate=1, acceleration=1)
     def motion(
         self,
         pose: ArrayLike,
         rate: ArrayLike,
         acceleration: ArrayLike,
         *,
+        legs: PoseLegs | None = None,
         errors: Errors = "raise",
     ) -> tuple[poses.PlatformMotion, LegMotion]:
         """Return how the platform and the legs move, in closed form.
@@ -230,6 +231,8 @@ class RPSRobot:
         ----------
         pose, rate, acceleration
             Pose (m, rad, rad) and its first and second time derivatives, shape (..., 3) each.
+        legs
+            `rps_pin.rps.kinematics.legs.legs_of_pose` of the poses, if they are known.
         errors
             ``"raise"`` refuses a pose that is out of reach; with ``"mask"`` its results are NaN.
 
@@ -239,8 +242,9 @@ class RPSRobot:
             As `inverse_kinematics`.
         """
         x, dx, ddx = poses.checked_motion(pose, rate, acceleration)
-        legs = reachable_motion(self.parameters, x, dx, ddx)
-        return poses.platform_motion(x, dx, ddx, self.parameters.platform_radius), legs
+        check_legs(legs, x)
+        leg_motion = reachable_motion(self.parameters, x, dx, ddx, legs)
+        return poses.platform_motion(x, dx, ddx, self.parameters.platform_radius), leg_motion
 
     @maskable(pose=1, rate=1, acceleration=1)
     def state(

@@ -230,7 +230,7 @@ class ClosureEquations:
         if not self.size:
             return 0.0
         scaled = self.row_scale * gaps
-        return math.sqrt(max(np.add.reduceat(scaled * scaled, self._groups).tolist()))
+        return math.sqrt(np.add.reduceat(scaled * scaled, self._groups).max())
 
     def is_open(self, q: Array) -> bool:
         """Return whether a gap exceeds `OPEN`, after `jacobian` at q: fast, for control loops."""

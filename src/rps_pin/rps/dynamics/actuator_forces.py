@@ -22,6 +22,7 @@ from rps_pin.rps.dynamics.loads import checked_wrench
 from rps_pin.rps.kernels import legs, tips
 from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE
 from rps_pin.rps.kinematics.inverse_kinematics import inverse_kinematics
+from rps_pin.rps.kinematics.legs import PoseLegs, legs_of_pose
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.kinematics.samples import Errors, check_errors_option, refuse
 from rps_pin.rps.parameters import RPSParameters
@@ -62,7 +63,7 @@ def actuator_forces(
         refused[suspect] = _refused(parameters, x[suspect], max_condition)
         if errors == "raise":
             _refuse(parameters, x, refused, max_condition)
-    force[refused] = 0.0
+        force[refused] = 0.0
     _refuse_overflow(force)
     if errors == "raise":
         return force
@@ -70,7 +71,10 @@ def actuator_forces(
 
 
 def forces_of(
-    shares: Sequence[ForceShare], pose: Array, limits: RPSParameters | None = None
+    shares: Sequence[ForceShare],
+    pose: Array,
+    limits: RPSParameters | None = None,
+    known: PoseLegs | None = None,
 ) -> tuple[list[Array], Bools]:
     """Return parts of the actuator forces of poses, and which poses must be looked at closely.
 
@@ -82,6 +86,8 @@ def forces_of(
         Checked poses, shape (..., 3).
     limits
         The robot whose limits the legs shall keep; none if left out.
+    known
+        The legs of the poses; computed block by block if left out.
 
     Returns
     -------
@@ -98,7 +104,8 @@ def forces_of(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for begin in range(0, len(flat_suspect), BLOCK):
             part = slice(begin, begin + BLOCK)
-            block = leg_block(g, h, _components(pose, part))
+            of_poses = known.part(part) if known else legs_of_pose(_components(pose, part).T, g, h)
+            block = leg_block(h, of_poses)
             flat_suspect[part] = block.close
             if limits is not None:
                 flat_suspect[part] |= _beyond_limits(limits, block)

@@ -18,6 +18,7 @@ from rps_pin.rps.dynamics.actuator_forces import ForceShare, forces_of
 from rps_pin.rps.dynamics.force_equations import ForceTerms, inertia_entries, vector_entries
 from rps_pin.rps.dynamics.friction import FRICTION, has_friction
 from rps_pin.rps.dynamics.loads import checked_wrench
+from rps_pin.rps.kinematics.legs import PoseLegs, check_legs
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.robot import RPSRobot
@@ -59,7 +60,7 @@ class ForceCauses:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
-@maskable(pose=1, rate=1, acceleration=1, wrench=1)
+@maskable("legs", pose=1, rate=1, acceleration=1, wrench=1)
 def force_causes(
     robot: RPSRobot,
     pose: ArrayLike,
@@ -67,6 +68,7 @@ def force_causes(
     acceleration: ArrayLike,
     *,
     wrench: ArrayLike | None = None,
+    legs: PoseLegs | None = None,
     errors: Errors = "raise",
 ) -> ForceCauses:
     """Return the parts of the actuator forces of samples.
@@ -77,6 +79,8 @@ def force_causes(
         The 3-RPS, with its payload and friction.
     pose, rate, acceleration, wrench
         As for `RPSRobot.actuator_forces`.
+    legs
+        Those of the poses, if they are known: `MotionRun.legs`.
     errors
         ``"raise"`` refuses the first sample that is out of reach or singular; with ``"mask"`` the
         parts of such samples are NaN.
@@ -87,6 +91,7 @@ def force_causes(
         As `RPSRobot.actuator_forces`.
     """
     x, dx, ddx = checked_motion(pose, rate, acceleration)
+    check_legs(legs, x)
     load = None if wrench is None else checked_wrench(wrench, x.shape[:-1])
     still = np.zeros_like(x)
     bodies = replace(ForceTerms.of(robot.parameters), **_NO_FRICTION)
@@ -109,7 +114,7 @@ def force_causes(
         shares["payload"] = ForceShare(carried, dx, ddx, None)
     if load is not None:
         shares["external"] = ForceShare(replace(weightless, **_NO_BODIES), still, still, load)
-    found, suspect = forces_of(list(shares.values()), x, robot.parameters)
+    found, suspect = forces_of(list(shares.values()), x, robot.parameters, legs)
     if suspect.any() or not np.isfinite(found).all():
         robot.actuator_forces(x, dx, ddx, wrench=wrench)  # raises where there are no forces
     parts = dict(zip(shares, found, strict=True))

@@ -27,8 +27,8 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.kernels import forces, legs, platform, tips
 from rps_pin.rps.kernels.platform import Inertia, Vector
-from rps_pin.rps.kernels.tilt_functions import TiltFunctions, tilt_functions
-from rps_pin.rps.kinematics.legs import RADIAL
+from rps_pin.rps.kernels.tilt_functions import TiltFunctions
+from rps_pin.rps.kinematics.legs import RADIAL, PoseLegs
 from rps_pin.rps.parameters import RPSParameters
 
 #: A pose is looked at closely from this size of the legs' forces for a unit force on the platform.
@@ -121,13 +121,10 @@ class LegBlock(NamedTuple):
     """Whether a pose may be singular, or a leg has no length, shape (n,)."""
 
 
-def leg_block(base_radius: float, platform_radius: float, pose: Array) -> LegBlock:
-    """Return the legs of poses with components (z, tilt_x, tilt_y), shape (3, n)."""
-    z, x, y = pose
-    h, tilt = platform_radius, tilt_functions(x * x + y * y)
-    slopes = tips.tip_slopes(x, y, tilt)
-    radial, height = (tips.at_legs(ring) for ring in tips.tips(z, x, y, tilt, h))
-    d, cosine, sine = legs.leg_geometry(radial, height, base_radius)
+def leg_block(platform_radius: float, of_poses: PoseLegs) -> LegBlock:
+    """Return the legs of poses (n, 3) as a block, with what solves for their forces."""
+    (x, y, tilt), slopes, geometry = of_poses
+    d, cosine, sine = geometry.length.T, geometry.cosine.T, geometry.sine.T
     rho_x, rho_y, z_x, z_y = (tips.at_legs(ring) for ring in slopes)
     by_x = legs.along_leg(cosine, sine, rho_x, z_x)
     by_y = legs.along_leg(cosine, sine, rho_y, z_y)
@@ -136,7 +133,7 @@ def leg_block(base_radius: float, platform_radius: float, pose: Array) -> LegBlo
     gain = forces.squared_norm(cofactors) * over * over
     # The legs' planes hold the platform with forces that grow like 1 / cos(|w| / 2), whose square
     # is (1 + C) / 2, and a leg turns as fast as its tip moves over its length.
-    lever = np.minimum(1.0, d.min(axis=0) / h)
+    lever = np.minimum(1.0, d.min(axis=0) / platform_radius)
     close = ~(gain < CLOSE**2 * (lever * lever) * (0.5 + 0.5 * tilt[2]))
     return LegBlock(x, y, tilt, slopes, d, cosine, sine, cofactors, over, close)
 

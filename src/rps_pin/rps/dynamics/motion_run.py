@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy.integrate import trapezoid
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError
+from rps_pin.rps.kinematics.legs import PoseLegs, legs_of_pose
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_events import PathCheck
 from rps_pin.rps.singularity.path_refusal import require_clear
@@ -62,6 +63,8 @@ class MotionRun:
     `rps_pin.rps.singularity.measures`."""
     path_check: PathCheck
     """Of the trajectory: its smallest distance to a singularity, and where."""
+    legs: PoseLegs | None = field(default=None, repr=False, compare=False)
+    """Legs of the poses, of which `force_causes` need not compute them again; None if unknown."""
 
     @property
     def singularity_distance(self) -> Array:
@@ -179,8 +182,10 @@ def run_motion(
     time = sample_times(trajectory.duration, sample_rate)
     path_check = require_clear(robot, trajectory)
     motion = trajectory.sample(time)
-    platform, legs = robot.motion(*motion)
-    q, v, a = robot.state_of(motion.pose, platform, legs)
+    p = robot.parameters
+    legs = legs_of_pose(motion.pose, p.base_radius, p.platform_radius)
+    platform, leg_motion = robot.motion(*motion, legs=legs)
+    q, v, a = robot.state_of(motion.pose, platform, leg_motion)
     n = len(time)
     force, reaction = np.empty((n, 3)), np.empty((n, 3, 3))
     gap, residual, conditioning = np.empty(n), np.empty(n), np.empty(n)
@@ -199,9 +204,9 @@ def run_motion(
         residual[i] = result.residual / largest if largest > 0 else result.residual
         conditioning[i] = 1 / result.condition
         gap[i] = robot.mechanism.loop_gap(q[i])
-    of_legs = legs.length, legs.speed, legs.acceleration
+    of_legs = leg_motion.length, leg_motion.speed, leg_motion.acceleration
     solved = force, reaction, gap, residual, conditioning
-    return MotionRun(time, *motion, platform.position, q, v, a, *of_legs, *solved, path_check)
+    return MotionRun(time, *motion, platform.position, q, v, a, *of_legs, *solved, path_check, legs)
 
 
 def summarise(run: MotionRun, robot: RPSRobot) -> MotionSummary:

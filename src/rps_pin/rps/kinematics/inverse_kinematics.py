@@ -12,7 +12,7 @@ from rps_pin.errors import UnreachableError
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips
 from rps_pin.rps.kinematics import legs as leg_kinematics
-from rps_pin.rps.kinematics.pose import checked_pose, tilt_of
+from rps_pin.rps.kinematics.pose import Tilt, checked_pose, tilt_of
 from rps_pin.rps.kinematics.samples import Errors, check_errors_option, refuse
 from rps_pin.rps.parameters import RPSParameters
 
@@ -29,20 +29,27 @@ def inverse_kinematics(
 
 
 def reachable_motion(
-    parameters: RPSParameters, pose: Array, rate: Array, acceleration: Array
+    parameters: RPSParameters,
+    pose: Array,
+    rate: Array,
+    acceleration: Array,
+    legs: leg_kinematics.PoseLegs | None = None,
 ) -> leg_kinematics.LegMotion:
-    """Return how the legs move, or refuse a pose beyond their limits."""
+    """Return how the legs (of the poses, if known) move, or refuse a pose beyond their limits."""
     g, h = parameters.base_radius, parameters.platform_radius
-    legs = leg_kinematics.geometry_of_pose(pose, g, h)
-    _reachable(parameters, pose, legs, "raise")
+    legs = legs or leg_kinematics.legs_of_pose(pose, g, h)
+    _reachable(parameters, pose, legs.geometry, "raise", legs.tilt)
     return leg_kinematics.leg_motion(pose, rate, acceleration, h, g, legs)
 
 
 def spherical_angles(
-    parameters: RPSParameters, pose: Array, legs: leg_kinematics.LegGeometry
+    parameters: RPSParameters,
+    pose: Array,
+    legs: leg_kinematics.LegGeometry,
+    known: Tilt | None = None,
 ) -> Array:
     """Return the angle between each leg and its joint's rest axis, shape (..., 3 legs), rad."""
-    x, y, tilt = tilt_of(pose)
+    x, y, tilt = known or tilt_of(pose)
     rest = math.cos(parameters.spherical_rest_angle), math.sin(parameters.spherical_rest_angle)
     e, t = (np.asarray(tips.at_legs(ring)) for ring in ((0.0, x, y), (0.0, y, -x)))
     out, across, up = kernels.rest_axis(e, t, tilt, *rest)
@@ -55,12 +62,16 @@ def spherical_angles(
 
 
 def _reachable(
-    parameters: RPSParameters, pose: Array, legs: leg_kinematics.LegGeometry, errors: Errors
+    parameters: RPSParameters,
+    pose: Array,
+    legs: leg_kinematics.LegGeometry,
+    errors: Errors,
+    tilt: Tilt | None = None,
 ) -> Bools:
     """Return whether each pose keeps its limits, or refuse the first that does not."""
     if errors == "raise":
         leg_kinematics.refuse_vanishing(legs.length, legs.vanishing)
-    length, angle, cone = legs.length, legs.angle, spherical_angles(parameters, pose, legs)
+    length, angle, cone = legs.length, legs.angle, spherical_angles(parameters, pose, legs, tilt)
     reachable = leg_kinematics.within_limits(parameters, length, angle, cone)
 
     def error(first: tuple[int, ...], where: str) -> UnreachableError:

@@ -11,16 +11,16 @@ Legs are counted 1 to 3 in messages, as in the paper, and 0 to 2 in arrays.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rps_pin.arrays import Array, Bools
-from rps_pin.errors import LimitViolation, UnreachableError
+from rps_pin.errors import InputError, LimitViolation, UnreachableError
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips as ring
 from rps_pin.rps.kernels.limits import within
-from rps_pin.rps.kinematics.pose import components, tilt_of
+from rps_pin.rps.kinematics.pose import Tilt, components, tilt_of
 from rps_pin.rps.kinematics.samples import refuse
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.urdf import LEG_DIRECTIONS
@@ -86,6 +86,29 @@ class LegGeometry(NamedTuple):
         return angles
 
 
+class PoseLegs(NamedTuple):
+    """Legs of poses (..., 3), and how their tips move with the tilt."""
+
+    tilt: Tilt
+    """tilt_x and tilt_y (rad) with the functions of the tilt, shape (...) each."""
+    slopes: ring.Slopes
+    """Of the tips, by h tilt_x and h tilt_y, shape (...) each, or constants; without unit."""
+    geometry: LegGeometry
+    """Lengths and directions, shape (..., 3 legs) each."""
+
+    def part(self, part: slice) -> PoseLegs:
+        """Return the legs of a part of the poses, as one batch (n, 3) in C order."""
+        shape = self.geometry.length.shape[:-1]
+
+        def cut(numbers: Any) -> Any:
+            if isinstance(numbers, tuple):
+                return tuple(map(cut, numbers))
+            return np.broadcast_to(numbers, shape).reshape(-1)[part]
+
+        geometry = LegGeometry._make(of.reshape(-1, 3)[part] for of in self.geometry)
+        return PoseLegs(cut(self.tilt), cut(self.slopes), geometry)
+
+
 def leg_geometry(radial: Array, height: Array, base_radius: float) -> LegGeometry:
     """Return the legs of tips at (rho, z_i) in their planes, shape (..., 3 legs) each, m: Eq. 7."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -96,15 +119,34 @@ def leg_geometry(radial: Array, height: Array, base_radius: float) -> LegGeometr
     return LegGeometry(length, cosine, sine, vanishing)
 
 
-def geometry_of_pose(pose: Array, base_radius: float, platform_radius: float) -> LegGeometry:
-    """Return the legs of poses (..., 3): Eq. 1, 4 and 7."""
-    radial, height = ring.tips(components(pose)[0], *tilt_of(pose), platform_radius)
+def geometry_of_pose(
+    pose: Array, base_radius: float, platform_radius: float, tilt: Tilt | None = None
+) -> LegGeometry:
+    """Return the legs of poses (..., 3), whose tilt may be known: Eq. 1, 4 and 7."""
+    radial, height = ring.tips(components(pose)[0], *(tilt or tilt_of(pose)), platform_radius)
     return leg_geometry(at_legs(radial), at_legs(height), base_radius)
+
+
+def legs_of_pose(pose: Array, base_radius: float, platform_radius: float) -> PoseLegs:
+    """Return the legs of poses (..., 3), and how their tips move with the tilt."""
+    tilt = tilt_of(pose)
+    geometry = geometry_of_pose(pose, base_radius, platform_radius, tilt)
+    return PoseLegs(tilt, ring.tip_slopes(*tilt), geometry)
+
+
+def check_legs(legs: PoseLegs | None, pose: Array) -> None:
+    """Raise `InputError` if legs are given and are not as many as the poses (..., 3)."""
+    if legs is not None and legs.geometry.length.shape != pose.shape:
+        raise InputError(
+            f"legs are those of poses of shape {legs.geometry.length.shape}; they must be those "
+            f"of the poses given, of shape {pose.shape}"
+        )
 
 
 def at_legs(numbers: ring.Ring) -> Array:
     """Return a ring's number for each leg, shape (..., 3 legs)."""
-    return np.moveaxis(np.asarray(ring.at_legs(numbers)), 0, -1)
+    legs = np.asarray(ring.at_legs(numbers))
+    return legs.transpose(*range(1, legs.ndim), 0)
 
 
 def leg_angles_and_lengths(tip: Array, base_radius: float) -> tuple[Array, Array]:
@@ -140,7 +182,7 @@ def leg_motion(
     acceleration: Array,
     platform_radius: float,
     base_radius: float,
-    legs: LegGeometry | None = None,
+    legs: PoseLegs | None = None,
 ) -> LegMotion:
     """Return how the legs move with the platform, in closed form.
 
@@ -151,24 +193,22 @@ def leg_motion(
     platform_radius, base_radius
         The paper's h and g, m.
     legs
-        The legs of the poses, if they are known.
+        `legs_of_pose` of the poses, if they are known.
 
     Raises
     ------
     UnreachableError
         If a leg has no length.
     """
-    legs = legs or geometry_of_pose(pose, base_radius, platform_radius)
-    refuse_vanishing(legs.length, legs.vanishing)
-    x, y, tilt = tilt_of(pose)
+    (x, y, tilt), slopes, geometry = legs or legs_of_pose(pose, base_radius, platform_radius)
+    d, cosine, sine, vanishing = geometry
+    refuse_vanishing(d, vanishing)
     (dz, dx, dy), (ddz, ddx, ddy) = components(rate), components(acceleration)
     h = platform_radius
-    slopes = ring.tip_slopes(x, y, tilt)
     rates = [at_legs(one) for one in ring.tip_rates(slopes, dz, h * dx, h * dy)]
     moving = (x, y, dx, dy, ddx, ddy)
     changes = [at_legs(one) for one in ring.tip_accelerations(moving, ddz, tilt, h)]
-    d, cosine, sine, _ = legs
-    return LegMotion(d, legs.angle, *kernels.leg_motion(cosine, sine, d, rates, changes))
+    return LegMotion(d, geometry.angle, *kernels.leg_motion(cosine, sine, d, rates, changes))
 
 
 def rest_axes(rest_angle: float) -> Array:

@@ -34,6 +34,9 @@ from rps_pin.rps.kernels import platform, tips
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions, tilt_functions
 from rps_pin.validation import one_shape, real_array
 
+#: tilt_x, tilt_y (rad) and the functions of the tilt, of poses of shape (..., 3): shape (...) each.
+Tilt = tuple[Number, Number, TiltFunctions]
+
 
 class PlatformMotion(NamedTuple):
     """Position and orientation of the platform with their first and second time derivatives.
@@ -77,7 +80,7 @@ def components(vectors: Array) -> list[Number]:
     if vectors.ndim == 1:
         entries: list[Number] = vectors.tolist()
         return entries
-    return list(np.ascontiguousarray(np.moveaxis(vectors, -1, 0)))
+    return list(np.ascontiguousarray(vectors.transpose(-1, *range(vectors.ndim - 1))))
 
 
 def stacked(*numbers: Number) -> Array:
@@ -85,7 +88,7 @@ def stacked(*numbers: Number) -> Array:
     return np.stack(np.broadcast_arrays(*numbers), axis=-1)
 
 
-def tilt_of(pose: Array) -> tuple[Number, Number, TiltFunctions]:
+def tilt_of(pose: Array) -> Tilt:
     """Return tilt_x, tilt_y and the functions of the tilt, of poses (..., 3).
 
     Raises `InputError` for one pose with a tilt above 1e154 rad, whose square is not finite.

@@ -42,6 +42,7 @@ def refuse(failed: Bools | np.bool_, error: Callable[[tuple[int, ...], str], RPS
 
 
 def maskable(
+    *derived: str,
     **endings: int,
 ) -> Callable[[Callable[_Arguments, _Result]], Callable[_Arguments, _Result]]:
     """Give a function of batches the option ``errors``, by its keyword argument of this name.
@@ -52,6 +53,9 @@ def maskable(
 
     Parameters
     ----------
+    derived
+        Names of keyword arguments that follow from the others, given to save time: left out in the
+        call with the samples that do not fail.
     endings
         For each argument with batch dimensions, the number of its dimensions after these.
     """
@@ -75,6 +79,8 @@ def maskable(
                     value = np.asarray(given.arguments[name])
                     whole = good.shape + value.shape[value.ndim - endings[name] :]
                     given.arguments[name] = np.broadcast_to(value, whole)[good]
+            for name in derived:
+                given.arguments.pop(name, None)
             result: _Result = _spread(call(*given.args, **given.kwargs), good)
             return result
 

@@ -77,7 +77,7 @@ def _legs(parameters: RPSParameters, pose: Array) -> _Legs:
     cone = None
     if parameters.spherical_cone_limit < math.pi:
         geometry = LegGeometry(d.T, cosine.T, sine.T, vanishing.T)
-        cone = spherical_angles(parameters, pose, geometry).T
+        cone = spherical_angles(parameters, pose, geometry, (x, y, tilt)).T
     if vanishing.any():  # the leg has no direction
         cosine, sine = np.where(vanishing, 0.0, cosine), np.where(vanishing, 0.0, sine)
     by_x, by_y, *heights = ring.tip_slopes(x, y, tilt)
