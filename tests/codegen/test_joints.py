@@ -100,9 +100,8 @@ def test_tangent_is_the_derivative_of_integrate(kind: str) -> None:
     tangent = values(joint.tangent(symbol), (symbol, q))
     assert worst(tangent - expected) < 1e-15
     h = 1e-3
-    rows = [
-        pin.integrate(model, q, h * e) - pin.integrate(model, q, -h * e) for e in np.eye(model.nv)
-    ]
+    steps = h * np.eye(model.nv)
+    rows = [pin.integrate(model, q, dv) - pin.integrate(model, q, -dv) for dv in steps]
     assert worst(tangent - np.transpose(rows) / (2 * h)) < 1e-6
 
 
@@ -143,14 +142,13 @@ def test_joints_with_changing_axes_are_refused(kind: str) -> None:
 
 def test_unknown_types_are_refused_with_what_is_possible() -> None:
     joint = pin.JointModelEllipsoid(0.3, 0.5, 0.8)
-    with pytest.raises(MechanismError, match="joint 'shoulder' of type Ellipsoid; types .* RX"):
+    with pytest.raises(MechanismError, match=r"joint 'shoulder' of type Ellipsoid; types .* RX"):
         Joint(joint, "shoulder")
 
 
 def test_composites_of_constant_subspace_are_taken_whatever_their_depth() -> None:
-    slides = composite(
-        composite(PX, PX), composite(PX, with_axis(pin.JointModelPrismaticUnaligned))
-    )
+    along_any = with_axis(pin.JointModelPrismaticUnaligned)
+    slides = composite(composite(PX, PX), composite(PX, along_any))
     model, joint, rng = alone(slides, 4)
     q, symbol = rng.normal(size=4), ca.SX.sym("q", 4)
     data = model.createData()
