@@ -1,0 +1,283 @@
+"""Choice of the independent velocities of a mechanism, from its Jacobian at closed configurations.
+
+With J of rank r, m = nv - r velocities u move independently and the others follow: J_d v_d = -J_u u,
+J_d of full column rank. Generated code has u fixed, so the choice is made once, for J_d well
+conditioned at all samples. `elimination.blocks` then orders J_d's rows and columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from scipy.linalg import qr
+from scipy.sparse import bmat, csc_matrix, identity
+from scipy.sparse.linalg import splu
+
+from rps_pin.arrays import Array, Bools, Indices
+from rps_pin.closed_loop.assembly.closing import closed_gap, close_gaps
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.errors import InputError, MechanismError
+from rps_pin.numerics.linear_algebra import (
+    RANK_TOLERANCE,
+    condition_number,
+    rank,
+    singular_values,
+)
+
+#: Lengths of the random steps from home, in radians or characteristic lengths of all motions.
+_STEPS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
+#: A step that does not close is halved so often.
+_HALVINGS = 4
+#: mu in [1 J'; J -mu], which gives steps of least norm also where rows are redundant.
+_REGULARISATION = 1e-9
+#: Samples nearer to a singularity than this, compared with the best of them, do not count.
+_NEAR_SINGULAR = 1e-2
+#: Condition of J_d up to which the actuated velocities are taken as they are.
+_ACCEPTED = 1e5
+#: Condition of J_d up to which a set with more actuated velocities goes before a better one.
+_GOOD = 1e4
+#: An actuated velocity goes before others whose part of the motions is at most 1 / this larger.
+_PREFERENCES = (1e-3, 1e-1, 1.0)
+
+
+class Samples(NamedTuple):
+    """Regular closed configurations near home."""
+
+    configurations: Array
+    """Shape (K, nq)."""
+    jacobians: Array
+    """J at each, all entries in one unit, shape (K, nc, nv)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Partition:
+    """Independent and dependent velocities of a mechanism.
+
+    Attributes
+    ----------
+    independent : (m,) array
+        Indices in v; the actuated ones first, in their order, then the others as in v.
+    dependent : (nv - m,) array
+        The others, as in v.
+    idle : index array
+        Velocities whose columns of J vanish at all samples; they are independent.
+    rank : int
+        Of J, and number of dependent velocities.
+    redundant_rows : int
+        Rows of J that depend on others, nc - rank.
+    is_actuated : bool
+        Whether the independent velocities are the actuated ones.
+    condition : float
+        The largest condition number of J_d (all entries in one unit) at the samples.
+    """
+
+    independent: Indices
+    dependent: Indices
+    idle: Indices
+    rank: int
+    redundant_rows: int
+    is_actuated: bool
+    condition: float
+
+    @property
+    def mobility(self) -> int:
+        """Number of independent velocities."""
+        return self.independent.size
+
+
+# Samples ------------------------------------------------------------------------------------------
+
+
+def regular_samples(system: ConstraintSystem, home: Array, seed: int = 0) -> Samples:
+    """Return regular closed configurations near a closed one: it, and random ones of each length.
+
+    Those where J has not the largest rank met, or is nearly of lower rank, are left out. Joint
+    limits are not looked at. The same for the same arguments.
+    """
+    rng = np.random.default_rng(seed)
+    places = [home]
+    for length in _STEPS:
+        found = _moved(system, home, length, rng.normal(size=system.model.nv))
+        if found is not None:
+            places.append(found)
+    jacobians = np.array([system.scaled(system.equations.jacobian(q)) for q in places])
+    values = [singular_values(jacobian) for jacobian in jacobians]
+    ranks = np.array([rank(one) for one in values])
+    best = int(ranks.max(initial=0))
+    least = np.array([one[best - 1] / one[0] if best else 1.0 for one in values])
+    regular = ranks == best
+    regular &= least >= _NEAR_SINGULAR * least[regular].max()
+    return Samples(np.array(places)[regular], jacobians[regular])
+
+
+def _moved(system: ConstraintSystem, q: Array, length: float, direction: Array) -> Array | None:
+    """Return the closed configuration after an allowed step of a root mean square length."""
+    along = _solution(system.scaled(system.equations.jacobian(q)), direction, None)
+    size = float(np.linalg.norm(along))
+    if size < 1e-9 * np.linalg.norm(direction):  # no mobility
+        return None
+    # A random direction's part in m dimensions of nv has length sqrt(m).
+    step = length * system.equations.length * max(size, 1.0) / size * along
+    for halving in range(_HALVINGS):
+        moved = pin.integrate(system.model, q, system.column_scale * step / 2**halving)
+        closed = _closed(system, moved)
+        if closed is not None:
+            return closed
+    return None
+
+
+def _closed(system: ConstraintSystem, q: Array) -> Array | None:
+    """Return a closed configuration near q by Newton's steps of least norm, or damped ones."""
+    equations, tolerance = system.equations, closed_gap(system)
+    start, first = q, np.inf
+    for _ in range(10):
+        gaps = equations.gaps(q)
+        largest = equations.largest_gap(gaps)
+        if largest <= tolerance:
+            return q
+        if not largest < 2 * first:
+            break
+        first = min(first, largest)
+        jacobian = system.scaled(equations.jacobian(q))
+        step = _solution(jacobian, None, -system.row_scale * gaps)
+        q = pin.integrate(system.model, q, system.column_scale * step)
+    q = close_gaps(system, start, np.zeros(system.model.nv, dtype=bool), False, iterations=30)
+    return q if equations.largest_gap(equations.gaps(q)) <= tolerance else None
+
+
+def _solution(jacobian: Array, near: Array | None, right: Array | None) -> Array:
+    """Return the x nearest to a vector with J x = b; either is zero if left out.
+
+    [1 J'; J -mu] [x; l] = [near; b], sparse: linear in the number of loops.
+    """
+    rows, columns = jacobian.shape
+    if not rows:
+        return np.zeros(columns) if near is None else near
+    sparse = csc_matrix(jacobian)
+    matrix = bmat(
+        [[identity(columns), sparse.T], [sparse, -_REGULARISATION * identity(rows)]], format="csc"
+    )
+    both = np.concatenate(
+        [
+            np.zeros(columns) if near is None else near,
+            np.zeros(rows) if right is None else right,
+        ]
+    )
+    return np.asarray(splu(matrix).solve(both)[:columns], np.float64)
+
+
+# Choice -------------------------------------------------------------------------------------------
+
+
+def choose(system: ConstraintSystem, jacobians: Array, pattern: Bools | None = None) -> Partition:
+    """Return the independent velocities of a mechanism, the same for the same arguments.
+
+    The actuated ones where they determine the motion. Otherwise the velocities with the largest
+    part in the motions that those chosen before leave (QR with column pivoting of bases of the
+    motions at all samples at once), actuated ones preferred.
+
+    Parameters
+    ----------
+    system
+        The mechanism.
+    jacobians
+        J at regular closed configurations, all entries in one unit, shape (K, nc, nv).
+    pattern
+        Which entries of J the generated code has, shape (nc, nv); all if left out.
+
+    Raises
+    ------
+    InputError
+        If shapes do not fit.
+    MechanismError
+        If the rank differs between the samples, or entries that are not zero are outside the
+        pattern.
+    """
+    rows, columns = system.equations.size, system.model.nv
+    if jacobians.ndim != 3 or not len(jacobians) or jacobians.shape[1:] != (rows, columns):
+        raise InputError(f"jacobians have the shape (K, {rows}, {columns}), not {jacobians.shape}")
+    if pattern is not None and pattern.shape != (rows, columns):
+        raise InputError(f"the pattern has the shape ({rows}, {columns}), not {pattern.shape}")
+    jacobians, idle = _without_noise(jacobians, pattern)
+    ranks = {rank(singular_values(jacobian)) for jacobian in jacobians}
+    if len(ranks) > 1:
+        raise MechanismError(
+            f"the closures' Jacobian has rank {min(ranks)} at some samples and {max(ranks)} at "
+            "others: all must be regular"
+        )
+    found = ranks.pop()
+
+    def partition(independent: Indices) -> Partition:
+        dependent = np.setdiff1d(np.arange(columns), independent)
+        worst = max(condition_number(jacobian[:, dependent]) for jacobian in jacobians)
+        is_actuated = np.array_equal(independent, system.actuated)
+        return Partition(
+            independent, dependent, idle, found, rows - found, is_actuated, float(worst)
+        )
+
+    if system.actuated.size == columns - found:
+        actuated = partition(system.actuated)
+        if actuated.condition <= _ACCEPTED:
+            return actuated
+    motions = np.array([_motions(jacobian, found) for jacobian in jacobians])
+    best: Partition | None = None
+    for preference in _PREFERENCES:
+        candidate = partition(_pivoted(motions, idle, system.actuated, preference))
+        if best is None or candidate.condition < best.condition:
+            best = candidate
+        if best.condition <= _GOOD:
+            break
+    assert best is not None
+    return best
+
+
+def _without_noise(jacobians: Array, pattern: Bools | None) -> tuple[Array, Indices]:
+    """Return J without columns that are rounding error at all samples, and their indices."""
+    size = max(float(np.abs(jacobians).max(initial=0.0)), 1.0)
+    vanishing = np.abs(jacobians).max(axis=(0, 1), initial=0.0) <= RANK_TOLERANCE * size
+    if pattern is not None:
+        # Rows of other axes than J's mix those of one closure, columns never.
+        outside = ~vanishing & ~np.asarray(pattern, dtype=bool).any(axis=0)
+        if outside.any():
+            raise MechanismError(
+                f"velocities {np.flatnonzero(outside).tolist()} move the closures, but have no "
+                "entries in the pattern"
+            )
+    return np.where(vanishing, 0.0, jacobians), np.flatnonzero(vanishing)
+
+
+def _motions(jacobian: Array, found: int) -> Array:
+    """Return an orthonormal basis of the null space of a J of known rank, shape (nv, m)."""
+    if not jacobian.shape[0]:
+        return np.eye(jacobian.shape[1])
+    turned, _, _ = qr(jacobian.T, pivoting=True)
+    return np.asarray(turned[:, found:], np.float64)
+
+
+def _pivoted(motions: Array, idle: Indices, actuated: Indices, preference: float) -> Indices:
+    """Return m velocities whose rows of the motions' bases (K, nv, m) are independent.
+
+    Idle ones first. An actuated one whose row, less what those before have of it, is at least
+    `preference` times the longest goes before the others; lengths are the least of the samples.
+    """
+    left, count = motions.copy(), motions.shape[2]
+    is_actuated = np.zeros(motions.shape[1], dtype=bool)
+    is_actuated[actuated] = True
+    chosen: list[int] = []
+    for step in range(count):
+        length = np.linalg.norm(left, axis=2)
+        least = length.min(axis=0)
+        least[chosen] = -1.0
+        at = int(idle[step]) if step < idle.size else int(least.argmax())
+        if step >= idle.size and not is_actuated[at]:
+            driven = np.where(is_actuated, least, -1.0)
+            if driven.max() >= preference * least[at]:
+                at = int(driven.argmax())
+        along = left[:, at] / length[:, at, None]
+        left -= np.einsum("kjm,km->kj", left, along)[:, :, None] * along[:, None]
+        chosen.append(at)
+    others = sorted(set(chosen) - set(actuated.tolist()))
+    return np.array([*[j for j in actuated.tolist() if j in chosen], *others], dtype=np.intp)
