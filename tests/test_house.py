@@ -86,6 +86,7 @@ LAYERS = [
     {"errors", "validation", "arrays", "files", "config", "moved"},
     {"numerics"},
     {"closed_loop"},
+    {"codegen"},
     {"trajectories"},
     {"rps"},
     {"control"},

@@ -1,5 +1,6 @@
 from . import (
     closed_loop,
+    codegen,
     control,
     errors,
     panel,
@@ -21,6 +22,7 @@ from .closed_loop import (
 )
 from .errors import (
     ClosureError,
+    CompileError,
     InfeasibleError,
     InputError,
     MechanismError,
@@ -37,6 +39,7 @@ __version__: str
 __all__ = [
     "ClosedLoopModel",
     "ClosureError",
+    "CompileError",
     "ForceBound",
     "ForceDistribution",
     "InfeasibleError",
@@ -54,6 +57,7 @@ __all__ = [
     "UnreachableError",
     "__version__",
     "closed_loop",
+    "codegen",
     "control",
     "errors",
     "helix",

@@ -197,3 +197,20 @@ class InfeasibleError(RPSPinError, ArithmeticError):
         self.violations = tuple(violations)
         self.unproduced = unproduced
         super().__init__(message)
+
+
+class CompileError(RPSPinError, RuntimeError):
+    """Code could not be compiled: there is no compiler, or it fails, is killed or takes too long.
+
+    Attributes
+    ----------
+    compiler : str
+        The compiler, with its version if it was found.
+    output : str
+        All that it said.
+    """
+
+    def __init__(self, message: str, compiler: str, output: str = "") -> None:
+        self.compiler = compiler
+        self.output = output
+        super().__init__(message)

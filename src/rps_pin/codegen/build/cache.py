@@ -1,0 +1,247 @@
+"""The cache: libraries that were built and proven, each in a folder of its own.
+
+A library is built in a folder beside, proven there, and then renamed, so that the cache has proven
+libraries only. Its digest is compared at each load. One lock for each keeps two processes from
+building the same; the system frees the lock of a process that is killed.
+
+Read without a lock, so that a cache that cannot be written to serves too. Where writing fails, a
+folder of this process takes its place, with a warning.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+import threading
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import platformdirs
+from filelock import FileLock, Timeout
+
+from rps_pin.codegen.build.library import Library, load
+from rps_pin.codegen.build.source import Source
+
+#: The environment variable that names the folder.
+VARIABLE = "RPS_PIN_CACHE"
+#: Beyond this, bytes, those go that were used the longest time ago.
+LARGEST = 2**30
+_LIBRARY, _RECORD, _PART = "library.so", "record.json", ".part-"
+_private = threading.Lock()
+
+
+def cache_folder() -> Path:
+    """Return where libraries are kept: ``RPS_PIN_CACHE``, or the user's folder for caches."""
+    named = os.environ.get(VARIABLE)
+    if named:
+        return Path(named).absolute()
+    # Of a user without a home, platformdirs would name a folder "~" in the current one.
+    found = Path(platformdirs.user_cache_dir("rps-pin"))
+    return found if found.is_absolute() else Path("/nowhere/rps-pin")
+
+
+def clear() -> int:
+    """Remove what the cache holds; return how many libraries that were. Loaded ones stay loaded."""
+    folder = cache_folder()
+    removed = sum(_remove(entry) for entry in _entries(folder))
+    for file in folder.glob("*.lock"):
+        held = FileLock(file)
+        with suppress(OSError), held.acquire(timeout=0):  # Timeout is an OSError
+            file.unlink()
+    return removed
+
+
+def usage() -> tuple[int, int]:
+    """Return how many libraries the cache holds, and their size in bytes."""
+    sizes = [_size(entry) for entry in _entries(cache_folder())]
+    return len(sizes), sum(sizes)
+
+
+def find(folder: Path, source: Source, key: str | None = None) -> Library | None:
+    """Return a proven library of a system compiler, the one used last; nothing if there is none.
+
+    Of the compiler whose `key` is given, or of any.
+    """
+    entries = [entry for entry in _entries(folder) if entry.name.startswith(f"{source.key}-")]
+    for entry in sorted(entries, key=_used, reverse=True):
+        if key is None or entry.name == f"{source.key}-{key}":
+            library = _load(entry, source)
+            if library is not None:
+                return library
+    return None
+
+
+def find_proof(folder: Path, source: Source, key: str) -> Mapping[str, Any] | None:
+    """Return the proof of code that is made anew in each process; nothing if there is none."""
+    found = _read(folder / f"{source.key}-{key}", b"")
+    return found and found["proof"]
+
+
+def keep_proof(folder: Path, source: Source, key: str, proof: Mapping[str, Any]) -> None:
+    """Keep the proof of such code."""
+    with new_part(folder, source, key) as part:
+        keep(part, source, key, proof)
+
+
+@contextmanager
+def lock(
+    folder: Path, source: Source, key: str, limit: float, watch: Callable[[], None]
+) -> Iterator[None]:
+    """Keep other processes and threads from building the same; wait until they have built it.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be written to, or the lock is not free within `limit`, s.
+    """
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    held = FileLock(folder / f"{source.key}-{key}.lock")
+    pause = 0.05
+    for _ in range(1 + int(limit / pause)):
+        try:
+            held.acquire(timeout=pause, poll_interval=pause / 5)
+            break
+        except Timeout:
+            watch()
+    else:
+        raise TimeoutError(f"another process held {held.lock_file} for more than {limit:g} s")
+    try:
+        yield
+    finally:
+        held.release()
+
+
+@contextmanager
+def new_part(folder: Path, source: Source, key: str) -> Iterator[Path]:
+    """Give a new folder to build in; it is removed at the end, unless it was kept.
+
+    Hold the lock: what a killed process left is removed.
+    """
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    start = f"{source.key}-{key}{_PART}"
+    for left in folder.glob(f"{start}*"):
+        shutil.rmtree(left, ignore_errors=True)
+    part = Path(tempfile.mkdtemp(prefix=start, dir=folder))
+    try:
+        yield part
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def keep(
+    part: Path, source: Source, key: str, proof: Mapping[str, Any], compiler: str = ""
+) -> None:
+    """Put what was built and proven into the cache; OSError if that fails."""
+    entry = part.parent / f"{source.key}-{key}"
+    for file in part.iterdir():
+        if file.name != _LIBRARY:
+            file.unlink()
+    about = {"name": source.name, "compiler": compiler, "proof": dict(proof)}
+    about["built"] = datetime.now(UTC).isoformat(timespec="seconds")
+    library = part / _LIBRARY
+    code = library.read_bytes() if library.exists() else b""
+    record = {"digest": _digest(code, about), **about}
+    (part / _RECORD).write_text(json.dumps(record, indent=1), "utf-8")
+    if entry.exists():  # it was damaged, or it would have been loaded
+        _remove(entry)
+    part.rename(entry)
+    _make_room(entry)
+
+
+@functools.cache
+def _own() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="rps-pin-")
+
+
+def fall_back(reason: OSError) -> Path:
+    """Return a folder that goes with this process, and warn that the cache could not be used."""
+    with _private:
+        own = Path(_own().name)
+    warnings.warn(
+        f"the cache folder {cache_folder()} cannot be used ({reason.strerror or reason}): what is "
+        f"built is kept in {own} until this process ends. Set {VARIABLE} to a folder that can be "
+        "written to",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+    return own
+
+
+def _load(entry: Path, source: Source) -> Library | None:
+    try:
+        code = (entry / _LIBRARY).read_bytes()
+        found = _read(entry, code)
+        if found is None:
+            return None
+        library = load(entry / _LIBRARY, source.functions, found["compiler"])
+    except OSError:  # no library, or it was removed meanwhile
+        return None
+    library.proof = found["proof"]
+    return library
+
+
+def _read(entry: Path, code: bytes) -> dict[str, Any] | None:
+    """Return an entry's record if it is whole, and note that it was used."""
+    try:
+        record = json.loads((entry / _RECORD).read_text("utf-8"))
+        wanted = record.pop("digest")
+    except (OSError, ValueError, KeyError, AttributeError, TypeError):
+        return None
+    if wanted != _digest(code, record):
+        return None
+    with suppress(OSError):  # it may be read-only
+        os.utime(entry / _RECORD)
+    return dict(record)
+
+
+def _digest(code: bytes, about: Mapping[str, Any]) -> str:
+    text = json.dumps(about, sort_keys=True).encode()
+    return hashlib.sha256(hashlib.sha256(code).digest() + text).hexdigest()
+
+
+def _entries(folder: Path) -> list[Path]:
+    try:
+        return [one for one in folder.iterdir() if one.is_dir() and _PART not in one.name]
+    except OSError:
+        return []
+
+
+def _used(entry: Path) -> float:
+    try:
+        return (entry / _RECORD).stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _size(entry: Path) -> int:
+    return sum(file.stat().st_size for file in entry.glob("*"))
+
+
+def _make_room(newest: Path) -> None:
+    """Remove what was used the longest time ago, until the cache is small enough."""
+    entries = sorted(_entries(newest.parent), key=_used)
+    sizes = [_size(entry) for entry in entries]
+    excess = sum(sizes) - LARGEST
+    for entry, size in zip(entries, sizes, strict=True):
+        if excess > 0 and entry != newest:
+            excess -= size
+            _remove(entry)
+
+
+def _remove(entry: Path) -> bool:
+    """Remove an entry at one blow: who reads it meanwhile finds all of it, or nothing."""
+    try:
+        gone = Path(tempfile.mkdtemp(prefix=f"{entry.name}{_PART}", dir=entry.parent))
+        entry.rename(gone / "entry")
+    except OSError:
+        return False
+    shutil.rmtree(gone, ignore_errors=True)
+    return True

@@ -1,0 +1,160 @@
+"""Compilers of the system: which there are, and from C texts to a shared library by one of them."""
+
+from __future__ import annotations
+
+import errno
+import functools
+import os
+import platform
+import shlex
+import shutil
+import signal
+import subprocess
+from pathlib import Path
+from typing import NamedTuple
+
+from rps_pin.codegen.build import process
+from rps_pin.codegen.build.source import Source, digest
+from rps_pin.errors import CompileError
+
+#: Searched for on PATH, the best first.
+NAMES = ("gcc", "clang", "cc")
+#: Environment variables with a command that comes before those.
+VARIABLES = ("RPS_PIN_CC", "CC")
+#: No contraction to fused multiply-add: results are then the same bits from every compiler, and one
+#: by one as in lanes. Never -ffast-math: with GCC 12 it changes the arithmetic of all of Python.
+FLAGS = ("-std=gnu99", "-O2", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
+_NATIVE = {"x86_64": "-march=native", "aarch64": "-mcpu=native", "arm64": "-mcpu=native"}
+_LINES = 8
+HOW_TO_GET = "pip install 'rps-pin[compile]' for a small one, or apt-get install gcc"
+
+
+class Compiler(NamedTuple):
+    """A C compiler that runs here."""
+
+    command: tuple[str, ...]
+    version: str
+    target: str
+
+    def __str__(self) -> str:
+        return self.version
+
+    def flags(self, source: Source) -> list[str]:
+        """Return the flags for a source's texts."""
+        native = _NATIVE.get(platform.machine())
+        vectors = ["-DRPS_PIN_MVEC"] if source.vectors and has_libmvec() else []
+        return [*FLAGS, *([native] if native else []), *vectors, *source.flags]
+
+    def key(self, source: Source) -> str:
+        """Return a digest of the compiler and its flags."""
+        return digest(self.version, self.target, self.flags(source))
+
+
+def has_libmvec() -> bool:
+    """Whether the C library has sines of vectors: glibc's has, on x86."""
+    return platform.libc_ver()[0] == "glibc" and platform.machine() == "x86_64"
+
+
+def find(name: str) -> list[Compiler]:
+    """Return the compilers that a name stands for, the best first.
+
+    ``"auto"``: all that there are; ``"cc"``: those of the environment variables, and cc; otherwise
+    the one of that name. A compiler for another machine is none, and neither is one that does not
+    run.
+    """
+    variables = [os.environ.get(one, "") for one in VARIABLES]
+    names = {"auto": (*variables, *NAMES), "cc": (*variables, "cc")}.get(name, (name,))
+    compilers: dict[tuple[str, ...], Compiler] = {}
+    for command in map(shlex.split, names):
+        path = shutil.which(command[0]) if command else None
+        if path is not None:
+            compiler = _identify((path, *command[1:]), Path(path).stat().st_mtime_ns)
+            if compiler is not None:  # the same under two names counts once
+                compilers.setdefault((compiler.version, *command[1:]), compiler)
+    return list(compilers.values())
+
+
+@functools.cache
+def _identify(command: tuple[str, ...], _changed: int) -> Compiler | None:
+    try:
+        run = subprocess.run(
+            [*command, "-v"],
+            capture_output=True,
+            text=True,
+            timeout=20,
+            check=False,
+            stdin=subprocess.DEVNULL,
+            env={**os.environ, "LC_ALL": "C"},
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    lines = (run.stderr + run.stdout).splitlines()
+    version = next((line.strip() for line in lines if " version " in line), "")
+    target = next((line.split()[-1] for line in lines if line.startswith("Target: ")), "")
+    here = {"arm64": ("arm64", "aarch64"), "aarch64": ("arm64", "aarch64")}
+    fits = not target or target.startswith(here.get(platform.machine(), (platform.machine(),)))
+    return Compiler(command, version, target) if run.returncode == 0 and version and fits else None
+
+
+def in_background(compiler: Compiler) -> Compiler:
+    """Return the compiler with a lower priority."""
+    nice = shutil.which("nice")
+    return compiler._replace(command=(nice, "-n", "10", *compiler.command)) if nice else compiler
+
+
+def compile_library(
+    source: Source, compiler: Compiler, folder: Path, limit: float, watch: process.Watch
+) -> Path:
+    """Compile a source into a shared library in a folder that is there.
+
+    Raises
+    ------
+    CompileError
+        If the compiler fails, is killed, or takes longer than `limit`, s.
+    OSError
+        If the folder cannot be written to, or is full.
+    """
+    total = len(source.units) + 1
+    objects = []
+    for number, text in enumerate(source.units):
+        (folder / f"{number}.c").write_text(text, "utf-8")
+        objects.append(f"{number}.o")
+    flags = compiler.flags(source)
+    steps = [[*compiler.command, *flags, "-c", f"{one[:-2]}.c", "-o", one] for one in objects]
+    library = folder / "library.so"
+    mvec = ["-lmvec"] if "-DRPS_PIN_MVEC" in flags else []
+    link = [*compiler.command, "-shared", *objects, "-o", library.name, *mvec, "-lm"]
+    for before, commands in ((0, steps), (total - 1, [link])):
+
+        def seen(done: int, _: int, before: int = before) -> None:
+            watch(before + done, total)
+
+        for ended in process.run(commands, folder, limit, seen):
+            _check(ended, source, compiler, limit)
+    if not library.is_file():
+        raise CompileError(f"{compiler} ended without an error, but made no library", str(compiler))
+    return library
+
+
+def _check(ended: process.Ended, source: Source, compiler: Compiler, limit: float) -> None:
+    if ended.status == 0:
+        return
+    if os.strerror(errno.ENOSPC) in ended.words:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    what = f"{compiler} could not compile {source.name}"
+    if ended.status is None:
+        why = f"it took longer than {limit:g} s and was ended"
+    elif ended.status > 128:
+        why = f"it was killed by {_signal(ended.status - 128)}"
+    else:
+        why = f"it ended with status {ended.status}"
+    lines = ended.words.splitlines()
+    first = [line for line in lines if "error" in line.lower()] or lines
+    raise CompileError("\n".join([f"{what}: {why}", *first[:_LINES]]), str(compiler), ended.words)
+
+
+def _signal(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"
