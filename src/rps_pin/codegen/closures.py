@@ -1,0 +1,339 @@
+"""Gaps, Jacobian and constraint bias of loop closures as sparse CasADi expressions.
+
+The rows are those of `closed_loop.constraints.rows`, unscaled. Let e be the vector from b's origin
+to a's. Rows of spherical, rigid and distance closures come from the motions of a and of b relative
+to the nearest joint that carries both, in that joint's axes; those of the other kinds from the
+motion of b relative to a, in a's axes. Either way the columns of the joints that carry both ends
+are structurally zero. Biases are accelerations at constant v; nothing is differentiated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.closures import JointCoupling, LoopClosure
+from rps_pin.closed_loop.constraints.equations import ClosureEquations
+from rps_pin.closed_loop.constraints.rows import across
+from rps_pin.codegen.chains import Chains, End, Expression, Motion, constant, cross, tidy
+
+#: A sine that vanishes beside rounding errors, in place of 0 in the quotient of an angle and its
+#: sine. Its square is a normal number in single precision too.
+_TINY = 2.0**-62
+#: A direction that is perpendicular to no likely axis.
+_ANY = np.array([1.0, 0.7, 0.4])
+
+
+class _Rows(NamedTuple):
+    """Rows of one closure."""
+
+    gap: Expression
+    jacobian: Expression
+    rate: Expression
+    bias: Expression
+
+
+class _InWorld(NamedTuple):
+    """A closure whose rows are the package's when turned to world axes."""
+
+    rows: slice
+    joint: int
+    """The nearest common ancestor, in whose axes they are."""
+    is_point: bool
+    """Whether it is spherical."""
+
+
+class ClosureRows:
+    """Rows of all closures of a mechanism, stacked in order.
+
+    Attributes
+    ----------
+    gap, rate, bias : SX, (nc, 1)
+        The gaps, m and rad; J v; and J' v, the derivative of J along the motion.
+    jacobian : SX, (nc, nv)
+        J, sparse.
+    """
+
+    def __init__(
+        self, tree: Any, chains: Chains, parts: list[_Rows], in_world: list[_InWorld]
+    ) -> None:
+        self._tree, self._chains, self._in_world = tree, chains, in_world
+        nv = tree.v.numel()
+        self.gap = tidy(ca.vertcat(ca.SX(0, 1), *(part.gap for part in parts)))
+        self.jacobian = tidy(ca.vertcat(ca.SX(0, nv), *(part.jacobian for part in parts)))
+        self.rate = tidy(ca.vertcat(ca.SX(0, 1), *(part.rate for part in parts)))
+        self.bias = tidy(ca.vertcat(ca.SX(0, 1), *(part.bias for part in parts)))
+
+    def in_package(self, x: Expression) -> Expression:
+        """Turn rows (nc, k), or multipliers, from these axes to those of `ClosureEquations`.
+
+        This is exact for gaps, multipliers, and the Jacobian and bias where the loops are closed
+        and v keeps them closed; `package_jacobian` and `package_bias` are exact everywhere.
+        """
+        result = ca.SX(x)
+        for closure in self._in_world:
+            if closure.joint:
+                turn, _ = self._tree.world(closure.joint)
+                for start in range(closure.rows.start, closure.rows.stop, 3):
+                    result[start : start + 3, :] = turn @ result[start : start + 3, :]
+        return result
+
+    def package_jacobian(self) -> Expression:
+        """Return the J of `ClosureEquations`, (nc, nv), also where the loops are open.
+
+        With w the angular velocity of the common ancestor, R its rotation and e a spherical
+        closure's gap, all in world axes, the gap's rate has the additional term w x e.
+        """
+        result, gaps = self.in_package(self.jacobian), self.in_package(self.gap)
+        for closure in self._in_world:
+            if closure.joint and closure.is_point:
+                carried = self._carrier(closure.joint).spin_jacobian
+                result[closure.rows, :] -= ca.skew(gaps[closure.rows]) @ carried
+        return tidy(result)
+
+    def package_bias(self) -> Expression:
+        """Return the J' v of `ClosureEquations`, (nc, 1), for any v and open loops too.
+
+        In addition to R J' v: w x R J v for a rigid closure; 2 w x R J v + w' x e + w x (w x e)
+        for a spherical one.
+        """
+        result, gaps = self.in_package(self.bias), self.in_package(self.gap)
+        rates = self.in_package(self.rate)
+        for closure in self._in_world:
+            if not closure.joint:
+                continue
+            carrier = self._carrier(closure.joint)
+            for start in range(closure.rows.start, closure.rows.stop, 3):
+                here = slice(start, start + 3)
+                result[here] += cross(carrier.spin, rates[here])
+                if closure.is_point:
+                    moved = rates[here] + cross(carrier.spin, gaps[here])
+                    result[here] += cross(carrier.spin, moved)
+                    result[here] += cross(carrier.spin_rate, gaps[here])
+        return tidy(result)
+
+    def _carrier(self, joint: int) -> Motion:
+        """Return a joint's motion relative to the world."""
+        return self._chains.from_joint(0, End(joint, ca.SX.eye(3), ca.SX(3, 1)))
+
+
+def closure_rows(tree: Any, equations: ClosureEquations) -> ClosureRows:
+    """Return the rows of all closures of a mechanism.
+
+    Parameters
+    ----------
+    tree
+        A `Tree` of the split model. The closures' frames stand where its `parameters` say, or, if
+        it has none, as in its model.
+    equations
+        The mechanism's closures; their model may be the one before `split`.
+
+    Raises
+    ------
+    MechanismError
+        If a frame or joint of a closure is not in the tree.
+    """
+    chains, parts, in_world, start = Chains(tree), [], [], 0
+    for closure in equations.closures:
+        rows = slice(start, start + closure.size)
+        start = rows.stop
+        if isinstance(closure, JointCoupling):
+            parts.append(_coupling(tree, closure))
+            continue
+        ends = _ends(tree, closure)
+        parts.append(_KINDS[closure.kind](chains, ends, closure))
+        if closure.kind in ("spherical", "rigid"):
+            root = chains.ancestor(ends[0].joint, ends[1].joint)
+            in_world.append(_InWorld(rows, root, closure.kind == "spherical"))
+    return ClosureRows(tree, chains, parts, in_world)
+
+
+_Ends = tuple[End, End]
+
+
+def _ends(tree: Any, closure: LoopClosure) -> _Ends:
+    """Return the two frames of a closure."""
+    frames = [tree.model.frames[index] for index in closure.frame_ids(tree.model)]
+    if tree.parameters is None:
+        placements = [(frame.placement.rotation, frame.placement.translation) for frame in frames]
+    else:
+        placements = tree.parameters.closure_placements(closure.name)
+    a, b = (
+        End(int(frame.parentJoint), tidy(ca.SX(rotation)), tidy(ca.SX(origin)))
+        for frame, (rotation, origin) in zip(frames, placements, strict=True)
+    )
+    return a, b
+
+
+def _coupling(tree: Any, coupling: JointCoupling) -> _Rows:
+    """q_joint - ratio q_other - offset = 0."""
+    one, other = (tree.model.joints[index] for index in coupling.joint_ids(tree.model))
+    jacobian = ca.SX(1, tree.v.numel())
+    jacobian[0, one.idx_v], jacobian[0, other.idx_v] = 1.0, -coupling.ratio
+    gap = tree.q[one.idx_q] - coupling.ratio * tree.q[other.idx_q] - coupling.offset
+    return _Rows(gap, jacobian, jacobian @ tree.v, ca.SX(1, 1))
+
+
+# Rows in the common ancestor's axes ---------------------------------------------------------------
+
+
+def _from_ancestor(chains: Chains, ends: _Ends) -> tuple[Motion, Motion]:
+    root = chains.ancestor(ends[0].joint, ends[1].joint)
+    return chains.from_joint(root, ends[0]), chains.from_joint(root, ends[1])
+
+
+def _point_to_point(a: Motion, b: Motion) -> _Rows:
+    """E = x_a - x_b and its derivatives."""
+    return _Rows(
+        tidy(a.origin - b.origin),
+        tidy(a.jacobian - b.jacobian),
+        tidy(a.velocity - b.velocity),
+        tidy(a.acceleration - b.acceleration),
+    )
+
+
+def _spherical(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
+    return _point_to_point(*_from_ancestor(chains, ends))
+
+
+def _rigid(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
+    """Velocity of a less that of b, both at a's origin: e' - w_b x e; and w_a - w_b."""
+    a, b = _from_ancestor(chains, ends)
+    gap, jacobian, rate, bias = _point_to_point(a, b)
+    return _Rows(
+        ca.vertcat(gap, _turn_between(a.rotation, b.rotation)),
+        ca.vertcat(jacobian + ca.skew(gap) @ b.spin_jacobian, a.spin_jacobian - b.spin_jacobian),
+        ca.vertcat(rate - cross(b.spin, gap), a.spin - b.spin),
+        ca.vertcat(bias - cross(b.spin_rate, gap) - cross(b.spin, rate), a.spin_rate - b.spin_rate),
+    )
+
+
+def _distance(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
+    """L - |e|, with u = e / |e|: rate -u . e'; J' v = -u . e'' - (e'^2 - (u . e')^2) / |e|."""
+    assert closure.distance is not None  # its constructor saw to that
+    a, b = _from_ancestor(chains, ends)
+    apart, _, rate, bias = _point_to_point(a, b)
+    length = ca.norm_2(apart)
+    u = apart / length
+    along = u.T @ rate
+    across_square = (rate.T @ rate - along**2) / length
+    gap, jacobian = closure.distance - length, b.along(u) - a.along(u)
+    return _Rows(gap, jacobian, -along, -(u.T @ bias) - across_square)
+
+
+# Rows in frame a's axes ---------------------------------------------------------------------------
+
+
+def _selected(
+    points: Callable[[LoopClosure], Array] | None,
+    turns: Callable[[Motion, LoopClosure], _Rows] | None,
+) -> Callable[[Chains, _Ends, LoopClosure], _Rows]:
+    """Return rows that hold b's origin across directions in a, and rows that hold b's rotation."""
+
+    def rows(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
+        motion, parts = chains.between(*ends), []
+        if points:
+            directions = constant(points(closure))
+            parts.append(
+                _Rows(
+                    -directions @ motion.origin,
+                    -directions @ motion.jacobian,
+                    -directions @ motion.velocity,
+                    -directions @ motion.acceleration,
+                )
+            )
+        if turns:
+            parts.append(turns(motion, closure))
+        return _Rows(*(ca.vertcat(*part) for part in zip(*parts, strict=True)))
+
+    return rows
+
+
+def _whole(closure: LoopClosure) -> Array:
+    return np.eye(3)
+
+
+def _line(closure: LoopClosure) -> Array:
+    return across(np.array(closure.axis))
+
+
+def _plane(closure: LoopClosure) -> Array:
+    return np.array([closure.axis])
+
+
+def _frame(motion: Motion, closure: LoopClosure) -> _Rows:
+    """-log R, -w: the frames stay parallel."""
+    gap = _turn_between(ca.SX.eye(3), motion.rotation)
+    return _Rows(gap, -motion.spin_jacobian, -motion.spin, -motion.spin_rate)
+
+
+def _crosswise(motion: Motion, closure: LoopClosure) -> _Rows:
+    """B's axis stays perpendicular to a's: m . n."""
+    m = constant(np.array([closure.axis]))
+    n = tidy(motion.rotation @ constant(np.array(closure.axis_b)))
+    return _Rows(m @ n, *_turning(m, n, motion))
+
+
+def _parallel(motion: Motion, closure: LoopClosure) -> _Rows:
+    """B's axis n stays parallel to a's, and its gap is the rotation vector from n to it."""
+    axis = np.array(closure.axis)
+    n = tidy(motion.rotation @ constant(np.array(closure.axis_b)))
+    sines = constant(np.cross(axis, across(axis)))  # (n x axis) . t = n . (axis x t)
+    turn, cosine = tidy(sines @ n), constant(axis).T @ n
+    # Opposite axes have no sine, and any direction across will do.
+    gap = _rotation_vector(turn, cosine, constant(np.array([1.0, 0.0])))
+    return _Rows(gap, *_turning(sines, n, motion))
+
+
+def _turning(m: Expression, n: Expression, motion: Motion) -> tuple[Expression, ...]:
+    """Return J, J v and J' v of m . n, m (k, 3) fixed: n' = w x n, n'' = w' x n + w x n'."""
+    moving = cross(motion.spin, n)
+    lever = tidy(-m @ ca.skew(n))  # m . (w x n) = (n x m) . w
+    return (
+        lever @ motion.spin_jacobian,
+        m @ moving,
+        m @ tidy(cross(motion.spin_rate, n) + cross(motion.spin, moving)),
+    )
+
+
+def _turn_between(a: Expression, b: Expression) -> Expression:
+    """Return -log(R_b R_a') of the rotations (3, 3) of two frames, a rotation vector (3, 1), rad.
+
+    Its sine is half the sum of b_i x a_i over their columns.
+    """
+    columns = list(zip(ca.horzsplit(a), ca.horzsplit(b), strict=True))
+    sine: Expression = ca.SX(3, 1)
+    trace: Expression = ca.SX(1, 1)
+    for of_a, of_b in columns:
+        sine, trace = sine + cross(of_b, of_a) / 2, trace + of_b.T @ of_a
+    # Half a turn has no sine; (R + 1) projects on its axis.
+    return _rotation_vector(sine, (trace - 1) / 2, (b @ a.T + ca.SX.eye(3)) @ constant(_ANY))
+
+
+def _rotation_vector(sine: Expression, cosine: Expression, otherwise: Expression) -> Expression:
+    """Return the rotation vector along `sine`, or along `otherwise` where its angle is half a turn.
+
+    angle * sine / |sine|; the quotient of angle and sine is 1 at 0, with finite derivatives.
+    """
+    backward = cosine < 0
+    sine = sine + _TINY * backward * otherwise
+    length = ca.sqrt(ca.sumsqr(sine) + _TINY**2 * (1 - backward))
+    return ca.atan2(length, cosine) / length * sine
+
+
+_KINDS: dict[str, Callable[[Chains, _Ends, LoopClosure], _Rows]] = {
+    "spherical": _spherical,
+    "rigid": _rigid,
+    "revolute": _selected(_whole, _parallel),
+    "prismatic": _selected(_line, _frame),
+    "cylindrical": _selected(_line, _parallel),
+    "universal": _selected(_whole, _crosswise),
+    "planar": _selected(_plane, _parallel),
+    "point_on_line": _selected(_line, None),
+    "point_on_plane": _selected(_plane, None),
+    "distance": _distance,
+}
