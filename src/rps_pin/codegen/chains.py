@@ -44,32 +44,36 @@ class _Step(NamedTuple):
     """A joint on a path: its twist by v, in the axes of the path's first frame."""
 
     columns: range
+    sign: int
+    """-1 where the path goes up, 1 where it goes down."""
     rotation: Expression
     """R_i (3, 3)."""
     own_linear: Array
     own_angular: Array
-    """S_l and S_a (3, k), in the joint's axes, with the sign of the path's direction."""
+    """S_l and S_a (3, k), in the joint's axes."""
     linear: Expression
     angular: Expression
     """R_i S_l and R_i S_a."""
     slide: Expression
     spin: Expression
-    """R_i S_l v and R_i S_a v."""
+    """R_i S_l v and R_i S_a v, times the sign."""
 
 
 class Motion(NamedTuple):
     """Motion of frame b relative to frame a, in a's axes; all SX, sparse."""
 
+    sign: int
+    """+1 or -1: the factor s of the derivatives of x."""
     rotation: Expression
     """R (3, 3): coordinates in b turned to a's axes."""
     origin: Expression
     """x (3, 1), m."""
     jacobian: Expression
-    """Of x, (3, nv)."""
+    """Of s x, (3, nv)."""
     velocity: Expression
-    """x' (3, 1), m/s."""
+    """s x' (3, 1), m/s."""
     acceleration: Expression
-    """x'' at constant v, (3, 1), m/s^2."""
+    """s x'' at constant v, (3, 1), m/s^2."""
     spin_jacobian: Expression
     """Of the angular velocity w, (3, nv)."""
     spin: Expression
@@ -91,7 +95,7 @@ class Motion(NamedTuple):
             if len(step.columns) == 1:
                 row[0, of_step] = direction.T @ self.jacobian[:, of_step]
                 continue
-            turned = step.rotation.T @ direction
+            turned = step.rotation.T @ (self.sign * step.sign * direction)
             moment = cross(own, turned)
             linear, angular = constant(step.own_linear), constant(step.own_angular)
             row[0, of_step] = turned.T @ linear + moment.T @ angular
@@ -121,7 +125,7 @@ class Chains:
             second = self._tree.parents[second]
         return second
 
-    def from_joint(self, root: int, end: End) -> Motion:
+    def from_joint(self, root: int, end: End, sign: int = 1) -> Motion:
         """Return the motion of a frame relative to a joint's frame on the way to the world."""
         path = self._path(root, end.joint)
         steps, segments = [], []
@@ -132,9 +136,9 @@ class Chains:
         rotation = steps[-1].rotation if steps else ca.SX.eye(3)
         segments.append(tidy(rotation @ end.origin))
         own, _ = self._points_down(path, end.origin)
-        return self._motion(steps, segments, own, tidy(rotation @ end.rotation))
+        return self._motion(sign, steps, segments, own, tidy(rotation @ end.rotation))
 
-    def between(self, a: End, b: End) -> Motion:
+    def between(self, a: End, b: End, sign: int = 1) -> Motion:
         """Return the motion of frame b relative to frame a."""
         root = self.ancestor(a.joint, b.joint)
         up, down = self._path(root, a.joint)[::-1], self._path(root, b.joint)
@@ -159,7 +163,8 @@ class Chains:
             turn, origin = placement[joint]
             point = tidy(turn.T @ tidy(point - origin))
             own_up.append(point)
-        return self._motion(steps, segments, own_up[::-1] + own, tidy(rotation @ b.rotation))
+        own = own_up[::-1] + own
+        return self._motion(sign, steps, segments, own, tidy(rotation @ b.rotation))
 
     def _path(self, root: int, joint: int) -> list[int]:
         """Return the joints below `root` on the way down to `joint`, which is the last."""
@@ -182,11 +187,11 @@ class Chains:
 
     def _step(self, joint: int, rotation: Expression, sign: int) -> _Step:
         columns = self._tree.columns[joint]
-        own_linear, own_angular = (sign * part for part in self._tree.subspace[joint])
+        own_linear, own_angular = self._tree.subspace[joint]
         linear, angular = (tidy(rotation @ constant(s)) for s in (own_linear, own_angular))
-        v = self._tree.v[columns.start : columns.stop]
+        v = sign * self._tree.v[columns.start : columns.stop]
         slide, spin = tidy(linear @ v), tidy(angular @ v)
-        return _Step(columns, rotation, own_linear, own_angular, linear, angular, slide, spin)
+        return _Step(columns, sign, rotation, own_linear, own_angular, linear, angular, slide, spin)
 
     def _points_down(
         self, path: list[int], point: Expression
@@ -201,6 +206,7 @@ class Chains:
 
     def _motion(
         self,
+        sign: int,
         steps: list[_Step],
         segments: list[Expression],
         own_points: list[Expression],
@@ -216,18 +222,19 @@ class Chains:
         to_tip, velocity, acceleration, spin, spin_rate = (ca.SX(3, 1) for _ in range(5))
         for (step, own), segment in zip(levers[::-1], segments[:0:-1], strict=True):
             to_tip = tidy(to_tip + segment)
-            block = _columns(step, to_tip, own)
+            block = _columns(step, sign * step.sign, to_tip, own)
             of_step = slice(step.columns.start, step.columns.stop)
-            jacobian[:, of_step], spin_jacobian[:, of_step] = block, step.angular
+            jacobian[:, of_step], spin_jacobian[:, of_step] = block, step.sign * step.angular
             moved = block @ self._tree.v[of_step]
             if len(step.columns) > 1 and block.nnz():
-                moved = step.slide + cross(step.spin, to_tip)
+                moved = sign * step.slide + _signed_cross(sign, step.spin, to_tip)
             faster = velocity + moved
             acceleration = acceleration + cross(step.spin, velocity + faster)
             velocity = faster
             spin_rate = spin_rate + cross(step.spin, spin)
             spin = spin + step.spin
         return Motion(
+            sign,
             rotation,
             tidy(to_tip + segments[0]),
             tidy(jacobian),
@@ -240,18 +247,23 @@ class Chains:
         )
 
 
-def _columns(step: _Step, to_tip: Expression, own: Expression) -> Expression:
-    """Return c = R (S_l + S_a x r) = R S_l + (R S_a) x R r, each column in the cheaper form."""
+def _columns(step: _Step, sign: int, to_tip: Expression, own: Expression) -> Expression:
+    """Return +-R (S_l + S_a x r) = +-(R S_l + (R S_a) x R r), each column in the cheaper form."""
     columns = []
     for k in range(len(step.columns)):
         angular = constant(step.own_angular[:, k])
-        in_own_axes = tidy(constant(step.own_linear[:, k]) + cross(angular, own))
-        axis = step.angular[:, k]
+        in_own_axes = constant(step.own_linear[:, k]) + cross(angular, own)
+        in_own_axes, axis = tidy(sign * in_own_axes), step.angular[:, k]
         if _products(step.rotation, in_own_axes) <= _products(ca.skew(axis), to_tip):
             columns.append(step.rotation @ in_own_axes)
         else:
-            columns.append(step.linear[:, k] + cross(axis, to_tip))
+            columns.append(sign * step.linear[:, k] + _signed_cross(sign, axis, to_tip))
     return tidy(ca.horzcat(*columns))
+
+
+def _signed_cross(sign: int, a: Expression, b: Expression) -> Expression:
+    """Return sign a x b without a change of sign."""
+    return cross(a, b) if sign > 0 else cross(b, a)
 
 
 def _products(matrix: Expression, vector: Expression) -> int:

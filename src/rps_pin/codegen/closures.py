@@ -182,17 +182,18 @@ def _coupling(tree: Any, coupling: JointCoupling) -> _Rows:
 
 
 def _from_ancestor(chains: Chains, ends: _Ends) -> tuple[Motion, Motion]:
+    """Return the motions of a and b, derivatives of b's origin with a changed sign."""
     root = chains.ancestor(ends[0].joint, ends[1].joint)
-    return chains.from_joint(root, ends[0]), chains.from_joint(root, ends[1])
+    return chains.from_joint(root, ends[0]), chains.from_joint(root, ends[1], sign=-1)
 
 
 def _point_to_point(a: Motion, b: Motion) -> _Rows:
     """E = x_a - x_b and its derivatives."""
     return _Rows(
         tidy(a.origin - b.origin),
-        tidy(a.jacobian - b.jacobian),
-        tidy(a.velocity - b.velocity),
-        tidy(a.acceleration - b.acceleration),
+        tidy(a.jacobian + b.jacobian),
+        tidy(a.velocity + b.velocity),
+        tidy(a.acceleration + b.acceleration),
     )
 
 
@@ -213,16 +214,16 @@ def _rigid(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
 
 
 def _distance(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
-    """L - |e|, with u = e / |e|: rate -u . e'; J' v = -u . e'' - (e'^2 - (u . e')^2) / |e|."""
+    """L - |e|, with u = -e / |e|: rate u . e'; J' v = u . e'' - (e'^2 - (u . e')^2) / |e|."""
     assert closure.distance is not None  # its constructor saw to that
     a, b = _from_ancestor(chains, ends)
     apart, _, rate, bias = _point_to_point(a, b)
     length = ca.norm_2(apart)
-    u = apart / length
+    u = apart / -length
     along = u.T @ rate
     across_square = (rate.T @ rate - along**2) / length
-    gap, jacobian = closure.distance - length, b.along(u) - a.along(u)
-    return _Rows(gap, jacobian, -along, -(u.T @ bias) - across_square)
+    gap, jacobian = closure.distance - length, a.along(u) + b.along(u)
+    return _Rows(gap, jacobian, along, u.T @ bias - across_square)
 
 
 # Rows in frame a's axes ---------------------------------------------------------------------------
@@ -235,15 +236,15 @@ def _selected(
     """Return rows that hold b's origin across directions in a, and rows that hold b's rotation."""
 
     def rows(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
-        motion, parts = chains.between(*ends), []
+        motion, parts = chains.between(*ends, sign=-1), []
         if points:
             directions = constant(points(closure))
             parts.append(
                 _Rows(
                     -directions @ motion.origin,
-                    -directions @ motion.jacobian,
-                    -directions @ motion.velocity,
-                    -directions @ motion.acceleration,
+                    directions @ motion.jacobian,
+                    directions @ motion.velocity,
+                    directions @ motion.acceleration,
                 )
             )
         if turns:
