@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 import rps_pin
 from rps_pin import ClosedLoopModel, JointCoupling, LoopClosure
-from rps_pin.closed_loop.constraints.closures import KINDS
+from rps_pin.closed_loop.constraints.closures import KINDS, Closure
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
-from rps_pin.closed_loop.editing.split import split
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.codegen.closures import closure_rows
-from rps_pin.codegen.joints import Joint, clean, sparse
+from rps_pin.codegen.parameters import Parameters
+from rps_pin.codegen.tree import Tree
 from rps_pin.errors import MechanismError
 from tests.closed_loop.random_mechanisms import (
     ALL_KINDS,
@@ -36,30 +37,13 @@ Array = NDArray[np.float64]
 URDF = Path(rps_pin.__file__).parent / "urdf"
 
 
-def tree_of(model: pin.Model) -> Any:
-    """The part of a `Tree` that closures read."""
-    model = split(model)
-    q, v = ca.SX.sym("q", model.nq), ca.SX.sym("v", model.nv)
-    tree = SimpleNamespace(model=model, q=q, v=v, parents=list(model.parents), parameters=None)
-    tree.columns, tree.placement = [range(0)], [(ca.SX.eye(3), ca.SX(3, 1))]
-    tree.subspace = [(np.zeros((3, 0)), np.zeros((3, 0)))]
-    for index in range(1, model.njoints):
-        joint, at = model.joints[index], model.jointPlacements[index]
-        own = Joint(joint, model.names[index])
-        turn, shift = own.placement(q[joint.idx_q : joint.idx_q + joint.nq])
-        R, p = sparse(clean(at.rotation)), sparse(clean(at.translation))
-        tree.placement.append((R @ turn, p + R @ shift))
-        tree.columns.append(range(joint.idx_v, joint.idx_v + joint.nv))
-        tree.subspace.append((own.linear, own.angular))
+def tree_of(system: ConstraintSystem, names: Sequence[str] = ()) -> Tree:
+    parameters = Parameters(system, names)
+    return Tree(parameters.model, parameters)
 
-    def world(joint: int) -> Any:
-        if not joint:
-            return tree.placement[0]
-        (R, p), (turn, shift) = world(tree.parents[joint]), tree.placement[joint]
-        return R @ turn, p + R @ shift
 
-    tree.world = world
-    return tree
+def system_of(model: pin.Model, closures: Sequence[Closure]) -> ConstraintSystem:
+    return ConstraintSystem(model, closures, [model.names[1]])
 
 
 class Numbers(NamedTuple):
@@ -76,17 +60,20 @@ class Numbers(NamedTuple):
 class Rows:
     """Rows of a mechanism as expressions, and as numbers."""
 
-    def __init__(self, model: pin.Model, closures: Any, tree: Any = None) -> None:
-        self.equations = ClosureEquations(model, closures)
-        self.tree = tree or tree_of(model)
+    def __init__(self, system: ConstraintSystem, names: Sequence[str] = ()) -> None:
+        self.equations = system.equations
+        self.tree = tree_of(system, names)
         self.rows = rows = closure_rows(self.tree, self.equations)
         turned = [rows.in_package(x) for x in (rows.gap, rows.rate, rows.jacobian, rows.bias)]
         of_package = [rows.package_jacobian(), rows.package_bias()]
         outputs = [ca.densify(x) for x in (*turned, *of_package)]
-        self.function = ca.Function("rows", [self.tree.q, self.tree.v], outputs)
+        parameters = self.tree.parameters
+        symbols = [self.tree.q, self.tree.v, parameters.symbols]
+        self.function = ca.Function("rows", symbols, outputs)
 
-    def __call__(self, q: Array, v: Array) -> Numbers:
-        gap, rate, *matrices = (x.toarray() for x in self.function(q, v))
+    def __call__(self, q: Array, v: Array, parameters: Array | None = None) -> Numbers:
+        numbers = self.tree.parameters.nominal if parameters is None else parameters
+        gap, rate, *matrices = (x.toarray() for x in self.function(q, v, numbers))
         jacobian, bias, of_package, bias_of_package = matrices
         turned = (jacobian, bias[:, 0])
         return Numbers(gap[:, 0], of_package, bias_of_package[:, 0], rate[:, 0], turned)
@@ -122,7 +109,7 @@ def test_rows_are_those_of_the_package(kind: str, planar: bool) -> None:
     for seed in range(3):
         c = case(seed, kinds=[kind], planar=planar)
         model = c.mechanism.model
-        rows = Rows(model, c.mechanism.closures)
+        rows = Rows(c.mechanism.system)
         for size in (0.0, 1e-4, 0.3):
             q = moved(rng, model, c.q, size)
             found += errors(rows, q, rng.normal(size=model.nv))
@@ -140,7 +127,7 @@ def test_rows_are_those_of_the_package(kind: str, planar: bool) -> None:
 def test_rows_of_mechanisms_that_come_with_the_package(name: str) -> None:
     rng, found = np.random.default_rng(2), []
     mechanism = mechanism_of(name)
-    rows = Rows(mechanism.model, mechanism.closures)
+    rows = Rows(mechanism.system)
     q = mechanism.home
     for size in (0.0, 1e-3, 0.1):
         here = moved(rng, mechanism.model, q, size)
@@ -188,7 +175,7 @@ def test_a_moving_common_ancestor_has_no_columns(kind: str) -> None:
     rng, found = np.random.default_rng(3), []
     for seed in range(3):
         model, closure, _ = carried(kind, seed)
-        rows = Rows(model, [closure])
+        rows = Rows(system_of(model, [closure]))
         assert rows.rows.jacobian[:, : 6 + 1].nnz() == 0
         q = moved(rng, model, pin.neutral(model), 1.0)
         found += errors(rows, q, rng.normal(size=model.nv))
@@ -206,7 +193,7 @@ def test_closed_loops_on_a_moving_ancestor_need_only_be_turned(kind: str) -> Non
         a, b = closure.frame_ids(model)
         joint = model.frames[b].parentJoint
         model.frames[b].placement = data.oMi[joint].actInv(data.oMf[a] * allowed)
-        rows = Rows(model, [closure])
+        rows = Rows(system_of(model, [closure]))
         jacobian = rows.equations.jacobian(q)
         kernel = np.linalg.svd(jacobian)[2][np.linalg.matrix_rank(jacobian) :].T
         v = kernel @ rng.normal(size=kernel.shape[1])
@@ -225,8 +212,8 @@ def test_the_bias_is_the_derivative_of_the_jacobian(kind: str) -> None:
     for seed in range(2):
         c = case(seed, kinds=[kind])
         model = c.mechanism.model
-        tree = tree_of(model)
-        rows = closure_rows(tree, ClosureEquations(model, c.mechanism.closures))
+        tree = tree_of(c.mechanism.system)
+        rows = closure_rows(tree, c.mechanism.system.equations)
         function = ca.Function("rows", [tree.q, tree.v], [rows.jacobian, rows.bias])
         q, v = moved(rng, model, c.q, 0.1), rng.normal(size=model.nv)
 
@@ -242,7 +229,7 @@ def test_the_bias_is_the_derivative_of_the_jacobian(kind: str) -> None:
 
 def test_planar_loops_have_empty_rows() -> None:
     """A pin of the four-bar: its fifth of rows, out of the plane, and both of directions."""
-    rows = Rows((m := mechanism_of("four_bar")).model, m.closures).rows
+    rows = Rows(mechanism_of("four_bar").system).rows
     filled = sorted(set(rows.jacobian.sparsity().get_triplet()[0]))
     assert filled == [0, 2]  # x and z; the axis is y
     assert sorted(set(rows.bias.sparsity().get_triplet()[0])) == [0, 2]
@@ -258,7 +245,7 @@ def test_joints_through_the_point_have_no_columns() -> None:
     along = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.5]))
     ball = model.addJoint(spin, pin.JointModelSpherical(), along, "ball")
     model.addFrame(pin.Frame("tip", ball, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    jacobian = Rows(model, [LoopClosure("tip", "universe")]).rows.jacobian
+    jacobian = Rows(system_of(model, [LoopClosure("tip", "universe")])).rows.jacobian
     assert jacobian[:, 1:].nnz() == 0
     assert jacobian[:, 0].nnz() == 2
 
@@ -266,7 +253,7 @@ def test_joints_through_the_point_have_no_columns() -> None:
 def test_a_coupling_has_two_constants() -> None:
     model = mechanism_of("five_bar").model
     one, other = model.names[1], model.names[3]
-    rows = Rows(model, [JointCoupling(one, other, -2.0, 0.5)]).rows
+    rows = Rows(system_of(model, [JointCoupling(one, other, -2.0, 0.5)])).rows
     assert rows.jacobian.is_constant()
     assert rows.jacobian.nnz() == 2
     assert rows.bias.nnz() == 0
@@ -298,8 +285,9 @@ def four_bars(count: int) -> tuple[pin.Model, list[LoopClosure]]:
 
 
 def _operations(model: pin.Model, closures: list[LoopClosure]) -> int:
-    tree = tree_of(model)
-    rows = closure_rows(tree, ClosureEquations(model, closures))
+    system = system_of(model, closures)
+    tree = tree_of(system)
+    rows = closure_rows(tree, system.equations)
     outputs = [rows.gap, rows.jacobian, rows.bias]
     return int(ca.Function("rows", [tree.q, tree.v], outputs).n_instructions())
 
@@ -314,7 +302,7 @@ def turned_by(angle: float, axis: Array, kind: str) -> tuple[Array, Array]:
     placement = pin.SE3(pin.exp3(angle * axis), np.zeros(3))
     model.addFrame(pin.Frame("a", 0, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
     model.addFrame(pin.Frame("b", joint, 0, placement, pin.FrameType.OP_FRAME))
-    rows = Rows(model, [LoopClosure("a", "b", kind)])
+    rows = Rows(system_of(model, [LoopClosure("a", "b", kind)]))
     q = np.zeros(1)
     return rows(q, q).gap, rows.equations.gaps(q)
 
@@ -338,48 +326,39 @@ def test_vanishing_angles_have_finite_derivatives() -> None:
     x = ca.SX.sym("x", 3)
     joint = pin.Model()
     joint.addJoint(0, pin.JointModelSphericalZYX(), pin.SE3.Identity(), "joint")
-    for name, kind in (("a", "revolute"), ("b", "rigid")):
+    for kind in ("revolute", "rigid"):
         model = joint.copy()
         for frame, parent in (("a", 0), ("b", 1)):
             model.addFrame(pin.Frame(frame, parent, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-        tree = tree_of(model)
-        rows = closure_rows(tree, ClosureEquations(model, [LoopClosure("a", "b", kind, name)]))
+        system = system_of(model, [LoopClosure("a", "b", kind)])
+        tree = tree_of(system)
+        rows = closure_rows(tree, system.equations)
         slope = ca.substitute(ca.jacobian(rows.gap, tree.q), tree.q, x)
         value = ca.Function("slope", [x], [slope])(np.zeros(3)).toarray()
-        jacobian = ClosureEquations(model, [LoopClosure("a", "b", kind)]).jacobian(np.zeros(3))
-        assert worst(value - jacobian) < 1e-12
+        assert worst(value - system.equations.jacobian(np.zeros(3))) < 1e-12
 
 
 # Parameters and bad input -------------------------------------------------------------------------
 
 
-def test_frames_stand_where_the_parameters_say() -> None:
-    """Frames moved as symbols: rows of the mechanism whose frames stand there."""
+@pytest.mark.parametrize("kind", KINDS)
+def test_frames_stand_where_the_parameters_say(kind: str) -> None:
+    """Moved frames as symbols: rows of the mechanism whose frames stand there."""
     rng = np.random.default_rng(6)
-    c = case(0, kinds=["revolute"])
-    model = c.mechanism.model.copy()
-    closures = [closure for closure in c.mechanism.closures if isinstance(closure, LoopClosure)]
-    asked = {}
-    for closure in closures:
-        for index in closure.frame_ids(model):
-            model.frames[index].placement = random_placement(rng)
-        asked[closure.name] = [
-            (
-                ca.SX(model.frames[index].placement.rotation),
-                model.frames[index].placement.translation,
-            )
-            for index in closure.frame_ids(model)
-        ]
-    tree = tree_of(c.mechanism.model)
-    tree.parameters = SimpleNamespace(closure_placements=asked.__getitem__)
-    rows = Rows(c.mechanism.model, closures, tree)
-    there = ClosureEquations(model, closures)
-    assert worst(rows(c.q, c.v).gap - there.gaps(c.q)) < 1e-12
-    assert worst(rows(c.q, c.v).jacobian - there.jacobian(c.q)) < 1e-12
+    c = case(0, kinds=[kind])
+    closure, model = c.mechanism.closures[0], c.mechanism.model.copy()
+    move = 0.3 * rng.normal(size=12)
+    for index, part in zip(closure.frame_ids(model), (move[:6], move[6:]), strict=True):
+        turn = pin.rpy.rpyToMatrix(*part[3:])
+        model.frames[index].placement = model.frames[index].placement * pin.SE3(turn, part[:3])
+    rows = Rows(c.mechanism.system, [f"closure:{closure.name}"])
+    found, there = rows(c.q, c.v, move), ClosureEquations(model, c.mechanism.closures)
+    errors = [found.gap - there.gaps(c.q), found.jacobian - there.jacobian(c.q)]
+    assert worst(*errors, found.bias - there.bias(c.q, c.v)) < 1e-12
 
 
 def test_a_frame_that_is_not_in_the_tree_is_named() -> None:
     mechanism = mechanism_of("four_bar")
-    other = tree_of(mechanism_of("delta").model)
+    other = tree_of(mechanism_of("delta").system)
     with pytest.raises(MechanismError, match="no frame 'coupler_tip'; there are:"):
         closure_rows(other, mechanism.system.equations)

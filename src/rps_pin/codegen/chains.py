@@ -18,18 +18,14 @@ are those of joints on whose axis b's origin lies.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from rps_pin.arrays import Array
-
-#: A CasADi SX matrix.
-Expression = Any
-
-#: Constants this close to 0 or to +-1 are rounding errors of it.
-ROUNDING = 1e-15
+from rps_pin.codegen.joints import ROUNDING, Expression
+from rps_pin.codegen.tree import Tree
 
 
 class End(NamedTuple):
@@ -108,10 +104,10 @@ class Chains:
     Parameters
     ----------
     tree
-        A `Tree`: `parents`, `columns`, `placement`, `subspace` and `v` are read.
+        The open tree.
     """
 
-    def __init__(self, tree: Any) -> None:
+    def __init__(self, tree: Tree) -> None:
         self._tree, self._nv = tree, tree.v.numel()
         self._down: dict[tuple[int, int], tuple[_Step, Expression]] = {}
 

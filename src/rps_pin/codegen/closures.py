@@ -10,7 +10,7 @@ are structurally zero. Biases are accelerations at constant v; nothing is differ
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -19,7 +19,9 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import JointCoupling, LoopClosure
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
 from rps_pin.closed_loop.constraints.rows import across
-from rps_pin.codegen.chains import Chains, End, Expression, Motion, constant, cross, tidy
+from rps_pin.codegen.chains import Chains, End, Motion, constant, cross, tidy
+from rps_pin.codegen.joints import Expression
+from rps_pin.codegen.tree import Tree
 
 #: A sine that vanishes beside rounding errors, in place of 0 in the quotient of an angle and its
 #: sine. Its square is a normal number in single precision too.
@@ -59,7 +61,7 @@ class ClosureRows:
     """
 
     def __init__(
-        self, tree: Any, chains: Chains, parts: list[_Rows], in_world: list[_InWorld]
+        self, tree: Tree, chains: Chains, parts: list[_Rows], in_world: list[_InWorld]
     ) -> None:
         self._tree, self._chains, self._in_world = tree, chains, in_world
         nv = tree.v.numel()
@@ -121,14 +123,13 @@ class ClosureRows:
         return self._chains.from_joint(0, End(joint, ca.SX.eye(3), ca.SX(3, 1)))
 
 
-def closure_rows(tree: Any, equations: ClosureEquations) -> ClosureRows:
+def closure_rows(tree: Tree, equations: ClosureEquations) -> ClosureRows:
     """Return the rows of all closures of a mechanism.
 
     Parameters
     ----------
     tree
-        A `Tree` of the split model. The closures' frames stand where its `parameters` say, or, if
-        it has none, as in its model.
+        Of the split model. The closures' frames stand where its `parameters` say.
     equations
         The mechanism's closures; their model may be the one before `split`.
 
@@ -155,13 +156,10 @@ def closure_rows(tree: Any, equations: ClosureEquations) -> ClosureRows:
 _Ends = tuple[End, End]
 
 
-def _ends(tree: Any, closure: LoopClosure) -> _Ends:
+def _ends(tree: Tree, closure: LoopClosure) -> _Ends:
     """Return the two frames of a closure."""
     frames = [tree.model.frames[index] for index in closure.frame_ids(tree.model)]
-    if tree.parameters is None:
-        placements = [(frame.placement.rotation, frame.placement.translation) for frame in frames]
-    else:
-        placements = tree.parameters.closure_placements(closure.name)
+    placements = tree.parameters.closure_placements(closure.name)
     a, b = (
         End(int(frame.parentJoint), tidy(ca.SX(rotation)), tidy(ca.SX(origin)))
         for frame, (rotation, origin) in zip(frames, placements, strict=True)
@@ -169,7 +167,7 @@ def _ends(tree: Any, closure: LoopClosure) -> _Ends:
     return a, b
 
 
-def _coupling(tree: Any, coupling: JointCoupling) -> _Rows:
+def _coupling(tree: Tree, coupling: JointCoupling) -> _Rows:
     """q_joint - ratio q_other - offset = 0."""
     one, other = (tree.model.joints[index] for index in coupling.joint_ids(tree.model))
     jacobian = ca.SX(1, tree.v.numel())
