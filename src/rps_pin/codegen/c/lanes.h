@@ -1,0 +1,126 @@
+/* Macros of the generated text for LANES samples at once: REAL is a vector of doubles (GNU C). */
+#if defined(__AVX512F__)
+#define LANES 8
+#elif defined(__AVX2__)
+#define LANES 4
+#else
+#define LANES 2
+#endif
+typedef double lanes_real __attribute__((vector_size(8 * LANES)));
+typedef long long lanes_bits __attribute__((vector_size(8 * LANES)));
+#undef REAL
+#define REAL lanes_real
+
+/* A function of C for each lane. */
+#define EACH_LANE(name) \
+    static inline REAL name##_each(REAL x) \
+    { \
+        REAL r; \
+        for (int l = 0; l < LANES; ++l) r[l] = name(x[l]); \
+        return r; \
+    }
+#define EACH_LANE_2(name) \
+    static inline REAL name##_each(REAL x, REAL y) \
+    { \
+        REAL r; \
+        for (int l = 0; l < LANES; ++l) r[l] = name(x[l], y[l]); \
+        return r; \
+    }
+EACH_LANE(sqrt)
+EACH_LANE(tan)
+EACH_LANE(asin)
+EACH_LANE(acos)
+EACH_LANE(atan)
+EACH_LANE(sinh)
+EACH_LANE(cosh)
+EACH_LANE(tanh)
+EACH_LANE(asinh)
+EACH_LANE(acosh)
+EACH_LANE(atanh)
+EACH_LANE(exp)
+EACH_LANE(log)
+EACH_LANE(expm1)
+EACH_LANE(log1p)
+EACH_LANE(erf)
+EACH_LANE(floor)
+EACH_LANE(ceil)
+EACH_LANE_2(pow)
+EACH_LANE_2(atan2)
+EACH_LANE_2(hypot)
+EACH_LANE_2(fmod)
+#undef MATH
+#define MATH(name) name##_each
+
+/* Sines and cosines of glibc's vector library, within 4 units in the last place. */
+#if defined(__x86_64__) && defined(__GLIBC__) && !defined(NO_MVEC)
+#if LANES == 8
+REAL _ZGVeN8v_sin(REAL), _ZGVeN8v_cos(REAL);
+#define sin_each _ZGVeN8v_sin
+#define cos_each _ZGVeN8v_cos
+#elif LANES == 4
+REAL _ZGVdN4v_sin(REAL), _ZGVdN4v_cos(REAL);
+#define sin_each _ZGVdN4v_sin
+#define cos_each _ZGVdN4v_cos
+#else
+REAL _ZGVbN2v_sin(REAL), _ZGVbN2v_cos(REAL);
+#define sin_each _ZGVbN2v_sin
+#define cos_each _ZGVbN2v_cos
+#endif
+#else
+EACH_LANE(sin)
+EACH_LANE(cos)
+#endif
+
+#define ALL_LANES(x) ((x) - (REAL){0}) /* keeps the sign of -0.0 */
+#define BITS(x) ((lanes_bits)(x))
+#define SIGN_BIT ((lanes_bits){0} - 0x7fffffffffffffffLL - 1)
+#define TRUE_WHERE(mask) ((REAL)((mask) & BITS(ALL_LANES(1.0))))
+static inline REAL lanes_choose(lanes_bits mask, REAL x, REAL y)
+{
+    return (REAL)((mask & BITS(x)) | (~mask & BITS(y)));
+}
+static inline REAL lanes_copysign(REAL x, REAL y)
+{
+    return (REAL)((~SIGN_BIT & BITS(x)) | (SIGN_BIT & BITS(y)));
+}
+static inline REAL lanes_fmin(REAL x, REAL y) { return lanes_choose((x <= y) | (y != y), x, y); }
+static inline REAL lanes_fmax(REAL x, REAL y) { return lanes_choose((x >= y) | (y != y), x, y); }
+static inline int lanes_any(lanes_bits mask)
+{
+    long long any = 0;
+    for (int l = 0; l < LANES; ++l) any |= mask[l];
+    return any != 0;
+}
+
+#undef PART
+#define PART(name) name##_part_lanes
+#undef CONST
+#define CONST(x) ALL_LANES((double)(x))
+#undef FABS
+#define FABS(x) ((REAL)(~SIGN_BIT & BITS(x)))
+#undef COPYSIGN
+#define COPYSIGN(x, y) lanes_copysign(x, y)
+#undef FMIN
+#define FMIN(x, y) lanes_fmin(x, y)
+#undef FMAX
+#define FMAX(x, y) lanes_fmax(x, y)
+#undef SIGN
+#define SIGN(x) SELECT(EQ(x, CONST(0)) , x, SELECT(NE(x, x), x, COPYSIGN(CONST(1), x)))
+#undef LT
+#define LT(x, y) TRUE_WHERE((x) < (y))
+#undef LE
+#define LE(x, y) TRUE_WHERE((x) <= (y))
+#undef EQ
+#define EQ(x, y) TRUE_WHERE((x) == (y))
+#undef NE
+#define NE(x, y) TRUE_WHERE((x) != (y))
+#undef NOT
+#define NOT(x) TRUE_WHERE((x) == (REAL){0})
+#undef AND
+#define AND(x, y) TRUE_WHERE(((x) != (REAL){0}) & ((y) != (REAL){0}))
+#undef OR
+#define OR(x, y) TRUE_WHERE(((x) != (REAL){0}) | ((y) != (REAL){0}))
+#undef SELECT
+#define SELECT(c, x, y) lanes_choose((c) != (REAL){0}, x, y)
+#undef ANY
+#define ANY(c) lanes_any((c) != (REAL){0})

@@ -1,0 +1,69 @@
+/* Groups of LANES samples; the last group repeats its last sample. */
+static void many_gather(REAL *to, const double *from, long stride, int size, int count)
+{
+    const double *lane[LANES];
+    for (int l = 0; l < LANES; ++l) lane[l] = from + (l < count ? l : count - 1) * stride;
+    for (int k = 0; k < size; ++k)
+        for (int l = 0; l < LANES; ++l) to[k][l] = lane[l][k];
+}
+
+static void many_scatter(double *to, const REAL *from, int size, int count)
+{
+    if (count == LANES)
+        for (int k = 0; k < size; ++k)
+            for (int l = 0; l < LANES; ++l) to[l * size + k] = from[k][l];
+    else
+        for (int l = 0; l < count; ++l)
+            for (int k = 0; k < size; ++k) to[l * size + k] = from[k][l];
+}
+
+static lanes_bits many_not_finite(const REAL *x, int size)
+{
+    lanes_bits bad = {0};
+    for (int k = 0; k < size; ++k) bad |= (x[k] - x[k]) != (REAL){0};
+    return bad;
+}
+
+/* x and y have room for a group's inputs and outputs, the output `check` included. */
+static void many_groups(const many_shape *f, long n, const double *const *in, const long *stride,
+                        double *const *out, int *status, REAL *x, REAL *y,
+                        void (*group)(const REAL *x, REAL *y))
+{
+    const int *in_size = f->sizes, *out_size = f->sizes + f->inputs;
+    lanes_bits same_bad = {0}; /* of inputs that are the same for all samples */
+    REAL *to = x;
+    for (int i = 0; i < f->inputs; to += in_size[i++])
+        if (stride[i] == 0) {
+            many_gather(to, in[i], 0, in_size[i], 1);
+            same_bad |= many_not_finite(to, in_size[i]);
+        }
+    for (long s = 0; s < n; s += LANES) {
+        const int count = n - s < LANES ? (int)(n - s) : LANES;
+        lanes_bits bits = same_bad, open, singular;
+        if (count == 1) {
+            const int found = many_one(f, s, in, stride, out);
+            if (status) status[s] = found;
+            continue;
+        }
+        to = x;
+        for (int i = 0; i < f->inputs; to += in_size[i++])
+            if (stride[i] != 0) {
+                many_gather(to, in[i] + s * stride[i], stride[i], in_size[i], count);
+                bits |= many_not_finite(to, in_size[i]);
+            }
+        group(x, y);
+        const REAL *from = y;
+        for (int j = 0; j < f->outputs; from += out_size[j++]) {
+            many_scatter(out[j] + s * out_size[j], from, out_size[j], count);
+            bits |= many_not_finite(from, out_size[j]);
+        }
+        if (!status) continue;
+        bits &= 1;
+        if (f->checked) {
+            open = ~(from[0] <= CONST(1.0));
+            singular = ~(from[1] <= CONST(f->limit));
+            bits |= (open & 2) | (singular & 4);
+        }
+        for (int l = 0; l < count; ++l) status[s + l] = (int)bits[l];
+    }
+}
