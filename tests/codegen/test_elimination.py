@@ -180,8 +180,8 @@ def test_units_of_pivots_follow_the_row_scale() -> None:
     """A row in other units, with its factor, has the same pivots."""
     rng = np.random.default_rng(8)
     scale = np.array([1.0, 1e-3, 0.1, 1.0])
-    for mask in (np.ones((4, 3)), np.ones((2, 2)), np.ones((3, 3)), np.eye(3)):
-        mask = mask.astype(bool)
+    full = np.ones((4, 3), dtype=bool)
+    for mask in (full, full[:2, :2], full[:3], np.eye(3, dtype=bool)):
         matrix = np.where(mask, rng.normal(size=mask.shape), 0.0)
         here = scale[: mask.shape[0]]
         b, c = np.ones((mask.shape[0], 1)), np.ones((mask.shape[1], 1))

@@ -1,8 +1,8 @@
 """Choice of the independent velocities of a mechanism, from its Jacobian at closed configurations.
 
-With J of rank r, m = nv - r velocities u move independently and the others follow: J_d v_d = -J_u u,
-J_d of full column rank. Generated code has u fixed, so the choice is made once, for J_d well
-conditioned at all samples. `elimination.blocks` then orders J_d's rows and columns.
+With J of rank r, m = nv - r velocities u move independently and the others follow:
+J_d v_d = -J_u u, J_d of full column rank. Generated code has u fixed, so the choice is made once,
+for J_d well conditioned at all samples. `elimination.blocks` then orders J_d's rows and columns.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 from scipy.linalg import qr
-from scipy.sparse import bmat, csc_matrix, identity
+from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from rps_pin.arrays import Array, Bools, Indices
-from rps_pin.closed_loop.assembly.closing import closed_gap, close_gaps
+from rps_pin.closed_loop.assembly.closing import close_gaps, closed_gap
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.numerics.linear_algebra import (
@@ -156,9 +156,17 @@ def _solution(jacobian: Array, near: Array | None, right: Array | None) -> Array
     rows, columns = jacobian.shape
     if not rows:
         return np.zeros(columns) if near is None else near
-    sparse = csc_matrix(jacobian)
-    matrix = bmat(
-        [[identity(columns), sparse.T], [sparse, -_REGULARISATION * identity(rows)]], format="csc"
+    i, j = np.nonzero(jacobian)
+    entries, x, multipliers = jacobian[i, j], np.arange(columns), columns + np.arange(rows)
+    regularisation = np.full(rows, -_REGULARISATION)
+    matrix = csc_matrix(
+        (
+            np.concatenate([np.ones(columns), entries, entries, regularisation]),
+            (
+                np.concatenate([x, columns + i, j, multipliers]),
+                np.concatenate([x, j, columns + i, multipliers]),
+            ),
+        )
     )
     both = np.concatenate(
         [
