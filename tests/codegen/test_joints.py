@@ -11,7 +11,7 @@ import pytest
 import scipy.linalg
 
 from rps_pin import MechanismError
-from rps_pin.codegen.joints import Joint, clean
+from rps_pin.codegen.joints import Joint, _half_angle, clean
 from tests.closed_loop.editing.test_split import CHANGING, CONSTANT, PX, composite, unit, with_axis
 from tests.each import each
 from tests.worst import worst
@@ -119,6 +119,20 @@ def test_derivatives_of_integrate_are_finite_at_any_step(kind: str, size: float)
     expected = values(joint.tangent(symbol), (symbol, after)) @ inner.reshape(model.nv, model.nv)
     # Pinocchio's own derivative loses digits where it leaves its series.
     assert worst(found - expected) < 1e-9 * max(1, size)
+
+
+def test_series_of_small_angles_join_the_functions() -> None:
+    """In 64-bit mantissas; (t - sin t)/t^3 is only used times t^2."""
+    squared = ca.SX.sym("squared")
+    function = ca.Function("f", [squared], list(_half_angle(squared)))
+    for value in [*np.geomspace(1e-8, 30.0, 200), 0.01, np.nextafter(0.01, 0)]:
+        t = np.sqrt(np.longdouble(value))
+        sinc, cosine, cubic = (float(x) for x in function(value))
+        assert worst(sinc - np.sin(t / 2) / (t / 2), cosine - np.cos(t / 2)) < 3e-16
+        assert worst(value * cubic - (t - np.sin(t)) / t) < 3e-16
+        exact = 1 / 6 - value / 120 if value < 1e-6 else (t - np.sin(t)) / t**3
+        assert worst(cubic - exact) < 3e-14
+    assert [float(x) for x in function(0.0)] == [1.0, 1.0, 1 / 6]
 
 
 def test_coordinate_axes_keep_their_zeros() -> None:

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from rps_pin import ClosedLoopModel, InputError, JointCoupling, LoopClosure
+from rps_pin import ClosedLoopModel, InputError, JointCoupling, LoopClosure, MechanismError
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.editing.split import split
 from rps_pin.codegen.parameters import Parameters, moved_inertia
@@ -218,6 +218,8 @@ def test_placements_of_closures() -> None:
             assert worst(found[2 * k + 1][:, 0] - wanted.translation) < 1e-14
     fixed = Parameters(system_of(model)).closure_placements("loop")
     assert all(x.is_constant() for end in fixed for x in end)
+    with pytest.raises(MechanismError, match="no closure of frames 'gear'; there are: loop"):
+        parameters.closure_placements("gear")
 
 
 def test_labels_and_order() -> None:

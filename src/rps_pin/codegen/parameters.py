@@ -6,7 +6,7 @@ group              np   what it is
 gravity            3    the acceleration of gravity in the world's axes, m/s^2
 inertia:JOINT      10   of the joint's body: mass, first moment, inertia about the joint's origin,
                         as `pinocchio.Inertia.toDynamicParameters` has them, kg, kg m, kg m^2
-mass:JOINT         1    the body's mass, kg, its centre and its inertia per mass kept
+mass:JOINT         1    the mass, kg, of a body that has one, centre and inertia per mass kept
 placement:JOINT    6    a shift, m, and a turn (roll, pitch, yaw), rad, of the joint in its own
                         frame, nominal 0
 closure:NAME       12   the same of the closure's frames a and b
@@ -31,7 +31,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.editing.split import split
 from rps_pin.codegen.joints import Expression, Placement, clean, sparse
-from rps_pin.errors import InputError, did_you_mean, shown
+from rps_pin.errors import InputError, MechanismError, did_you_mean, shown
 from rps_pin.validation import real_vector
 
 #: Mass, first moment (3, 1) and inertia (3, 3) about the origin.
@@ -229,7 +229,16 @@ class Parameters:
         return self._numbers(self.model.frames[frame].placement)
 
     def closure_placements(self, closure: str) -> tuple[Placement, Placement]:
-        """Return R and p (m) of a closure's frames a and b in their joints' frames."""
+        """Return R and p (m) of a closure's frames a and b in their joints' frames.
+
+        Raises
+        ------
+        MechanismError
+            If there is no such closure of frames.
+        """
+        if closure not in self._closures:
+            known = ", ".join(self._closures) or "none"
+            raise MechanismError(f"no closure of frames {closure!r}; there are: {known}")
         closed = self._closures[closure]
         a, b = self.frame_placement(closed.frame_a), self.frame_placement(closed.frame_b)
         own = self._symbols.get(f"closure:{closure}")
@@ -256,13 +265,14 @@ class Parameters:
 def moved_inertia(body: Inertia, placement: Placement) -> Inertia:
     """Return a body's mass, first moment and inertia in and about the frame it is placed in.
 
-    With h' = R h and u = h' + m p / 2: h = h' + m p and I = R I R' + 2 (p.u) 1 - p u' - u p'.
+    With h' = R h and u = h' + m p / 2: h = h' + m p, and I = R I R' - (X + X') where
+    X = skew(p) skew(u).
     """
     (mass, first, inertia), (rotation, origin) = body, placement
     turned = rotation @ first
-    half = turned + mass * origin / 2
-    outer = origin @ half.T
-    full = rotation @ inertia @ rotation.T + 2 * ca.trace(outer) * ca.SX.eye(3) - outer - outer.T
+    half = ca.sparsify(ca.skew(turned + mass * origin / 2))
+    shifted = ca.sparsify(ca.skew(origin)) @ half
+    full = rotation @ inertia @ rotation.T - (shifted + shifted.T)
     return mass, turned + mass * origin, _symmetric(full)
 
 

@@ -14,6 +14,7 @@ with mass m, first moment h = m c and inertia I about the origin. No linear velo
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -67,6 +68,7 @@ class Tree:
         self.placement: list[Placement] = [(ca.SX.eye(3), ca.SX(3, 1))]
         self.subspace: list[tuple[Array, Array]] = [(np.zeros((3, 0)), np.zeros((3, 0)))]
         self._joints: list[tuple[Joint, slice, slice]] = []
+        self._bodies: list[Inertia] = [(ca.SX(1, 1), ca.SX(3, 1), ca.SX(3, 3))]
         for index in range(1, model.njoints):
             self._add(index)
         #: S_l, S_a and the velocities of each joint.
@@ -85,6 +87,7 @@ class Tree:
         rotation, translation = self.parameters.joint_placement(index)
         self.placement.append((rotation @ turn, translation + rotation @ shift))
         self.subspace.append((joint.linear, joint.angular))
+        self._bodies.append(self.parameters.inertia(index))
         self.columns.append(range(velocities.start, velocities.stop))
         self._joints.append((joint, coordinates, velocities))
 
@@ -122,7 +125,7 @@ class Tree:
             at_origin += linear @ a[own] + _cross(w + carried, slide)
             turnings.append(_Turning(w, dw))
             accelerations.append(at_origin)
-            force, moment = _inertial_force(self.parameters.inertia(i), turnings[i], at_origin)
+            force, moment = _inertial_force(self._bodies[i], turnings[i], at_origin)
             if external and i in external:
                 force, moment = force - external[i][0], moment - external[i][1]
             forces.append((force, moment))
@@ -142,7 +145,11 @@ class Tree:
         A velocity of joint j alone moves the composite body of j with momentum (F, L); column j of
         M is what the joints between j and the world see of it.
         """
-        bodies = [self.parameters.inertia(i) for i in range(len(self.parents))]
+        return ca.SX(self._mass_matrix)  # a copy: SX can be changed in place
+
+    @cached_property
+    def _mass_matrix(self) -> Expression:
+        bodies = list(self._bodies)
         mass_matrix, nv = ca.SX(self.model.nv, self.model.nv), self.model.nv
         # Momenta of the velocities of each joint and those beyond it, in the joint's axes.
         momenta = [(ca.SX(3, nv), ca.SX(3, nv)) for _ in self.parents]
@@ -173,7 +180,7 @@ class Tree:
             linear = rotation.T @ (linear + _cross(w, origin)) + slide @ self.v[own]
             w = rotation.T @ w + turn @ self.v[own]
             velocities.append((linear, w))
-            mass, first, inertia = self.parameters.inertia(i)
+            mass, first, inertia = self._bodies[i]
             momentum = mass * linear + 2 * _cross(w, first)
             energy += ca.dot(linear, momentum) + ca.dot(w, inertia @ w)
         return ca.densify(energy / 2)
@@ -182,7 +189,7 @@ class Tree:
         """Return the bodies' energy of weight, J, zero at the world's origin, shape (1, 1)."""
         moment = ca.SX(3, 1)
         for i in range(1, len(self.parents)):
-            mass, first, _ = self.parameters.inertia(i)
+            mass, first, _ = self._bodies[i]
             rotation, origin = self.world(i)
             moment += mass * origin + rotation @ first
         return ca.densify(-ca.dot(self.parameters.gravity, moment))
