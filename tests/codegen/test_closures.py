@@ -53,6 +53,7 @@ class Numbers(NamedTuple):
     jacobian: Array
     bias: Array
     rate: Array
+    opening: float
     turned: tuple[Array, Array]
     """Jacobian and bias by `in_package`."""
 
@@ -65,7 +66,7 @@ class Rows:
         self.tree = tree_of(system, names)
         self.rows = rows = closure_rows(self.tree, self.equations)
         turned = [rows.in_package(x) for x in (rows.gap, rows.rate, rows.jacobian, rows.bias)]
-        of_package = [rows.package_jacobian(), rows.package_bias()]
+        of_package = [rows.package_jacobian(), rows.package_bias(), rows.opening]
         outputs = [ca.densify(x) for x in (*turned, *of_package)]
         parameters = self.tree.parameters
         symbols = [self.tree.q, self.tree.v, parameters.symbols]
@@ -74,9 +75,10 @@ class Rows:
     def __call__(self, q: Array, v: Array, parameters: Array | None = None) -> Numbers:
         numbers = self.tree.parameters.nominal if parameters is None else parameters
         gap, rate, *matrices = (x.toarray() for x in self.function(q, v, numbers))
-        jacobian, bias, of_package, bias_of_package = matrices
+        jacobian, bias, of_package, bias_of_package, opening = matrices
         turned = (jacobian, bias[:, 0])
-        return Numbers(gap[:, 0], of_package, bias_of_package[:, 0], rate[:, 0], turned)
+        opening = float(opening[0, 0])
+        return Numbers(gap[:, 0], of_package, bias_of_package[:, 0], rate[:, 0], opening, turned)
 
 
 def errors(rows: Rows, q: Array, v: Array) -> list[Array]:
@@ -87,7 +89,22 @@ def errors(rows: Rows, q: Array, v: Array) -> list[Array]:
         found.jacobian - equations.jacobian(q),
         found.bias - equations.bias(q, v),
         found.rate - found.turned[0] @ v,
+        np.array([found.opening - opening(equations, q)]),
     ]
+
+
+def opening(equations: ClosureEquations, q: Array) -> float:
+    """Sum of the squared gaps by which the package finds loops open, m^2."""
+    scaled = equations.row_scale * equations.gaps(q)
+    total = 0.0
+    for closure in equations.closures:
+        if isinstance(closure, JointCoupling):
+            total += float(scaled[equations.rows(closure.name).start] ** 2)
+    for frames in equations.closed_frames:
+        placement = frames.constraint_data.c1Mc2
+        p, R = placement.translation.tolist(), placement.rotation.T.ravel().tolist()
+        total += frames.selected.squared_gap(equations.length, p, R)
+    return total
 
 
 def moved(rng: np.random.Generator, model: pin.Model, q: Array, size: float) -> Array:
@@ -295,8 +312,8 @@ def _operations(model: pin.Model, closures: list[LoopClosure]) -> int:
 # Gaps of large angles -----------------------------------------------------------------------------
 
 
-def turned_by(angle: float, axis: Array, kind: str) -> tuple[Array, Array]:
-    """Gaps of a closure whose frame b is turned by an angle: found, and the package's."""
+def turned_by(angle: float, axis: Array, kind: str) -> tuple[Numbers, Array]:
+    """Rows of a closure whose frame b is turned by an angle, and the package's gaps."""
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "joint")
     placement = pin.SE3(pin.exp3(angle * axis), np.zeros(3))
@@ -304,7 +321,7 @@ def turned_by(angle: float, axis: Array, kind: str) -> tuple[Array, Array]:
     model.addFrame(pin.Frame("b", joint, 0, placement, pin.FrameType.OP_FRAME))
     rows = Rows(system_of(model, [LoopClosure("a", "b", kind)]))
     q = np.zeros(1)
-    return rows(q, q).gap, rows.equations.gaps(q)
+    return rows(q, q), rows.equations.gaps(q)
 
 
 @pytest.mark.parametrize("kind", ["rigid", "prismatic", "revolute"])
@@ -312,14 +329,15 @@ def turned_by(angle: float, axis: Array, kind: str) -> tuple[Array, Array]:
 def test_gaps_of_any_angle(kind: str, angle: float) -> None:
     axis = np.array([0.6, 0.0, 0.8]) if kind != "revolute" else np.array([0.6, 0.8, 0.0])
     found, expected = turned_by(angle, axis, kind)
-    assert worst(found - expected) < 1e-12
+    assert worst(found.gap - expected) < 1e-12
 
 
 @pytest.mark.parametrize("kind", ["rigid", "prismatic", "revolute"])
 def test_half_a_turn_is_no_closed_loop(kind: str) -> None:
     for axis in np.eye(3)[:2]:
         found, _ = turned_by(np.pi, axis, kind)
-        assert np.linalg.norm(found) == pytest.approx(np.pi, abs=1e-9)
+        assert np.linalg.norm(found.gap) == pytest.approx(np.pi, abs=1e-9)
+        assert found.opening == pytest.approx(4.0)  # the diameter's square; the length is 1 m
 
 
 def test_vanishing_angles_have_finite_derivatives() -> None:

@@ -37,6 +37,10 @@ class _Rows(NamedTuple):
     jacobian: Expression
     rate: Expression
     bias: Expression
+    apart: Expression = 0.0
+    """Sum of the squared gaps of points, m^2."""
+    turned: Expression = 0.0
+    """Sum of the squared gaps of angles, rad^2, of which some are replaced by chords."""
 
 
 class _InWorld(NamedTuple):
@@ -58,10 +62,18 @@ class ClosureRows:
         The gaps, m and rad; J v; and J' v, the derivative of J along the motion.
     jacobian : SX, (nc, nv)
         J, sparse.
+    opening : SX, (1, 1)
+        Sum of the squared gaps of all closures, m^2, to second order in the gaps, and cheaper than
+        these: an angle t counts as 2 sin(t / 2) at the mechanism's characteristic length.
     """
 
     def __init__(
-        self, tree: Tree, chains: Chains, parts: list[_Rows], in_world: list[_InWorld]
+        self,
+        tree: Tree,
+        chains: Chains,
+        parts: list[_Rows],
+        in_world: list[_InWorld],
+        length: float,
     ) -> None:
         self._tree, self._chains, self._in_world = tree, chains, in_world
         nv = tree.v.numel()
@@ -69,6 +81,8 @@ class ClosureRows:
         self.jacobian = tidy(ca.vertcat(ca.SX(0, nv), *(part.jacobian for part in parts)))
         self.rate = tidy(ca.vertcat(ca.SX(0, 1), *(part.rate for part in parts)))
         self.bias = tidy(ca.vertcat(ca.SX(0, 1), *(part.bias for part in parts)))
+        turned = sum((part.turned for part in parts), ca.SX(1, 1))
+        self.opening = tidy(sum((part.apart for part in parts), length**2 * turned))
 
     def in_package(self, x: Expression) -> Expression:
         """Turn rows (nc, k), or multipliers, from these axes to those of `ClosureEquations`.
@@ -143,14 +157,14 @@ def closure_rows(tree: Tree, equations: ClosureEquations) -> ClosureRows:
         rows = slice(start, start + closure.size)
         start = rows.stop
         if isinstance(closure, JointCoupling):
-            parts.append(_coupling(tree, closure))
+            parts.append(_coupling(tree, closure, bool(equations.angular_rows[rows.start])))
             continue
         ends = _ends(tree, closure)
         parts.append(_KINDS[closure.kind](chains, ends, closure))
         if closure.kind in ("spherical", "rigid"):
             root = chains.ancestor(ends[0].joint, ends[1].joint)
             in_world.append(_InWorld(rows, root, closure.kind == "spherical"))
-    return ClosureRows(tree, chains, parts, in_world)
+    return ClosureRows(tree, chains, parts, in_world, equations.length)
 
 
 _Ends = tuple[End, End]
@@ -167,13 +181,14 @@ def _ends(tree: Tree, closure: LoopClosure) -> _Ends:
     return a, b
 
 
-def _coupling(tree: Tree, coupling: JointCoupling) -> _Rows:
+def _coupling(tree: Tree, coupling: JointCoupling, angular: bool) -> _Rows:
     """q_joint - ratio q_other - offset = 0."""
     one, other = (tree.model.joints[index] for index in coupling.joint_ids(tree.model))
     jacobian = ca.SX(1, tree.v.numel())
     jacobian[0, one.idx_v], jacobian[0, other.idx_v] = 1.0, -coupling.ratio
     gap = tree.q[one.idx_q] - coupling.ratio * tree.q[other.idx_q] - coupling.offset
-    return _Rows(gap, jacobian, jacobian @ tree.v, ca.SX(1, 1))
+    rows = _Rows(gap, jacobian, jacobian @ tree.v, ca.SX(1, 1))
+    return rows._replace(turned=gap**2) if angular else rows._replace(apart=gap**2)
 
 
 # Rows in the common ancestor's axes ---------------------------------------------------------------
@@ -187,11 +202,13 @@ def _from_ancestor(chains: Chains, ends: _Ends) -> tuple[Motion, Motion]:
 
 def _point_to_point(a: Motion, b: Motion) -> _Rows:
     """E = x_a - x_b and its derivatives."""
+    gap = tidy(a.origin - b.origin)
     return _Rows(
-        tidy(a.origin - b.origin),
+        gap,
         tidy(a.jacobian + b.jacobian),
         tidy(a.velocity + b.velocity),
         tidy(a.acceleration + b.acceleration),
+        apart=ca.sumsqr(gap),
     )
 
 
@@ -202,12 +219,15 @@ def _spherical(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
 def _rigid(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
     """Velocity of a less that of b, both at a's origin: e' - w_b x e; and w_a - w_b."""
     a, b = _from_ancestor(chains, ends)
-    gap, jacobian, rate, bias = _point_to_point(a, b)
+    gap, jacobian, rate, bias, apart, _ = _point_to_point(a, b)
+    turn, turned = _turn_between(a.rotation, b.rotation)
     return _Rows(
-        ca.vertcat(gap, _turn_between(a.rotation, b.rotation)),
+        ca.vertcat(gap, turn),
         ca.vertcat(jacobian + ca.skew(gap) @ b.spin_jacobian, a.spin_jacobian - b.spin_jacobian),
         ca.vertcat(rate - cross(b.spin, gap), a.spin - b.spin),
         ca.vertcat(bias - cross(b.spin_rate, gap) - cross(b.spin, rate), a.spin_rate - b.spin_rate),
+        apart,
+        turned,
     )
 
 
@@ -215,39 +235,39 @@ def _distance(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
     """L - |e|, with u = -e / |e|: rate u . e'; J' v = u . e'' - (e'^2 - (u . e')^2) / |e|."""
     assert closure.distance is not None  # its constructor saw to that
     a, b = _from_ancestor(chains, ends)
-    apart, _, rate, bias = _point_to_point(a, b)
-    length = ca.norm_2(apart)
-    u = apart / -length
+    e, _, rate, bias, square, _ = _point_to_point(a, b)
+    length = ca.sqrt(square)
+    u = e / -length
     along = u.T @ rate
     across_square = (rate.T @ rate - along**2) / length
     gap, jacobian = closure.distance - length, a.along(u) + b.along(u)
-    return _Rows(gap, jacobian, along, u.T @ bias - across_square)
+    return _Rows(gap, jacobian, along, u.T @ bias - across_square, apart=gap**2)
 
 
 # Rows in frame a's axes ---------------------------------------------------------------------------
 
 
 def _selected(
-    points: Callable[[LoopClosure], Array] | None,
-    turns: Callable[[Motion, LoopClosure], _Rows] | None,
+    points: Callable[[LoopClosure], Array],
+    turns: Callable[[Motion, LoopClosure], _Rows] | None = None,
 ) -> Callable[[Chains, _Ends, LoopClosure], _Rows]:
     """Return rows that hold b's origin across directions in a, and rows that hold b's rotation."""
 
     def rows(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
-        motion, parts = chains.between(*ends, sign=-1), []
-        if points:
-            directions = constant(points(closure))
-            parts.append(
-                _Rows(
-                    -directions @ motion.origin,
-                    directions @ motion.jacobian,
-                    directions @ motion.velocity,
-                    directions @ motion.acceleration,
-                )
-            )
-        if turns:
-            parts.append(turns(motion, closure))
-        return _Rows(*(ca.vertcat(*part) for part in zip(*parts, strict=True)))
+        motion, directions = chains.between(*ends, sign=-1), constant(points(closure))
+        gap, jacobian = -directions @ motion.origin, directions @ motion.jacobian
+        rate, bias = directions @ motion.velocity, directions @ motion.acceleration
+        if turns is None:
+            return _Rows(gap, jacobian, rate, bias, ca.sumsqr(gap))
+        turning = turns(motion, closure)
+        return _Rows(
+            ca.vertcat(gap, turning.gap),
+            ca.vertcat(jacobian, turning.jacobian),
+            ca.vertcat(rate, turning.rate),
+            ca.vertcat(bias, turning.bias),
+            ca.sumsqr(gap),
+            turning.turned,
+        )
 
     return rows
 
@@ -266,29 +286,32 @@ def _plane(closure: LoopClosure) -> Array:
 
 def _frame(motion: Motion, closure: LoopClosure) -> _Rows:
     """-log R, -w: the frames stay parallel."""
-    gap = _turn_between(ca.SX.eye(3), motion.rotation)
-    return _Rows(gap, -motion.spin_jacobian, -motion.spin, -motion.spin_rate)
+    gap, turned = _turn_between(ca.SX.eye(3), motion.rotation)
+    return _Rows(gap, -motion.spin_jacobian, -motion.spin, -motion.spin_rate, turned=turned)
 
 
 def _crosswise(motion: Motion, closure: LoopClosure) -> _Rows:
-    """B's axis stays perpendicular to a's: m . n."""
+    """M . n: the axes stay perpendicular."""
     m = constant(np.array([closure.axis]))
     n = tidy(motion.rotation @ constant(np.array(closure.axis_b)))
-    return _Rows(m @ n, *_turning(m, n, motion))
+    gap = m @ n
+    return _Rows(gap, *_turning(m, n, motion), turned=gap**2)
 
 
 def _parallel(motion: Motion, closure: LoopClosure) -> _Rows:
-    """B's axis n stays parallel to a's, and its gap is the rotation vector from n to it."""
+    """Rotation vector from b's axis n to a's: the axes stay parallel."""
     axis = np.array(closure.axis)
     n = tidy(motion.rotation @ constant(np.array(closure.axis_b)))
     sines = constant(np.cross(axis, across(axis)))  # (n x axis) . t = n . (axis x t)
     turn, cosine = tidy(sines @ n), constant(axis).T @ n
     # Opposite axes have no sine, and any direction across will do.
     gap = _rotation_vector(turn, cosine, constant(np.array([1.0, 0.0])))
-    return _Rows(gap, *_turning(sines, n, motion))
+    return _Rows(gap, *_turning(sines, n, motion), turned=2 * (1 - cosine))
 
 
-def _turning(m: Expression, n: Expression, motion: Motion) -> tuple[Expression, ...]:
+def _turning(
+    m: Expression, n: Expression, motion: Motion
+) -> tuple[Expression, Expression, Expression]:
     """Return J, J v and J' v of m . n, m (k, 3) fixed: n' = w x n, n'' = w' x n + w x n'."""
     moving = cross(motion.spin, n)
     lever = tidy(-m @ ca.skew(n))  # m . (w x n) = (n x m) . w
@@ -299,10 +322,10 @@ def _turning(m: Expression, n: Expression, motion: Motion) -> tuple[Expression, 
     )
 
 
-def _turn_between(a: Expression, b: Expression) -> Expression:
-    """Return -log(R_b R_a') of the rotations (3, 3) of two frames, a rotation vector (3, 1), rad.
+def _turn_between(a: Expression, b: Expression) -> tuple[Expression, Expression]:
+    """Return -log(R_b R_a') of the rotations (3, 3) of two frames, (3, 1), rad, and its chord^2.
 
-    Its sine is half the sum of b_i x a_i over their columns.
+    The sine is half the sum of b_i x a_i over their columns, and 2 (1 - cosine) = 3 - trace.
     """
     columns = list(zip(ca.horzsplit(a), ca.horzsplit(b), strict=True))
     sine: Expression = ca.SX(3, 1)
@@ -310,7 +333,8 @@ def _turn_between(a: Expression, b: Expression) -> Expression:
     for of_a, of_b in columns:
         sine, trace = sine + cross(of_b, of_a) / 2, trace + of_b.T @ of_a
     # Half a turn has no sine; (R + 1) projects on its axis.
-    return _rotation_vector(sine, (trace - 1) / 2, (b @ a.T + ca.SX.eye(3)) @ constant(_ANY))
+    axis = (b @ a.T + ca.SX.eye(3)) @ constant(_ANY)
+    return _rotation_vector(sine, (trace - 1) / 2, axis), 3 - trace
 
 
 def _rotation_vector(sine: Expression, cosine: Expression, otherwise: Expression) -> Expression:
@@ -332,7 +356,7 @@ _KINDS: dict[str, Callable[[Chains, _Ends, LoopClosure], _Rows]] = {
     "cylindrical": _selected(_line, _parallel),
     "universal": _selected(_whole, _crosswise),
     "planar": _selected(_plane, _parallel),
-    "point_on_line": _selected(_line, None),
-    "point_on_plane": _selected(_plane, None),
+    "point_on_line": _selected(_line),
+    "point_on_plane": _selected(_plane),
     "distance": _distance,
 }
