@@ -107,6 +107,24 @@ def test_sines_stand_beside_cosines_and_nothing_is_computed_twice() -> None:
     assert sum("= x0[0]" in line for line in lines) == 1
 
 
+def test_a_value_is_divided_by_once() -> None:
+    """Products with 1 / x come from casadi as quotients by x; they share one reciprocal."""
+    x, y = ca.SX.sym("x", 4), ca.SX.sym("y")
+    inverse = 1 / y
+    shared = ca.Function("f", [x, y], [inverse * x, ca.sin(inverse), x[0] / x[1]])
+    found = listing(shared)
+    names = [found.names[step] for step in found.steps if isinstance(step, int)]
+    assert (names.count("INV"), names.count("DIV"), names.count("MUL")) == (1, 1, 4)
+    computed: set[int] = set()
+    for step in found.steps:
+        assert all(k in computed or found.names[k] == "INPUT" for k in found.needs(step))
+        computed.update([step] if isinstance(step, int) else [])
+    later = ca.Function("f", [x, y], [x[0] / y, x[1] / y, inverse])
+    found = listing(later)
+    names = [found.names[step] for step in found.steps if isinstance(step, int)]
+    assert sorted(names) == ["INV", "MUL", "MUL"]
+
+
 def test_constants_come_back_exactly(tmp_path: Path) -> None:
     numbers = [0.1, 0.0, 1e-320, -1.7976931348623157e308, 1 / 3, 5.0, np.inf, -np.inf]
     x = ca.SX.sym("x")

@@ -145,8 +145,46 @@ def listing(function: Any) -> Listing:
                 f"function {name} uses the operation OP_{key} of casadi, which has no C text here; "
                 f"those that have: {', '.join(sorted(OPERATIONS))}"
             )
+    _share_reciprocals(found)
     found.steps = _pairs_together(found)
     return found
+
+
+def _share_reciprocals(found: Listing) -> None:
+    """Make quotients by the same value products with its reciprocal.
+
+    casadi writes every product with ``1 / x`` as a quotient, and a division takes the time of
+    several products.
+    """
+    denominators = {"DIV": 1, "INV": 0}  # which operand it is
+    counts: dict[int, int] = {}
+    for step in found.steps:
+        if isinstance(step, int) and found.names[step] in denominators:
+            below = found.operands[step][denominators[found.names[step]]]
+            counts[below] = counts.get(below, 0) + 1
+    reciprocals = {found.operands[k][0]: k for k, name in enumerate(found.names) if name == "INV"}
+    steps: list[int | tuple[int, int, int]] = []
+    written: set[int] = set()
+    for step in found.steps:
+        if not isinstance(step, int) or found.names[step] not in denominators:
+            steps.append(step)
+            continue
+        below = found.operands[step][denominators[found.names[step]]]
+        if counts[below] > 1:
+            if below not in reciprocals:
+                reciprocals[below] = len(found.names)
+                found.names.append("INV")
+                found.operands.append((below,))
+            if below not in written:
+                written.add(below)
+                steps.append(reciprocals[below])
+            if found.names[step] == "DIV":
+                found.names[step] = "MUL"
+                found.operands[step] = (found.operands[step][0], reciprocals[below])
+                steps.append(step)
+        else:
+            steps.append(step)
+    found.steps = steps
 
 
 def _pairs_together(found: Listing) -> list[int | tuple[int, int, int]]:
