@@ -132,7 +132,8 @@ class Chains:
         rotation = steps[-1].rotation if steps else ca.SX.eye(3)
         segments.append(tidy(rotation @ end.origin))
         own, _ = self._points_down(path, end.origin)
-        return self._motion(sign, steps, segments, own, tidy(rotation @ end.rotation))
+        motion = self._motion(sign, steps, segments, own, tidy(rotation @ end.rotation))
+        return self._cheaper(path, motion)
 
     def between(self, a: End, b: End, sign: int = 1) -> Motion:
         """Return the motion of frame b relative to frame a."""
@@ -161,6 +162,26 @@ class Chains:
             own_up.append(point)
         own = own_up[::-1] + own
         return self._motion(sign, steps, segments, own, tidy(rotation @ b.rotation))
+
+    def _cheaper(self, path: list[int], motion: Motion) -> Motion:
+        """Return a motion, its velocity and acceleration in the form of fewer operations.
+
+        The other form has the same sums in each joint's own axes, where S_a v has few entries, and
+        turns them from joint to joint. Joints of several coordinates are cheaper in the first form
+        as soon as two paths share them.
+        """
+        if any(len(step.columns) > 1 for step, _ in motion.levers):
+            return motion
+        velocity, acceleration = ca.SX(3, 1), ca.SX(3, 1)
+        for joint, (step, own) in zip(path[::-1], motion.levers[::-1], strict=True):
+            v = self._tree.v[step.columns.start]
+            axis = constant(step.own_angular)
+            faster = velocity + (constant(step.own_linear) + cross(axis, own)) * (motion.sign * v)
+            acceleration = acceleration + cross(axis * v, velocity + faster)
+            turn, _ = self._tree.placement[joint]
+            velocity, acceleration = tidy(turn @ tidy(faster)), tidy(turn @ tidy(acceleration))
+        other = motion._replace(velocity=velocity, acceleration=acceleration)
+        return min(motion, other, key=_operations)
 
     def _path(self, root: int, joint: int) -> list[int]:
         """Return the joints below `root` on the way down to `joint`, which is the last."""
@@ -241,6 +262,12 @@ class Chains:
             tidy(spin_rate),
             levers,
         )
+
+
+def _operations(motion: Motion) -> int:
+    """Count the nodes of the graph of what most closures need."""
+    needed = ca.vertcat(motion.origin, ca.vec(motion.jacobian), motion.acceleration)
+    return int(ca.n_nodes(needed))
 
 
 def _columns(step: _Step, sign: int, to_tip: Expression, own: Expression) -> Expression:
