@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -13,11 +12,15 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from rps_pin.codegen.build import compilers
+from rps_pin.codegen.build.compilers import has_libmvec
+from rps_pin.codegen.build.library import Library, load
 from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
 from rps_pin.codegen.units import Unit
 
 COMPILERS = [one for one in ("gcc", "clang") if shutil.which(one)]
-FLAGS = ["-O2", "-fPIC", "-shared", "-march=native", "-fno-math-errno"]
+MVEC = has_libmvec()
+FLAGS = [*compilers.FLAGS, "-shared", "-march=native", *(["-DRPS_PIN_MVEC"] if MVEC else [])]
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O1"]
 
 if not COMPILERS:
@@ -25,13 +28,21 @@ if not COMPILERS:
 
 
 def compiled(
-    text: str, folder: Path, flags: Sequence[str] = (), name: str = "unit.c", compiler: str = ""
+    texts: str | Sequence[str],
+    folder: Path,
+    flags: Sequence[str] = (),
+    compiler: str = "",
+    suffix: str = ".c",
 ) -> Path:
-    """Return the shared library of a text."""
-    source = folder / name
-    source.write_text(text, "utf-8")
-    library = source.with_suffix(".so")
-    command = [compiler or COMPILERS[0], *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
+    """Return the shared library of one or several texts."""
+    sources = []
+    for number, text in enumerate([texts] if isinstance(texts, str) else texts):
+        sources.append(str(folder / f"{number}{suffix}"))
+        Path(sources[-1]).write_text(text, "utf-8")
+    library = folder / "library.so"
+    given = FLAGS if suffix == ".c" else FLAGS[1:]  # without the language of C
+    command = [compiler or COMPILERS[0], *given, *flags, *sources, "-o", str(library)]
+    command += ["-lmvec", "-lm"] if MVEC else ["-lm"]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr[:4000]
     return library
@@ -41,11 +52,11 @@ def loaded(
     unit: Unit, folder: Path, flags: Sequence[str] = (), *, lanes: bool = True
 ) -> dict[str, CompiledFunction]:
     """Return a unit's entry points as functions."""
-    library = ctypes.CDLL(str(compiled(unit.library(lanes=lanes), folder, flags)))
+    library = load(compiled(unit.library(lanes=lanes), folder, flags), unit.symbols, "gcc")
     return {name: called(unit, library, name) for name in unit.entries}
 
 
-def called(unit: Unit, library: ctypes.CDLL, name: str) -> CompiledFunction:
+def called(unit: Unit, library: Library, name: str) -> CompiledFunction:
     """Return one entry point as a function."""
     one = unit.function(name)
     shapes = dict(zip((*one.inputs, *one.outputs), one.shapes, strict=True))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -11,6 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from rps_pin.codegen.build.library import load
 from rps_pin.codegen.calls import CompiledFunction, Entry
 from rps_pin.codegen.units import Kernel, Unit
 from rps_pin.errors import InputError
@@ -188,7 +188,8 @@ def test_code_is_replaced_while_it_runs(release: bool, tmp_path: Path) -> None:
     for k in (1, 2):
         folder = tmp_path / str(k)
         folder.mkdir()
-        library = ctypes.CDLL(str(compiled(product_unit(k).library(), folder)))
+        unit = product_unit(k)
+        library = load(compiled(unit.library(), folder), unit.symbols, "gcc")
         entries.append(Entry.of(library, "product"))
     f = called(product_unit(1.0), entries[0].owner, "product")
     f = CompiledFunction("product", f.inputs, f.outputs, entries[0], release=release)
@@ -214,5 +215,5 @@ def test_code_is_replaced_while_it_runs(release: bool, tmp_path: Path) -> None:
     f.replace(entries[1])
     assert f.entry is entries[1]
     assert f(A, x, y)[0][0] == 6.0
-    with pytest.raises(InputError, match="no entry point sum"):
+    with pytest.raises(InputError, match="no function sum_one"):
         Entry.of(entries[0].owner, "sum")

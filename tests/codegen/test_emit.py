@@ -38,7 +38,7 @@ def test_every_operation_is_tried() -> None:
 def test_every_operation_in_scalars_and_lanes(tmp_path: Path) -> None:
     """Scalars are casadi's numbers, as both call the C library; lanes have their own sine."""
     function = every_operation()
-    f = loaded(unit_of(function), tmp_path, ["-ffp-contract=off"])["every"]
+    f = loaded(unit_of(function), tmp_path)["every"]
     x, y = np.random.default_rng(0).uniform(0.05, 0.95, (2, 64, 4))
     (expected,) = reference(function, x, y)
     scalar = np.array([f(*sample)[0] for sample in zip(x, y, strict=True)])
@@ -53,7 +53,7 @@ def test_random_functions_in_chunks(chunk: int, tmp_path: Path) -> None:
     """Large and small chunks, sparse outputs, matrices."""
     rng = np.random.default_rng(1)
     function = random_function(rng, 700)
-    f = loaded(unit_of(function, chunk=chunk), tmp_path, ["-ffp-contract=off"])["drawn"]
+    f = loaded(unit_of(function, chunk=chunk), tmp_path)["drawn"]
     x, y = rng.standard_normal((13, 5)), rng.standard_normal((13, 3, 2))
     expected = reference(function, x, y)
     assert expected[1][0, 1, 3] == 2.5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,13 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.arrays import Array
+from rps_pin.codegen.build.library import MANY, Library
 from rps_pin.errors import InputError
 from rps_pin.validation import numbers, whole_number
 
-_MANY = ctypes.CFUNCTYPE(None, ctypes.c_long, *[ctypes.c_void_p] * 4)  # without the GIL
-_ONE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_char_p, ctypes.c_void_p)
-_ONE_HELD = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_char_p, ctypes.c_void_p)  # with the GIL
-_FLOAT64 = np.dtype(np.float64)
+_ONE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+_ONE_HELD = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p)  # keeps the GIL: 60 ns less
 
 #: Slices of a batch are whole groups of as many samples.
 _GROUP = 8
@@ -42,16 +42,9 @@ class Entry:
     owner: object = None
 
     @classmethod
-    def of(cls, library: ctypes.CDLL, name: str) -> Entry:
-        """Return the entry point NAME of a loaded shared library."""
-        places = []
-        for end in ("one", "many"):
-            try:
-                symbol = getattr(library, f"{name}_{end}")
-            except AttributeError:
-                raise InputError(f"{library} has no entry point {name}") from None
-            places.append(ctypes.cast(symbol, ctypes.c_void_p).value or 0)
-        return cls(*places, library)
+    def of(cls, library: Library, name: str) -> Entry:
+        """Return the entry point NAME of a library; InputError if it has none."""
+        return cls(library.address(f"{name}_one"), library.address(f"{name}_many"), library)
 
 
 class Argument(NamedTuple):
@@ -95,11 +88,19 @@ class CompiledFunction:
         self.name = name
         self.inputs = tuple(inputs)
         self.outputs = tuple(outputs)
-        self._sizes = tuple(int(np.prod(one.shape)) for one in (*self.inputs, *self.outputs))
+        self._sizes = tuple(math.prod(one.shape) for one in (*self.inputs, *self.outputs))
         self._one_type: Callable[[int], Any] = _ONE if release else _ONE_HELD
         self._local = threading.local()
-        self._shapes = tuple(one.shape for one in self.inputs)
+        self._names: dict[str, Any] = {
+            "local": self._local,
+            "prepare": self._prepare,
+            "batch": self._batch,
+            "float64": np.dtype(np.float64),
+        }
         self.replace(entry)
+        exec(_call_of([one.shape for one in self.inputs], len(self.outputs)), self._names)
+        #: The same as calling this object, 0.1 microseconds faster.
+        self.call: Callable[..., tuple[Any, ...]] = self._names["call"]
 
     def replace(self, entry: Entry) -> None:
         """Use other machine code of the same function from now on; any thread may do so.
@@ -108,8 +109,8 @@ class CompiledFunction:
         """
         # Each is one assignment; a call reads one of them once, and holds what it reads.
         self.entry = entry
-        self._many = _held(_MANY(entry.many), entry)
-        self._one = _held(self._one_type(entry.one), entry)
+        self._many = _held(MANY(entry.many), entry)
+        self._names["one"] = _held(self._one_type(entry.one), entry)
 
     def __call__(self, *inputs: ArrayLike, threads: int = 1) -> tuple[Any, ...]:
         """Return the outputs and the status.
@@ -127,36 +128,30 @@ class CompiledFunction:
             For a wrong number of inputs, a wrong shape, shapes that cannot be broadcast, and
             values that are no real numbers.
         """
-        try:
-            for value, shape in zip(inputs, self._shapes, strict=True):
-                if value.dtype is not _FLOAT64 or value.shape != shape:  # type: ignore[union-attr]
-                    return self._batch(inputs, threads)
-            # The inputs' memory, one after the other; only C-contiguous arrays give theirs.
-            x = b"".join(inputs)  # type: ignore[arg-type]
-        except (AttributeError, TypeError, ValueError, BufferError):
-            return self._batch(inputs, threads)
-        try:
-            y, copies = self._local.outputs
-        except AttributeError:
-            y, copies = self._local.outputs = self._memory()
-        status = self._one(x, y)
-        return (*[copy() for copy in copies], status)
+        return self.call(*inputs, threads=threads)
 
-    def _memory(self) -> tuple[ctypes.c_void_p, list[Callable[[], Array]]]:
-        """Return the address of this thread's memory for outputs, and what copies each."""
-        shapes = [one.shape for one in self.outputs]
-        sizes = self._sizes[len(self.inputs) :]
-        memory = np.zeros(sum(sizes))
-        parts = np.split(memory, np.cumsum(sizes)[:-1]) if sizes else []
-        views = [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
-        return ctypes.c_void_p(memory.ctypes.data), [view.copy for view in views]
+    def _prepare(self) -> None:
+        """Lay out this thread's memory of one sample: all inputs, then all outputs."""
+        memory = np.zeros(max(1, sum(self._sizes)))
+        ends = np.cumsum(self._sizes, dtype=int).tolist()
+        every = (*self.inputs, *self.outputs)
+        arrays = [
+            memory[end - size : end].reshape(one.shape)
+            for end, size, one in zip(ends, self._sizes, every, strict=True)
+        ]
+        count = len(self.inputs)
+        self._local.block = (
+            ctypes.c_void_p(memory.ctypes.data),
+            *(array.data if array.ndim == 1 else array for array in arrays[:count]),
+            *(array.copy for array in arrays[count:]),
+        )
 
     # Batches ------------------------------------------------------------------------------------
 
     def _batch(self, inputs: Sequence[ArrayLike], threads: int) -> tuple[Any, ...]:
         threads = whole_number(threads, "threads")
         batch, arrays = self._broadcast(inputs)
-        n = int(np.prod(batch))
+        n = math.prod(batch)
         outputs = [np.empty((n, size)) for size in self._sizes[len(self.inputs) :]]
         status = np.empty(n, dtype=np.int32)
         many = self._many
@@ -211,11 +206,39 @@ class CompiledFunction:
             raise InputError(
                 f"the leading dimensions of the inputs of {self.name} do not go together: {given}"
             ) from None
-        n = int(np.prod(batch))
+        n = math.prod(batch)
         return batch, [
             _samples(np.broadcast_to(array, batch + one.shape), n, size)
             for array, one, size in zip(arrays, self.inputs, self._sizes, strict=False)
         ]
+
+
+def _call_of(shapes: Sequence[tuple[int, ...]], outputs: int) -> str:
+    """Return the Python text of a call with inputs of these shapes: without loops, it is fast.
+
+    What is not float64 of exactly one sample's shape goes to ``batch``, and so does a thread's
+    first call, which has no memory yet. A memoryview refuses all other types and shapes itself,
+    but it takes vectors only.
+    """
+    inputs = [f"x{i}" for i in range(len(shapes))]
+    memory = [f"m{i}" for i in range(len(shapes))]
+    copies = [f"copy{j}" for j in range(outputs)]
+    lines = ["def call(*inputs, threads=1):", "    try:"]
+    lines += [f"        [{', '.join(inputs)}] = inputs"]
+    lines += [f"        [{', '.join(['address', *memory, *copies])}] = local.block"]
+    for x, m, shape in zip(inputs, memory, shapes, strict=True):
+        if len(shape) == 1:
+            lines += [f"        {m}[:] = {x}"]
+        else:
+            lines += [f"        if {x}.dtype is not float64 or {x}.shape != {shape}:"]
+            lines += ["            return batch(inputs, threads)", f"        {m}[...] = {x}"]
+    lines += ["    except AttributeError:", "        prepare()"]
+    lines += ["        return batch(inputs, threads)"]
+    lines += ["    except (TypeError, ValueError, BufferError):"]
+    lines += ["        return batch(inputs, threads)"]
+    lines += ["    status = one(address)"]
+    lines += [f"    return {', '.join([*(f'{copy}()' for copy in copies), 'status'])},"]
+    return "\n".join(lines)
 
 
 def _held(function: Any, entry: Entry) -> Any:

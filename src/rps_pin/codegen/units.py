@@ -144,6 +144,16 @@ def _places(start: str, arguments: tuple[tuple[str, int], ...]) -> list[str]:
     return [f"{start} + {at}" for at, _ in zip(ends, arguments, strict=False)]
 
 
+def _renamed(functions: list[Kernel | Routine], end: str) -> list[str]:
+    """Return the functions' texts, with names that end in `end`: C's own stay free."""
+    return [
+        *(f"#define {one.name} {one.name}_{end}" for one in functions),
+        *("", *(one.text() for one in functions)),
+        *(f"#undef {one.name}" for one in functions),
+        "",
+    ]
+
+
 @dataclass(frozen=True)
 class Unit:
     """One file of C: kernels and routines, and those of them that are entry points.
@@ -248,44 +258,46 @@ class Unit:
 
     # For Python ---------------------------------------------------------------------------------
 
-    def library(self, *, lanes: bool = True) -> str:
-        """Return the text of a shared library, in double precision.
+    @property
+    def symbols(self) -> tuple[str, ...]:
+        """Return the names of the functions of `library` that Python calls."""
+        return tuple(f"{name}_{end}" for name in self.entries for end in ("one", "many"))
 
-        For an entry NAME it has ``int NAME_one(const double *x, double *y)``, which computes one
-        sample from all inputs, one after the other, writes the outputs likewise, and returns the
-        status, and ``void NAME_many(long n, const double *const *in, const long *stride,
+    def library(self, *, lanes: bool = True) -> tuple[str, str]:
+        """Return the two texts of a shared library, in double precision.
+
+        For an entry NAME the first has ``int NAME_one(double *block)``, which computes one sample
+        from all inputs, one after the other, writes the outputs after them, and returns the status.
+        The second has ``void NAME_many(long n, const double *const *in, const long *stride,
         double *const *out, int *status)`` for n samples: input i of sample s begins at
         ``in[i] + s * stride[i]``, outputs follow each other, and status may be NULL.
 
         Parameters
         ----------
         lanes
-            Whether NAME_many computes 8, 4 or 2 samples at once, in vectors of GNU C. The text is
-            twice as long. tcc leaves them out.
+            Whether NAME_many computes 8, 4 or 2 samples at once, in vectors of GNU C: it takes as
+            long to compile as the first text. tcc leaves them out. With the macro RPS_PIN_MVEC, it
+            uses the sine and cosine of glibc's libmvec.
         """
         needed = list(self._needed())
-        text = [prelude("scalar.h"), prelude("status.h")]
-        text += [f"#define {one.name} {one.name}_scalar" for one in needed]
-        text += ["", *(one.text() for one in needed)]
-        text += [f"#undef {one.name}" for one in needed]
-        text += ["", *(self._one(name) for name in self.entries), prelude("many.h")]
+        one = [prelude("scalar.h"), prelude("status.h"), *_renamed(needed, "scalar")]
+        one += [self._one(name) for name in self.entries]
+        many = [prelude("scalar.h"), prelude("many.h")]
         if lanes:
-            text += ["#if defined(__GNUC__) && !defined(__TINYC__)", prelude("lanes.h")]
-            text += [f"#define {one.name} {one.name}_lanes" for one in needed]
-            text += ["", *(one.text() for one in needed)]
-            text += [f"#undef {one.name}" for one in needed]
-            text += ["", prelude("many_lanes.h"), *(self._group(name) for name in self.entries)]
-            text += ["#endif", ""]
-        return "\n".join([*text, *(self._many(name, lanes) for name in self.entries)])
+            many += ["#if defined(__GNUC__) && !defined(__TINYC__)", prelude("lanes.h")]
+            many += [*_renamed(needed, "lanes"), prelude("many_lanes.h")]
+            many += [*(self._group(name) for name in self.entries), "#endif", ""]
+        many += [self._many(name, lanes) for name in self.entries]
+        return "\n".join(one), "\n".join(many)
 
     def _one(self, name: str) -> str:
         one = self.function(name)
         outputs = self.handed_out(name)
-        count = len(one.inputs) + len(outputs)
-        arguments = [f"io[{i}]" for i in range(count)]
-        sizes = [size for _, size in (*one.inputs, *outputs)]
-        bad = [f"status_not_finite(io[{i}], {size})" for i, size in enumerate(sizes) if size]
-        lines = [f"static int {name}_at(double *const *io)", "{", "    (void)io;"]
+        every = (*one.inputs, *outputs)
+        arguments = [f"io[{i}]" for i in range(len(every))]
+        bad = [f"status_not_finite(io[{i}], {size})" for i, (_, size) in enumerate(every) if size]
+        at = f"int {name}_at(double *const *io)"
+        lines = [f"{at};", at, "{", "    (void)io;"]
         if name in self.checked:
             lines.append("    double check[2];")
             arguments.append("check")
@@ -293,10 +305,9 @@ class Unit:
         lines.append(f"    int status = {' | '.join(bad) or '0'};")
         if name in self.checked:
             lines.append(f"    status |= STATUS_OF_CHECK(check, {self.limit!r});")
-        lines += ["    return status;", "}", f"int {name}_one(const double *x, double *y)", "{"]
-        places = [*_places("(double *)x", one.inputs), *_places("y", outputs)]
-        lines += ["    (void)x, (void)y;"]
-        lines += [f"    double *const io[] = {{{', '.join(places or ['0'])}}};"]
+        places = _places("block", every) or ["block"]
+        lines += ["    return status;", "}", f"int {name}_one(double *block)", "{"]
+        lines += [f"    double *const io[] = {{{', '.join(places)}}};"]
         return "\n".join([*lines, f"    return {name}_at(io);", "}", ""])
 
     def _group(self, name: str) -> str:
@@ -310,6 +321,7 @@ class Unit:
         outputs = self.handed_out(name)
         sizes = [size for _, size in (*one.inputs, *outputs)]
         lines = [
+            f"int {name}_at(double *const *io);",
             f"void {name}_many(long n, const double *const *in, const long *stride,",
             "    double *const *out, int *status)",
             "{",
@@ -359,9 +371,7 @@ class Unit:
         text = [heading] if heading else []
         text += ["#define SINGLE"] if real == "float" else []
         text += [prelude("scalar.h"), prelude("status.h")]
-        text += [f"#define {one.name} {self.name}_{one.name}_real" for one in needed]
-        text += ["", *(one.text() for one in needed)]
-        text += [f"#undef {one.name}" for one in needed]
+        text += _renamed(needed, "real")
         return "\n".join([*text, "", *(self._public(name, real) for name in self.entries)])
 
     def _public(self, name: str, real: str) -> str:
@@ -374,7 +384,7 @@ class Unit:
         checked = name in self.checked
         lines += ["    REAL check[2];"] if checked else []
         arguments += ["check"] if checked else []
-        lines.append(f"    {self.name}_{name}_real({', '.join(arguments)});")
+        lines.append(f"    {name}_real({', '.join(arguments)});")
         lines.append(f"    status = {' | '.join(bad) or '0'};")
         lines += (
             [f"    status |= STATUS_OF_CHECK(check, CONST({self.limit!r}));"] if checked else []
@@ -402,9 +412,7 @@ class Unit:
         needed = list(self._needed())
         text = ["#define SINGLE"] if real == "float" else []
         text += [prelude("cuda.h"), prelude("scalar.h"), prelude("status.h")]
-        text += [f"#define {one.name} {one.name}_real" for one in needed]
-        text += ["", *(one.text() for one in needed)]
-        text += [f"#undef {one.name}" for one in needed]
+        text += _renamed(needed, "real")
         return "\n".join([*text, "", *(self._cuda(name) for name in self.entries)])
 
     def _cuda(self, name: str) -> str:

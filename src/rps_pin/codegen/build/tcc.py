@@ -25,7 +25,8 @@ from rps_pin.errors import CompileError
 _MEMORY = 1
 _OPTIONS = "-nostdlib -nostdinc"
 _SMOOTH = ("cos", "sin", "tan", "cosh", "sinh", "tanh", "sqrt", "exp", "log")
-_ONE = (*_SMOOTH, "acos", "asin", "atan", "ceil", "fabs", "floor")
+_INVERSE = ("acos", "asin", "atan", "acosh", "asinh", "atanh")
+_ONE = (*_SMOOTH, *_INVERSE, "ceil", "erf", "expm1", "fabs", "floor", "log1p")
 _TWO = ("atan2", "copysign", "fmax", "fmin", "fmod", "hypot", "pow")
 _MATH = [name + kind for kind in ("", "f") for name in (*_ONE, *_TWO)]
 _OTHERS = ("memcpy", "memmove", "memset")

@@ -52,7 +52,7 @@ EACH_LANE_2(fmod)
 #define MATH(name) name##_each
 
 /* Sines and cosines of glibc's vector library, within 4 units in the last place. */
-#if defined(__x86_64__) && defined(__GLIBC__) && !defined(NO_MVEC)
+#if defined(RPS_PIN_MVEC)
 #if LANES == 8
 REAL _ZGVeN8v_sin(REAL), _ZGVeN8v_cos(REAL);
 #define sin_each _ZGVeN8v_sin
