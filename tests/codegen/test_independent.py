@@ -10,10 +10,15 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.legged import biped, leg
 from rps_pin import ClosedLoopModel, LoopClosure
 from rps_pin.closed_loop.assembly.closing import closed_gap
+from rps_pin.closed_loop.editing.split import split
+from rps_pin.codegen.closures import closure_rows
 from rps_pin.codegen.elimination import Householder
 from rps_pin.codegen.independent import Partition, choose, regular_samples
+from rps_pin.codegen.parameters import Parameters
+from rps_pin.codegen.tree import Tree
 from rps_pin.errors import InputError, MechanismError
 from tests.closed_loop.random_mechanisms import pooled
 from tests.worst import worst
@@ -151,23 +156,76 @@ def test_chains_of_loops(kind: str, slanted: bool) -> None:
     assert worst(np.diff(np.log(operations)) / np.diff(np.log(counts))) <= 1.1
 
 
-def test_a_rod_spins_idly() -> None:
-    """A rod between two balls, its length along a coordinate of the ball: that column vanishes."""
+@pytest.mark.parametrize("planar", [False, True])
+def test_inverse_dynamics_of_symbols_is_the_engines(planar: bool) -> None:
+    """Actuator and constraint forces from J as generated code has it, redundant rows included."""
+    for seed in range(10):
+        case = pooled(seed, planar=planar)
+        mechanism, system = case.mechanism, case.mechanism.system
+        tree = Tree(split(mechanism.model), Parameters(system, ()))
+        rows = closure_rows(tree, system.equations)
+        J = ca.sparsify(rows.jacobian)
+        samples = regular_samples(system, mechanism.home)
+        pattern = np.zeros(J.shape, dtype=bool)
+        pattern[J.sparsity().get_triplet()] = True
+        partition = choose(system, samples.jacobians, pattern)
+        independent, dependent = partition.independent.tolist(), partition.dependent.tolist()
+        tau = ca.SX(tree.rnea(tree.v, tree.a))
+        factors = Householder(J[:, dependent], row_scale=mechanism.row_scale)
+        forces = factors.transposed(tau[dependent])
+        found = ca.Function(
+            "f",
+            [tree.q, tree.v, tree.a],
+            [tau[independent] - J[:, independent].T @ forces, rows.in_package(forces)],
+        )(case.q, case.v, case.a)
+        expected = mechanism.inverse_dynamics(case.q, case.v, case.a)
+        for mine, theirs in zip(found, (expected.tau, expected.constraint_forces), strict=True):
+            size = np.abs(theirs).max() * expected.condition
+            assert worst(np.array(mine)[:, 0] - theirs) < 1e-12 * size
+
+
+def test_legs_on_rods() -> None:
+    """Base and actuated joints are the independent ones; blocks are as large as one drive."""
+    for make in (leg, biped):
+        mechanism = make()
+        partition = chosen(mechanism)
+        base = [mechanism.model.names[1]]
+        moving = mechanism.system.velocity_indices([*mechanism.actuated, *base], "to move")
+        assert partition.independent.tolist() == moving.tolist()
+        assert partition.condition < 100
+
+
+def test_home_may_be_singular() -> None:
+    """All bars in one line: samples stand beside it."""
+    mechanism, _ = chain(1, "point_on_line")
+    home = np.zeros(mechanism.model.nq)
+    partition = chosen(mechanism, home)
+    assert (partition.mobility, partition.is_actuated) == (1, True)
+    assert partition.condition < 1e3
+    samples = regular_samples(mechanism.system, home)
+    assert len(samples.configurations) > 3
+    assert np.abs(samples.configurations).max(axis=1).min() > 1e-3
+
+
+@pytest.mark.parametrize(("along", "idle"), [((0.7, 0, 0), [1]), ((0.4, -0.3, 0.5), [])])
+def test_a_rod_spins_idly(along: tuple[float, float, float], idle: list[int]) -> None:
+    """A rod between two balls: a column vanishes if the rod lies along a coordinate of its ball."""
     model = pin.Model()
     crank = model.addJoint(0, pin.JointModelRZ(), pin.SE3.Identity(), "crank")
     place = pin.SE3(np.eye(3), np.array([0.3, 0, 0]))
     rod = model.addJoint(crank, pin.JointModelSpherical(), place, "rod")
-    rocker = model.addJoint(
-        0, pin.JointModelRX(), pin.SE3(np.eye(3), np.array([0.9, 0.2, 0.1])), "rocker"
-    )
-    for name, joint, at in (("rod_end", rod, [0.7, 0, 0]), ("tip", rocker, [0, 0.4, 0])):
+    place = pin.SE3(np.eye(3), np.array([0.9, 0.2, 0.1]))
+    rocker = model.addJoint(0, pin.JointModelRX(), place, "rocker")
+    for name, joint, at in (("rod_end", rod, along), ("tip", rocker, (0, 0.4, 0))):
         placement = pin.SE3(np.eye(3), np.array(at, float))
         model.addFrame(pin.Frame(name, joint, 0, placement, pin.FrameType.OP_FRAME))
     mechanism = ClosedLoopModel(model, [LoopClosure("tip", "rod_end", "spherical")], ["crank"])
     partition = chosen(mechanism)
-    assert partition.idle.tolist() == [1]
-    assert partition.independent.tolist() == [0, 1]
+    assert partition.idle.tolist() == idle
     assert (partition.mobility, partition.is_actuated) == (2, False)
+    assert partition.independent[0] == 0
+    assert partition.independent[1] in (idle or [1, 2, 3])
+    assert partition.condition < 100
 
 
 def test_without_closures_all_are_independent() -> None:

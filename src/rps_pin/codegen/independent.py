@@ -34,7 +34,7 @@ _HALVINGS = 4
 #: mu in [1 J'; J -mu], which gives steps of least norm also where rows are redundant.
 _REGULARISATION = 1e-9
 #: Samples nearer to a singularity than this, compared with the best of them, do not count.
-_NEAR_SINGULAR = 1e-2
+_NEAR_SINGULAR = 0.1
 #: Condition of J_d up to which the actuated velocities are taken as they are.
 _ACCEPTED = 1e5
 #: Condition of J_d up to which a set with more actuated velocities goes before a better one.
@@ -94,23 +94,36 @@ class Partition:
 def regular_samples(system: ConstraintSystem, home: Array, seed: int = 0) -> Samples:
     """Return regular closed configurations near a closed one: it, and random ones of each length.
 
-    Those where J has not the largest rank met, or is nearly of lower rank, are left out. Joint
-    limits are not looked at. The same for the same arguments.
+    Those where J has not the largest rank met, or is nearly of lower rank, are left out. If that
+    holds at home, more are found from the best of the others. Joint limits are not looked at. The
+    same for the same arguments.
     """
     rng = np.random.default_rng(seed)
-    places = [home]
-    for length in _STEPS:
-        found = _moved(system, home, length, rng.normal(size=system.model.nv))
-        if found is not None:
-            places.append(found)
-    jacobians = np.array([system.scaled(system.equations.jacobian(q)) for q in places])
-    values = [singular_values(jacobian) for jacobian in jacobians]
+    places = [home, *_around(system, home, rng)]
+    regular = _regular(system, places)
+    if not regular[0]:
+        places += _around(system, places[int(np.argmax(regular))], rng)
+        regular = _regular(system, places)
+    found = [place for place, quality in zip(places, regular, strict=True) if quality]
+    jacobians = [system.scaled(system.equations.jacobian(q)) for q in found]
+    return Samples(np.array(found), np.array(jacobians))
+
+
+def _around(system: ConstraintSystem, q: Array, rng: np.random.Generator) -> list[Array]:
+    """Return closed configurations after steps of all lengths, as far as they close."""
+    found = [_moved(system, q, size, rng.normal(size=system.model.nv)) for size in _STEPS]
+    return [place for place in found if place is not None]
+
+
+def _regular(system: ConstraintSystem, places: list[Array]) -> Array:
+    """Return the least singular value over the largest of J, or 0 where it is not regular."""
+    values = [singular_values(system.scaled(system.equations.jacobian(q))) for q in places]
     ranks = np.array([rank(one) for one in values])
     best = int(ranks.max(initial=0))
     least = np.array([one[best - 1] / one[0] if best else 1.0 for one in values])
-    regular = ranks == best
-    regular &= least >= _NEAR_SINGULAR * least[regular].max()
-    return Samples(np.array(places)[regular], jacobians[regular])
+    least[ranks < best] = 0.0
+    least[least < _NEAR_SINGULAR * least.max()] = 0.0
+    return least
 
 
 def _moved(system: ConstraintSystem, q: Array, length: float, direction: Array) -> Array | None:
