@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -24,6 +24,69 @@ from rps_pin.arrays import Array
 from rps_pin.codegen.joints import Expression, Joint, Placement, sparse
 from rps_pin.codegen.parameters import Inertia, Parameters, moved_inertia, summed
 from rps_pin.errors import MechanismError
+
+#: Force and moment about a point, each of shape (3, k).
+Wrench = tuple[Expression, Expression]
+
+
+class Turning:
+    """Angular velocity w and acceleration dw of a body, and what points of it have from them."""
+
+    def __init__(self, w: Expression, dw: Expression) -> None:
+        self.w, self.dw = w, dw
+
+    @cached_property
+    def squares(self) -> list[Expression]:
+        """Of w's entries."""
+        return [x * x for x in ca.vertsplit(self.w)]
+
+    @cached_property
+    def products(self) -> list[Expression]:
+        """Of the two other entries of w: w_y w_z, w_z w_x, w_x w_y."""
+        x, y, z = ca.vertsplit(self.w)
+        return [y * z, z * x, x * y]
+
+    @cached_property
+    def tensor(self) -> Expression:
+        """B = skew(dw) + skew(w)^2: points at r are accelerated by B r against the origin."""
+        (xx, yy, zz), (yz, zx, xy) = self.squares, self.products
+        x, y, z = ca.vertsplit(self.dw)
+        return ca.blockcat(
+            [
+                [-(yy + zz), xy - z, zx + y],
+                [xy + z, -(zz + xx), yz - x],
+                [zx - y, yz + x, -(xx + yy)],
+            ]
+        )
+
+
+class BodyMotion(NamedTuple):
+    """Motion of a body, in its joint's axes; accelerations of points with gravity subtracted."""
+
+    turning: Turning
+    acceleration: Expression
+    """A, of the origin."""
+    carried: Turning
+    """Of the parent."""
+    carried_acceleration: Expression
+    """Of the parent's point at the origin."""
+
+
+def inertial_force(body: Inertia, motion: BodyMotion) -> Wrench:
+    """Return f and n of one body: the products of w are those that B holds already."""
+    mass, first, inertia = body
+    dw, tensor, moments = motion.turning.dw, motion.turning.tensor, []
+    for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        # Row x of I dw + w x I w.
+        moments.append(
+            inertia[x, x] * dw[x]
+            + (inertia[z, z] - inertia[y, y]) * motion.turning.products[x]
+            + inertia[y, z] * (motion.turning.squares[y] - motion.turning.squares[z])
+            - inertia[x, y] * tensor[z, x]
+            + inertia[x, z] * tensor[y, x]
+        )
+    moment = ca.vertcat(*moments) + cross(first, motion.acceleration)
+    return mass * motion.acceleration + tensor @ first, moment
 
 
 class Tree:
@@ -68,11 +131,11 @@ class Tree:
         self.placement: list[Placement] = [(ca.SX.eye(3), ca.SX(3, 1))]
         self.subspace: list[tuple[Array, Array]] = [(np.zeros((3, 0)), np.zeros((3, 0)))]
         self._joints: list[tuple[Joint, slice, slice]] = []
-        self._bodies: list[Inertia] = [(ca.SX(1, 1), ca.SX(3, 1), ca.SX(3, 3))]
+        self.bodies: list[Inertia] = [(ca.SX(1, 1), ca.SX(3, 1), ca.SX(3, 3))]
         for index in range(1, model.njoints):
             self._add(index)
         #: S_l, S_a and the velocities of each joint.
-        self._motions = [
+        self.motions = [
             (sparse(linear), sparse(angular), slice(own.start, own.stop))
             for (linear, angular), own in zip(self.subspace, self.columns, strict=True)
         ]
@@ -87,7 +150,7 @@ class Tree:
         rotation, translation = self.parameters.joint_placement(index)
         self.placement.append((rotation @ turn, translation + rotation @ shift))
         self.subspace.append((joint.linear, joint.angular))
-        self._bodies.append(self.parameters.inertia(index))
+        self.bodies.append(self.parameters.inertia(index))
         self.columns.append(range(velocities.start, velocities.stop))
         self._joints.append((joint, coordinates, velocities))
 
@@ -111,33 +174,43 @@ class Tree:
         external
             Force and moment (3, 1) on bodies from outside, by joint, in its axes at its origin.
         """
-        none, world = ca.SX(3, 1), _Turning(ca.SX(3, 1), ca.SX(3, 1))
-        turnings, accelerations = [world], [-self.parameters.gravity if gravity else none]
-        forces: list[tuple[Expression, Expression]] = [(none, none)]
+        motions = self.body_motions(v, a, gravity)
+        forces = [(ca.SX(3, 1), ca.SX(3, 1)) for _ in self.parents]
         for i in range(1, len(self.parents)):
-            parent, (rotation, origin) = turnings[self.parents[i]], self.placement[i]
-            linear, angular, own = self._motions[i]
-            back = rotation.T
-            carried, turn, slide = back @ parent.w, angular @ v[own], linear @ v[own]
-            w = carried + turn
-            dw = back @ parent.dw + angular @ a[own] + _cross(carried, turn)
-            at_origin = back @ (accelerations[self.parents[i]] + parent.shear @ origin)
-            at_origin += linear @ a[own] + _cross(w + carried, slide)
-            turnings.append(_Turning(w, dw))
-            accelerations.append(at_origin)
-            force, moment = _inertial_force(self._bodies[i], turnings[i], at_origin)
+            force, moment = inertial_force(self.bodies[i], motions[i])
             if external and i in external:
                 force, moment = force - external[i][0], moment - external[i][1]
-            forces.append((force, moment))
+            forces[i] = force, moment
         tau = sparse(self.model.armature) * a
         for i in range(len(self.parents) - 1, 0, -1):
-            (force, moment), (linear, angular, own) = forces[i], self._motions[i]
+            (force, moment), (linear, angular, own) = forces[i], self.motions[i]
             tau[own] += linear.T @ force + angular.T @ moment
-            below, (rotation, origin) = self.parents[i], self.placement[i]
-            force = rotation @ force
-            moment = rotation @ moment + _cross(origin, force)
-            forces[below] = forces[below][0] + force, forces[below][1] + moment
+            forces[self.parents[i]] = self.onto_parent(i, forces[i], forces[self.parents[i]])
         return ca.densify(tau)
+
+    def body_motions(self, v: Expression, a: Expression, gravity: bool = True) -> list[BodyMotion]:
+        """Return the motions of all bodies, as the module's formulas have them."""
+        none = ca.SX(3, 1)
+        start = -self.parameters.gravity if gravity else none
+        result = [BodyMotion(Turning(none, none), start, Turning(none, none), start)]
+        for i in range(1, len(self.parents)):
+            parent, (rotation, origin) = result[self.parents[i]], self.placement[i]
+            linear, angular, own = self.motions[i]
+            back, turn, slide = rotation.T, angular @ v[own], linear @ v[own]
+            carried = Turning(back @ parent.turning.w, back @ parent.turning.dw)
+            at_origin = back @ (parent.acceleration + parent.turning.tensor @ origin)
+            w = carried.w + turn
+            dw = carried.dw + angular @ a[own] + cross(carried.w, turn)
+            acceleration = at_origin + linear @ a[own] + cross(w + carried.w, slide)
+            result.append(BodyMotion(Turning(w, dw), acceleration, carried, at_origin))
+        return result
+
+    def onto_parent(self, joint: int, wrench: Wrench, others: Wrench) -> Wrench:
+        """Return the sum of a joint's force and moment, in its parent's axes, and others."""
+        rotation, origin = self.placement[joint]
+        force = rotation @ wrench[0]
+        moment = rotation @ wrench[1] + skew(origin) @ force
+        return others[0] + force, others[1] + moment
 
     def mass_matrix(self) -> Expression:
         """Return M, shape (nv, nv), sparse and symmetric (composite rigid bodies).
@@ -149,24 +222,21 @@ class Tree:
 
     @cached_property
     def _mass_matrix(self) -> Expression:
-        bodies = list(self._bodies)
+        bodies = list(self.bodies)
         mass_matrix, nv = ca.SX(self.model.nv, self.model.nv), self.model.nv
         # Momenta of the velocities of each joint and those beyond it, in the joint's axes.
         momenta = [(ca.SX(3, nv), ca.SX(3, nv)) for _ in self.parents]
         for i in range(len(self.parents) - 1, 0, -1):
-            (mass, first, inertia), (linear, angular, own) = bodies[i], self._motions[i]
-            lever, (momentum, about) = _skew(first), momenta[i]
+            (mass, first, inertia), (linear, angular, own) = bodies[i], self.motions[i]
+            lever, (momentum, about) = skew(first), momenta[i]
             momentum[:, own] = mass * linear - lever @ angular
             about[:, own] = lever @ linear + inertia @ angular
             rows = linear.T @ momentum + angular.T @ about
             mass_matrix[own, :] = rows
             mass_matrix[:, own] = rows.T
-            parent, (rotation, origin) = self.parents[i], self.placement[i]
-            if parent:
+            if parent := self.parents[i]:
                 bodies[parent] = summed(bodies[parent], moved_inertia(bodies[i], self.placement[i]))
-                momentum = rotation @ momentum
-                about = rotation @ about + _skew(origin) @ momentum
-                momenta[parent] = momenta[parent][0] + momentum, momenta[parent][1] + about
+                momenta[parent] = self.onto_parent(i, momenta[i], momenta[parent])
         return ca.sparsify(mass_matrix + ca.diag(sparse(self.model.armature)))
 
     def kinetic_energy(self) -> Expression:
@@ -176,12 +246,12 @@ class Tree:
         energy = ca.dot(sparse(self.model.armature) * self.v, self.v)
         for i in range(1, len(self.parents)):
             (linear, w), (rotation, origin) = velocities[self.parents[i]], self.placement[i]
-            slide, turn, own = self._motions[i]
-            linear = rotation.T @ (linear + _cross(w, origin)) + slide @ self.v[own]
+            slide, turn, own = self.motions[i]
+            linear = rotation.T @ (linear + cross(w, origin)) + slide @ self.v[own]
             w = rotation.T @ w + turn @ self.v[own]
             velocities.append((linear, w))
-            mass, first, inertia = self._bodies[i]
-            momentum = mass * linear + 2 * _cross(w, first)
+            mass, first, inertia = self.bodies[i]
+            momentum = mass * linear + 2 * cross(w, first)
             energy += ca.dot(linear, momentum) + ca.dot(w, inertia @ w)
         return ca.densify(energy / 2)
 
@@ -189,7 +259,7 @@ class Tree:
         """Return the bodies' energy of weight, J, zero at the world's origin, shape (1, 1)."""
         moment = ca.SX(3, 1)
         for i in range(1, len(self.parents)):
-            mass, first, _ = self._bodies[i]
+            mass, first, _ = self.bodies[i]
             rotation, origin = self.world(i)
             moment += mass * origin + rotation @ first
         return ca.densify(-ca.dot(self.parameters.gravity, moment))
@@ -243,15 +313,15 @@ class Tree:
         _, lever = self.parameters.frame_placement(frame)
         for i in self._to_world(self._joint_of(frame)):
             rotation, origin = self.world(i)
-            linear, angular, own = self._motions[i]
+            linear, angular, own = self.motions[i]
             axes = rotation @ angular
             # From the joint to the frame's origin: in the joint's axes as long as that is one step,
             # so that columns of axes through the point vanish exactly.
             if lever is not None:
-                jacobian[:3, own] = rotation @ (linear - _skew(lever) @ angular)
+                jacobian[:3, own] = rotation @ (linear - skew(lever) @ angular)
                 lever = None if lever.nnz() else self.placement[i][1]
             else:
-                jacobian[:3, own] = rotation @ linear - _skew(point - origin) @ axes
+                jacobian[:3, own] = rotation @ linear - skew(point - origin) @ axes
             jacobian[3:, own] = axes
         return ca.sparsify(jacobian)
 
@@ -259,48 +329,11 @@ class Tree:
         return int(self.model.frames[frame].parentJoint)
 
 
-class _Turning:
-    """Angular velocity w and acceleration dw of a body, and what points of it have from them."""
-
-    def __init__(self, w: Expression, dw: Expression) -> None:
-        self.w, self.dw = w, dw
-        (x, y, z), (dx, dy, dz) = ca.vertsplit(w), ca.vertsplit(dw)
-        xx, yy, zz = x * x, y * y, z * z
-        yz, zx, xy = y * z, z * x, x * y
-        self.squares, self.products = (xx, yy, zz), (yz, zx, xy)
-        #: B = skew(dw) + skew(w)^2: points at r from the origin are accelerated by B r against it.
-        self.shear = ca.blockcat(
-            [
-                [-(yy + zz), xy - dz, zx + dy],
-                [xy + dz, -(zz + xx), yz - dx],
-                [zx - dy, yz + dx, -(xx + yy)],
-            ]
-        )
-
-
-def _inertial_force(
-    body: Inertia, turning: _Turning, at_origin: Expression
-) -> tuple[Expression, Expression]:
-    """Return f and n of one body: the products of w are those that B holds already."""
-    mass, first, inertia = body
-    dw, shear, moments = turning.dw, turning.shear, []
-    for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        # Row x of I dw + w x I w.
-        moments.append(
-            inertia[x, x] * dw[x]
-            + (inertia[z, z] - inertia[y, y]) * turning.products[x]
-            + inertia[y, z] * (turning.squares[y] - turning.squares[z])
-            - inertia[x, y] * shear[z, x]
-            + inertia[x, z] * shear[y, x]
-        )
-    return mass * at_origin + shear @ first, ca.vertcat(*moments) + _cross(first, at_origin)
-
-
-def _skew(r: Expression) -> Expression:
+def skew(r: Expression) -> Expression:
     """Return the matrix of the cross product with r (3, 1), without its zeros."""
     return ca.sparsify(ca.skew(r))
 
 
-def _cross(r: Expression, s: Expression) -> Expression:
+def cross(r: Expression, s: Expression) -> Expression:
     """Return r x s, of shape (3, 1), without its zeros."""
     return ca.cross(r, s) if r.nnz() and s.nnz() else ca.SX(3, 1)
