@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import re
 import subprocess
 import time
@@ -46,6 +47,19 @@ def test_every_operation_in_scalars_and_lanes(tmp_path: Path) -> None:
     assert not status.any()
     assert worst((scalar - expected) / np.maximum(1e-300, np.abs(expected))) < 3e-16
     assert worst((z - expected) / np.maximum(1e-300, np.abs(expected))) < 1e-15
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="widths of x86-64")
+@pytest.mark.parametrize("march", ["x86-64", "x86-64-v3"])
+@pytest.mark.parametrize("flags", [(), ("-URPS_PIN_MVEC",)])
+def test_two_and_four_lanes(march: str, flags: tuple[str, ...], tmp_path: Path) -> None:
+    """And with the sines of the C library where its vectors' are not wanted."""
+    function = every_operation()
+    f = loaded(unit_of(function), tmp_path, [f"-march={march}", *flags])["every"]
+    x, y = np.random.default_rng(0).uniform(0.05, 0.95, (2, 19, 4))
+    (expected,) = reference(function, x, y)
+    error = worst((f(x, y)[0] - expected) / np.maximum(1e-300, np.abs(expected)))
+    assert error == 0 if flags else error < 1e-15
 
 
 @pytest.mark.parametrize("chunk", [500, 37, 4])

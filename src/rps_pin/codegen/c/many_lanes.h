@@ -1,17 +1,28 @@
 /* Groups of LANES samples; the last group repeats its last sample. */
+#if LANES == 8
+#define EVERY_LANE(do) do(0) do(1) do(2) do(3) do(4) do(5) do(6) do(7)
+#elif LANES == 4
+#define EVERY_LANE(do) do(0) do(1) do(2) do(3)
+#else
+#define EVERY_LANE(do) do(0) do(1)
+#endif
+#define READ_LANE(l) from[l * stride + k],
+#define WRITE_LANE(l) to[l * size + k] = from[k][l];
+
 static void many_gather(REAL *to, const double *from, long stride, int size, int count)
 {
-    const double *lane[LANES];
-    for (int l = 0; l < LANES; ++l) lane[l] = from + (l < count ? l : count - 1) * stride;
-    for (int k = 0; k < size; ++k)
-        for (int l = 0; l < LANES; ++l) to[k][l] = lane[l][k];
+    if (count == LANES)
+        for (int k = 0; k < size; ++k) to[k] = (REAL){EVERY_LANE(READ_LANE)};
+    else
+        for (int l = 0; l < LANES; ++l)
+            for (int k = 0; k < size; ++k)
+                to[k][l] = from[(l < count ? l : count - 1) * stride + k];
 }
 
 static void many_scatter(double *to, const REAL *from, int size, int count)
 {
     if (count == LANES)
-        for (int k = 0; k < size; ++k)
-            for (int l = 0; l < LANES; ++l) to[l * size + k] = from[k][l];
+        for (int k = 0; k < size; ++k) { EVERY_LANE(WRITE_LANE) }
     else
         for (int l = 0; l < count; ++l)
             for (int k = 0; k < size; ++k) to[l * size + k] = from[k][l];
