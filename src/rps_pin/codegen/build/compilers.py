@@ -10,11 +10,13 @@ import shlex
 import shutil
 import signal
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from rps_pin.codegen.build import process
-from rps_pin.codegen.build.source import Source, digest
+from rps_pin.codegen.build.library import FILE
+from rps_pin.codegen.build.source import Source, c_library, digest
 from rps_pin.errors import CompileError
 
 #: Searched for on PATH, the best first.
@@ -42,8 +44,8 @@ class Compiler(NamedTuple):
     def flags(self, source: Source) -> list[str]:
         """Return the flags for a source's texts."""
         native = _NATIVE.get(platform.machine())
-        vectors = ["-DRPS_PIN_MVEC"] if source.vectors and has_libmvec() else []
-        return [*FLAGS, *([native] if native else []), *vectors, *source.flags]
+        scalar = [] if source.vectors and has_libmvec() else ["-DNO_MVEC"]
+        return [*FLAGS, *([native] if native else []), *scalar, *source.flags]
 
     def key(self, source: Source) -> str:
         """Return a digest of the compiler and its flags."""
@@ -52,11 +54,11 @@ class Compiler(NamedTuple):
 
 def has_libmvec() -> bool:
     """Whether the C library has sines of vectors: glibc's has, on x86."""
-    return platform.libc_ver()[0] == "glibc" and platform.machine() == "x86_64"
+    return c_library().startswith("glibc") and platform.machine() == "x86_64"
 
 
-def find(name: str) -> list[Compiler]:
-    """Return the compilers that a name stands for, the best first.
+def find(name: str) -> Iterator[Compiler]:
+    """Give the compilers that a name stands for, the best first.
 
     ``"auto"``: all that there are; ``"cc"``: those of the environment variables, and cc; otherwise
     the one of that name. A compiler for another machine is none, and neither is one that does not
@@ -64,14 +66,15 @@ def find(name: str) -> list[Compiler]:
     """
     variables = [os.environ.get(one, "") for one in VARIABLES]
     names = {"auto": (*variables, *NAMES), "cc": (*variables, "cc")}.get(name, (name,))
-    compilers: dict[tuple[str, ...], Compiler] = {}
+    given = set()
     for command in map(shlex.split, names):
         path = shutil.which(command[0]) if command else None
         if path is not None:
             compiler = _identify((path, *command[1:]), Path(path).stat().st_mtime_ns)
-            if compiler is not None:  # the same under two names counts once
-                compilers.setdefault((compiler.version, *command[1:]), compiler)
-    return list(compilers.values())
+            if compiler is None or (same := (compiler.version, *command[1:])) in given:
+                continue  # it is none, or the same under another name
+            given.add(same)
+            yield compiler
 
 
 @functools.cache
@@ -121,8 +124,8 @@ def compile_library(
         objects.append(f"{number}.o")
     flags = compiler.flags(source)
     steps = [[*compiler.command, *flags, "-c", f"{one[:-2]}.c", "-o", one] for one in objects]
-    library = folder / "library.so"
-    mvec = ["-lmvec"] if "-DRPS_PIN_MVEC" in flags else []
+    library = folder / FILE
+    mvec = [] if "-DNO_MVEC" in flags else ["-lmvec"]
     link = [*compiler.command, "-shared", *objects, "-o", library.name, *mvec, "-lm"]
     for before, commands in ((0, steps), (total - 1, [link])):
 

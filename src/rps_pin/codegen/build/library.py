@@ -15,6 +15,10 @@ from rps_pin.errors import CompileError, InputError, did_you_mean
 MANY = ctypes.CFUNCTYPE(None, ctypes.c_long, *[ctypes.c_void_p] * 4)
 
 
+#: The name of its file.
+FILE = "library.so"
+
+
 class Library:
     """Functions in machine code; ``library[name]`` calls one of the form `MANY`.
 
@@ -33,7 +37,7 @@ class Library:
 
     def __init__(self, compiler: str, addresses: Mapping[str, int], owner: object) -> None:
         self.compiler = compiler
-        self.proof: Mapping[str, Any] = {}
+        self.proof: dict[str, Any] = {}
         self._addresses = dict(addresses)
         self._owner = owner  # the code is there as long as this is
 

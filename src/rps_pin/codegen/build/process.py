@@ -14,9 +14,17 @@ from typing import NamedTuple
 #: Called while processes run, with how many of how many have ended; it may raise to end them.
 Watch = Callable[[int, int], None]
 
-#: A shell that runs a command, and a watcher that ends both when our end of its input is closed,
-#: however this process ends. The watcher is all that is left then, and ends too.
-_GUARD = 'exec 3<&0; (read _ <&3; kill -9 0) >/dev/null 2>&1 & "$@" </dev/null 3<&-'
+#: A shell that runs a command, and a watcher that ends all of it when our end of its input is
+#: closed: however this process ends.
+_GUARD = """
+exec 3<&0
+(read _ <&3; kill -9 0) >/dev/null 2>&1 &
+"$@" </dev/null 3<&-
+status=$?
+kill $! 2>/dev/null
+wait $! 2>/dev/null
+exit $status
+"""
 _PAUSE = 0.005
 
 

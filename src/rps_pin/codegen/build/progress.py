@@ -26,7 +26,12 @@ class Bar:
             if time.monotonic() - self._begin < _AFTER:
                 return
             console = Console(stderr=True)
-            columns = (SpinnerColumn(), TextColumn(self._words), BarColumn(), TimeElapsedColumn())
+            columns = (
+                SpinnerColumn(),
+                TextColumn("{task.description}", markup=False),
+                BarColumn(),
+                TimeElapsedColumn(),
+            )
             self._shown = Progress(
                 *columns, console=console, transient=True, disable=not console.is_terminal
             )

