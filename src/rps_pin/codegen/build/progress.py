@@ -26,14 +26,14 @@ class Bar:
             if time.monotonic() - self._begin < _AFTER:
                 return
             console = Console(stderr=True)
-            columns = (
+            self._shown = Progress(
                 SpinnerColumn(),
                 TextColumn("{task.description}", markup=False),
                 BarColumn(),
                 TimeElapsedColumn(),
-            )
-            self._shown = Progress(
-                *columns, console=console, transient=True, disable=not console.is_terminal
+                console=console,
+                transient=True,
+                disable=not console.is_terminal,
             )
             self._shown.add_task(self._words)
             self._shown.start()
