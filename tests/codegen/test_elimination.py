@@ -105,6 +105,30 @@ def test_condition_numbers_up_to_1e8(columns: int, extra: int) -> None:
             assert worst(found_y - y) < 100 * EPS * condition * np.linalg.norm(y)
 
 
+@pytest.mark.parametrize("size", [2, 3, 4])
+def test_small_blocks_lose_no_more_than_their_condition(size: int) -> None:
+    """Cramer's rule for the last two columns, at a condition of 1e4 and any values between.
+
+    The reference is refined with extended precision.
+    """
+    rng = np.random.default_rng(size)
+    solver = Solver(np.ones((size, size), dtype=bool), 1)
+    errors = []
+    for _ in range(300):
+        left, right = (np.linalg.qr(rng.normal(size=(size, size)))[0] for _ in range(2))
+        values = np.array([1.0, 1e-4, *rng.choice([1.0, 1e-2, 1e-4], size=size - 2)])
+        matrix, b = (left * values) @ right, rng.normal(size=(size, 1))
+        expected = np.linalg.solve(matrix, b).astype(np.longdouble)
+        for _ in range(4):
+            rest = b - matrix.astype(np.longdouble) @ expected
+            expected = expected + np.linalg.solve(matrix, rest.astype(float))
+        x = solver(matrix, b, b)[0]
+        errors.append(np.abs(x - expected).max() / np.abs(expected).max())
+    # One rounding of A already changes x by eps * 1e4 = 2e-12 in the worst direction.
+    assert np.median(errors) < 1e-12
+    assert worst(np.asarray(errors, dtype=float)) < 3e-12
+
+
 def test_redundant_rows_that_are_zero_or_rounding_error() -> None:
     """Rows beyond the rank may vanish exactly, and in the pattern only."""
     rng = np.random.default_rng(5)

@@ -61,7 +61,7 @@ class Block(NamedTuple):
 
 
 class InversePivot(NamedTuple):
-    """Inverse of a pivot, in the unit of A's column by that of the (scaled) rows, inverse."""
+    """Inverse of a pivot of a column, in the unit of x by that of A x (in scaled rows)."""
 
     column: int
     value: Scalar
@@ -146,9 +146,11 @@ class Householder:
     ----------
     blocks : list of Block
     inverse_pivots : list of InversePivot
-        One of each column, or two where Cramer's rule is used: then the entries of the 2 x 2
-        inverse. The sum of their squares is at most the squared Frobenius norm of the inverses of
-        the diagonal blocks' factors, and tends to infinity where one becomes singular.
+        One of each column, or two where Cramer's rule is used: then the entries of the inverse of
+        the two columns' block. Each is at most 1 / s, s the smallest singular value of A in scaled
+        rows, and the root of the sum of their squares is of that order (tests: at least 0.05 / s),
+        so they show how near A is to a singular one. With columns in other units, x = u x_u, they
+        are divided by u.
 
     Raises
     ------
