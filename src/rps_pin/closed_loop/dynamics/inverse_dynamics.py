@@ -94,10 +94,7 @@ class InverseDynamics:
 
         0 where J_p is not square, or its determinant vanishes. Computed when asked for.
         """
-        jacobian = self._scaled_jacobian()
-        if jacobian.shape[0] != jacobian.shape[1]:
-            return 0
-        return int(np.linalg.slogdet(jacobian)[0])
+        return orientation(self._scaled_jacobian())
 
     def _scaled_jacobian(self) -> Array:
         """Return J_p with all entries in one unit, shape (nc, np)."""
@@ -110,6 +107,13 @@ class InverseDynamics:
             f"residual={self.residual:.3g}"
             + (")" if self.unproduced is None else f", unproduced={self.unproduced})")
         )
+
+
+def orientation(passive_jacobian: Array) -> int:
+    """Return the sign of det J_p; 0 where J_p is not square, or its determinant vanishes."""
+    if passive_jacobian.shape[0] != passive_jacobian.shape[1]:
+        return 0
+    return int(np.linalg.slogdet(passive_jacobian)[0])
 
 
 def inverse_dynamics(

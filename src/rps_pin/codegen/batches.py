@@ -1,0 +1,93 @@
+"""Batches of samples, of which the Pinocchio engine answers those that generated code flags."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.errors import RPSPinError
+from rps_pin.validation import choice
+
+Errors = Literal["raise", "mask"]
+#: Answers of one sample, from its arguments.
+Answer = Callable[..., Sequence[Any]]
+
+
+def settled(
+    found: Sequence[Array],
+    status: Any,
+    given: Sequence[ArrayLike],
+    answer: Answer,
+    errors: Errors = "raise",
+) -> Sequence[Any]:
+    """Return results of generated code, those of flagged samples replaced by an engine's answers.
+
+    Parameters
+    ----------
+    found, status
+        Results, shapes (..., *shape), and status, an int or shape (...).
+    given
+        The arguments; those with batch dimensions have one more dimension.
+    answer
+        Returns the results of one sample, or raises.
+    errors
+        As for `CompiledMechanism`.
+
+    Raises
+    ------
+    RPSPinError
+        That of the first sample which has no answer, and which one it is.
+    """
+    choice(errors, "errors", ("raise", "mask"))
+    if isinstance(status, int):
+        return answer(*given) if status else found
+    flagged = np.argwhere(status)
+    if not flagged.size:
+        return found
+    arrays = [_spread(array, status.shape) for array in given]
+    failed, first = np.zeros(status.shape, dtype=bool), None
+    for row in flagged:
+        index = tuple(int(i) for i in row)
+        try:
+            answers = answer(*(array[index] for array in arrays))
+        except RPSPinError as error:
+            failed[index] = True
+            first = first or (index, error)
+            answers = [np.nan] * len(found)
+        for whole, part in zip(found, answers, strict=True):
+            whole[index] = part
+    if first is not None and errors == "raise":
+        index, error = first
+        error.args = (f"sample {index}: {error}", *error.args[1:])
+        error.failed = failed
+        raise error
+    return found
+
+
+def by_samples(answer: Answer, given: Sequence[ArrayLike], errors: Errors = "raise") -> list[Any]:
+    """Return an engine's answers of all samples, (..., *shape); arguments (..., n) each."""
+    arrays = [np.asarray(array, dtype=np.float64) for array in given]
+    batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    if not batch:
+        return list(answer(*arrays))
+    found: list[Array] | None = None
+    spread = [_spread(array, batch) for array in arrays]
+    for index in np.ndindex(batch):  # the shapes are those of the first sample that has an answer
+        try:
+            first = answer(*(array[index] for array in spread))
+        except RPSPinError:
+            continue
+        found = [np.empty(batch + np.shape(part)) for part in first]
+        break
+    every = np.ones(batch, dtype=np.int32)
+    return list(settled(found or [], every, arrays, answer, errors))
+
+
+def _spread(array: ArrayLike, batch: tuple[int, ...]) -> Array:
+    """Return an argument (..., n) with the whole batch's dimensions."""
+    whole = np.asarray(array, dtype=np.float64)
+    return np.broadcast_to(whole, batch + whole.shape[-1:])

@@ -1,0 +1,568 @@
+"""A mechanism in generated code, with the names, arguments, results and errors of `ClosedLoopModel`.
+
+Every array argument takes leading batch dimensions, which are broadcast. Generated code answers
+with a status for each sample; what it flags (numbers that are not finite, open loops, a nearly
+singular configuration) is handed to the Pinocchio engine, which answers or raises.
+"""
+
+from __future__ import annotations
+
+import copy
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.constraints.closures import Closure
+from rps_pin.closed_loop.dynamics import least_effort
+from rps_pin.closed_loop.dynamics.derivatives import (
+    ForwardDynamicsDerivatives,
+    InverseDynamicsDerivatives,
+    Linearisation,
+)
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.closed_loop.simulation.result import Simulation
+from rps_pin.codegen.applied import with_parameters
+from rps_pin.codegen.batches import Errors, by_samples, settled
+from rps_pin.codegen.forces import GeneratedForces
+from rps_pin.codegen.generated import GeneratedCode
+from rps_pin.codegen.simulation import simulate
+from rps_pin.errors import InputError
+from rps_pin.validation import choice, numbers
+
+#: Answers of the Pinocchio engine for one sample, in the order of a function's outputs.
+Reference = Callable[..., Sequence[Any]]
+
+
+class CompiledMechanism:
+    """Generated code of a mechanism; made by `ClosedLoopModel.compile`, which tells its options.
+
+    One object serves any number of threads.
+
+    Methods have the names, arguments and errors of `ClosedLoopModel`, with these additions: array
+    arguments have leading batch dimensions, and results have them too; ``parameters`` gives the
+    parameters' numbers, shape (..., np), instead of the nominal ones; ``threads`` computes a batch
+    on so many; ``errors="mask"`` makes samples that fail NaN instead of raising the first one's
+    error. What the Pinocchio engine has and this object has not is in ``mechanism``.
+
+    Attributes
+    ----------
+    mechanism : ClosedLoopModel
+        What the code was generated from. Its scratch memory is not used here.
+    code : GeneratedCode
+        The functions, their libraries and proofs.
+    """
+
+    def __init__(self, code: GeneratedCode) -> None:
+        self.code, self.mechanism = code, code.mechanism
+        self._codes: dict[tuple[str, ...], GeneratedCode] = {code.wrench_frames: code}
+        self._lock, self._local = threading.Lock(), threading.local()
+        self._plain = not (code.parameters or code.wrench_frames)
+
+    # Structure ------------------------------------------------------------------------------------
+
+    @property
+    def model(self) -> pin.Model:
+        """The open tree."""
+        return self.mechanism.model
+
+    @property
+    def closures(self) -> tuple[Closure, ...]:
+        """The loop closures."""
+        return self.mechanism.closures
+
+    @property
+    def actuated(self) -> tuple[str, ...]:
+        """Names of the actuated joints."""
+        return self.mechanism.actuated
+
+    @property
+    def actuated_indices(self) -> Indices:
+        """Indices of the actuated joints in a velocity vector, shape (na,)."""
+        return self.mechanism.actuated_indices
+
+    @property
+    def name(self) -> str:
+        """The mechanism's name."""
+        return self.mechanism.name
+
+    @property
+    def home(self) -> Array:
+        """Closed configuration to start from, shape (nq,); a copy."""
+        return self._reference().home
+
+    @property
+    def constraint_size(self) -> int:
+        """Number of closure rows, nc."""
+        return self.mechanism.constraint_size
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """What each of the parameters is, in order; empty if none were named."""
+        return self.code.labels
+
+    @property
+    def nominal_parameters(self) -> Array:
+        """The parameters' numbers of the mechanism as it is, shape (np,)."""
+        return self.code.nominal.copy()
+
+    def rows(self, closure: str) -> slice:
+        """Return the rows of a closure, by its name; see `ClosedLoopModel.rows`."""
+        return self.mechanism.rows(closure)
+
+    # Position -------------------------------------------------------------------------------------
+
+    def gaps(self, q: ArrayLike, **options: Any) -> Array:
+        """Return the gaps of the closures' rows, m and rad, shape (..., nc)."""
+
+        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return (m.loop_errors(q).position,)
+
+        return self._one("gaps", (q,), answer, **options)
+
+    def loop_gap(self, q: ArrayLike, **options: Any) -> Any:
+        """Return the largest gap between two closed frames, m, float or (...)."""
+        gaps = self.gaps(q, **options)
+        equations = self.mechanism.system.equations
+        if gaps.ndim == 1:
+            return equations.largest_gap(gaps)
+        flat = gaps.reshape(-1, gaps.shape[-1])
+        return np.array([equations.largest_gap(row) for row in flat]).reshape(gaps.shape[:-1])
+
+    def jacobian(self, q: ArrayLike, **options: Any) -> Array:
+        """Return J, shape (..., nc, nv); see `ClosedLoopModel.jacobian`."""
+        return self._one("jacobian", (q,), lambda m, q: (m.jacobian(q),), **options)
+
+    def close(
+        self,
+        q_guess: ArrayLike,
+        *,
+        fixed: Sequence[str] = (),
+        within_limits: bool = True,
+        restarts: int = 20,
+        **options: Any,
+    ) -> Array:
+        """Return closed configurations near guesses, shape (..., nq); see `ClosedLoopModel.close`.
+
+        Newton's steps of least norm, in generated code; where they do not close the loops, or leave
+        the joint limits, or joints are fixed, as the Pinocchio engine does.
+        """
+
+        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return (m.close(q, fixed=fixed, within_limits=within_limits, restarts=restarts), 0.0)
+
+        if fixed:
+            return self._by_samples(answer, (q_guess,), **options)
+        return self._closed("closed_near", self._normalised(q_guess), answer, within_limits, options)
+
+    def project(self, q_guess: ArrayLike, *, within_limits: bool = True, **options: Any) -> Array:
+        """Return the closed configurations nearest to guesses; by the Pinocchio engine."""
+
+        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return (m.project(q, within_limits=within_limits),)
+
+        return self._by_samples(answer, (q_guess,), **options)
+
+    def complete(
+        self,
+        values: Mapping[str, ArrayLike] | ArrayLike,
+        q_guess: ArrayLike | None = None,
+        *,
+        within_limits: bool = True,
+        **options: Any,
+    ) -> Array:
+        """Return the closed configurations in which some joints have given values, (..., nq).
+
+        As `ClosedLoopModel.complete`; generated code where the values are those of the actuated
+        joints, shape (..., na), and these determine the motion.
+        """
+        if isinstance(values, Mapping):
+            if any(np.ndim(value) for value in values.values()) or set(values) != set(self.actuated):
+                return self._reference().complete(values, q_guess, within_limits=within_limits)
+            values = [values[name] for name in self.actuated]
+        system, count = self.mechanism.system, len(self.actuated)
+        given = numbers(values, "values", f"numbers of shape (..., {count})")
+        if given.shape[-1:] != (count,):
+            raise InputError(f"values has shape {given.shape}; expected (..., {count})")
+
+        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return (m.complete(q[at], q, within_limits=within_limits), 0.0)
+
+        at = np.array(
+            [self.model.joints[self.model.getJointId(name)].idx_q for name in self.actuated]
+        )
+        guess = self._reference()._start if q_guess is None else self._normalised(q_guess)
+        start = np.broadcast_to(guess, given.shape[:-1] + (self.model.nq,)).copy()
+        start[..., at] = given
+        simple = system.actuated.size == count and np.all(
+            [self.model.joints[self.model.getJointId(name)].nq == 1 for name in self.actuated]
+        )
+        if not (simple and self.code.partition.is_actuated):
+            return self._by_samples(answer, (start,), **options)
+        return self._closed("closed", start, answer, within_limits, options)
+
+    def _closed(
+        self, name: str, start: Array, answer: Reference, within_limits: bool, options: Any
+    ) -> Array:
+        """Return what a routine of Newton's steps finds, if that is within the limits."""
+        limits = self.mechanism.system.limits
+        parameters, errors = options.pop("parameters", None), options.pop("errors", "raise")
+        code, extra = self._code(None), self._numbers(parameters)
+        q, first, status = code[name](start, *extra, **options)
+        if within_limits and limits.q.size:
+            x = q[..., limits.q]
+            outside = ((x < limits.lower) | (x > limits.upper)).any(axis=-1)
+            status = status | outside if q.ndim > 1 else status | int(outside)
+        return self._settled((q, first), status, (start,), answer, parameters, errors)[0]
+
+    def _normalised(self, q: ArrayLike) -> Array:
+        """Return configurations with quaternions of unit length."""
+        system = self.mechanism.system
+        if all(joint.nq == joint.nv for joint in list(self.model.joints)[1:]):
+            return numbers(q, "q_guess", f"numbers of shape (..., {self.model.nq})")
+        return by_samples(lambda one: (system.normalised(one, "q_guess"),), (q,))[0]
+
+    # Velocity and acceleration --------------------------------------------------------------------
+
+    def motion_basis(
+        self, q: ArrayLike, independent: Sequence[str] | None = None, **options: Any
+    ) -> Array:
+        """Return T, shape (..., nv, m); see `ClosedLoopModel.motion_basis`."""
+
+        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return (m.motion_basis(q, independent),)
+
+        return self._independently("motion_basis", (q,), answer, independent, options)
+
+    def velocity(
+        self,
+        q: ArrayLike,
+        v_actuated: ArrayLike,
+        independent: Sequence[str] | None = None,
+        **options: Any,
+    ) -> Array:
+        """Return velocities that keep the loops closed, (..., nv); see `ClosedLoopModel`."""
+
+        def answer(m: ClosedLoopModel, q: Array, u: Array) -> Sequence[Any]:
+            return (m.velocity(q, u, independent),)
+
+        return self._independently("velocity", (q, v_actuated), answer, independent, options)
+
+    def acceleration(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a_actuated: ArrayLike,
+        independent: Sequence[str] | None = None,
+        **options: Any,
+    ) -> Array:
+        """Return accelerations that keep the loops closed, (..., nv); see `ClosedLoopModel`."""
+
+        def answer(m: ClosedLoopModel, q: Array, v: Array, w: Array) -> Sequence[Any]:
+            return (m.acceleration(q, v, w, independent),)
+
+        given = (q, v, a_actuated)
+        return self._independently("acceleration", given, answer, independent, options)
+
+    def frame_placement(self, q: ArrayLike, frame: str, **options: Any) -> Array:
+        """Return homogeneous placements of a frame, (..., 4, 4); see `ClosedLoopModel`."""
+
+        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return (m.frame_placement(q, frame), np.nan)
+
+        name = f"frame_{self.mechanism.system.frame(frame)}"
+        return self._run(name, (q,), answer, **options)[0]
+
+    def frame_jacobian(
+        self,
+        q: ArrayLike,
+        frame: str,
+        independent: Sequence[str] | None = None,
+        *,
+        axes: Literal["world", "frame"] = "world",
+        **options: Any,
+    ) -> Array:
+        """Return closed-loop Jacobians of a frame, (..., 6, m); see `ClosedLoopModel`."""
+        choice(axes, "axes", ("world", "frame"))
+
+        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return (m.frame_jacobian(q, frame, independent, axes=axes),)
+
+        def world(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return m.frame_placement(q, frame), m.frame_jacobian(q, frame, independent)
+
+        if not self._has(independent):
+            return self._by_samples(answer, (q,), **options)
+        name = f"frame_jacobian_{self.mechanism.system.frame(frame)}"
+        placement, jacobian = self._run(name, (q,), world, **options)
+        if axes == "world":
+            return np.asarray(jacobian)
+        turn = np.swapaxes(placement[..., :3, :3], -1, -2)
+        return np.concatenate([turn @ jacobian[..., :3, :], turn @ jacobian[..., 3:, :]], axis=-2)
+
+    # Inverse dynamics -----------------------------------------------------------------------------
+
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        parameters: ArrayLike | None = None,
+        errors: Errors = "raise",
+        threads: int = 1,
+    ) -> GeneratedForces:
+        """Return the forces of motions; see `ClosedLoopModel.inverse_dynamics`."""
+        code, extra = self._code(wrenches), self._extra(wrenches, parameters, (q, v, a))
+        *found, status = code["inverse_dynamics"](q, v, a, *extra, threads=threads)
+        if status.__class__ is not int or status:
+
+            def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
+                result = m.inverse_dynamics(q, v, a, wrenches=w)
+                answers = [result.tau, result.constraint_forces, result.residual]
+                if len(found) > 3:
+                    lacking = result.unproduced is not None
+                    answers += [result.unproduced if lacking else 0.0, float(lacking)]
+                return answers
+
+            found = list(
+                self._settled(found, status, (q, v, a), answer, parameters, errors, wrenches)
+            )
+        tau, multipliers, residual, *rest = found
+        unproduced = None
+        if rest:
+            lacking = rest[1][..., 0] > least_effort.RESIDUAL**2
+            if np.any(lacking):
+                unproduced = np.where(lacking[..., None], rest[0], 0.0)
+        at = np.array(q, dtype=np.float64)
+        passive = self.mechanism.system
+
+        def passive_jacobian() -> Array:
+            rows, columns = passive.factorisation.scales
+            jacobian = self.jacobian(at, parameters=parameters)
+            return np.asarray(rows * jacobian[..., passive.passive] * columns)
+
+        size = residual[..., 0] if residual.ndim > 1 else float(residual[0])
+        return GeneratedForces(tau, multipliers, size, unproduced, passive_jacobian)
+
+    def generalised_force(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> Array:
+        """Return S' tau + J' lambda, (..., nv); see `ClosedLoopModel.generalised_force`."""
+
+        def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
+            return (m.generalised_force(q, v, a, wrenches=w),)
+
+        return self._one("generalised_force", (q, v, a), answer, wrenches, **options)
+
+    def constraint_forces(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> Array:
+        """Return lambda of motions under forces, (..., nc); see `ClosedLoopModel`."""
+
+        def answer(
+            m: ClosedLoopModel, q: Array, v: Array, a: Array, tau: Array, w: Any
+        ) -> Sequence[Any]:
+            return (m.constraint_forces(q, v, a, tau, wrenches=w),)
+
+        return self._one("constraint_forces", (q, v, a, tau), answer, wrenches, **options)
+
+    # Forward dynamics -----------------------------------------------------------------------------
+
+    def forward_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> Array:
+        """Return accelerations under actuator forces, (..., nv); see `ClosedLoopModel`."""
+        if self._plain and wrenches is None and not options:
+            a, status = self.code["forward_dynamics"](q, v, tau)
+            if status.__class__ is int and not status:
+                return np.asarray(a)
+
+        def answer(m: ClosedLoopModel, q: Array, v: Array, tau: Array, w: Any) -> Sequence[Any]:
+            return (m.forward_dynamics(q, v, tau, wrenches=w),)
+
+        return self._one("forward_dynamics", (q, v, tau), answer, wrenches, **options)
+
+    def mass_matrix(
+        self, q: ArrayLike, independent: Sequence[str] | None = None, **options: Any
+    ) -> Array:
+        """Return T' M T, shape (..., m, m); see `ClosedLoopModel.mass_matrix`."""
+
+        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return (m.mass_matrix(q, independent),)
+
+        return self._independently("mass_matrix", (q,), answer, independent, options)
+
+    def bias(
+        self, q: ArrayLike, v: ArrayLike, independent: Sequence[str] | None = None, **options: Any
+    ) -> Array:
+        """Return the reduced bias, shape (..., m); see `ClosedLoopModel.bias`."""
+
+        def answer(m: ClosedLoopModel, q: Array, v: Array) -> Sequence[Any]:
+            return (m.bias(q, v, independent),)
+
+        return self._independently("bias", (q, v), answer, independent, options)
+
+    def gravity_forces(
+        self, q: ArrayLike, independent: Sequence[str] | None = None, **options: Any
+    ) -> Array:
+        """Return the forces that carry the weight, (..., m); see `ClosedLoopModel`."""
+
+        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
+            return (m.gravity_forces(q, independent),)
+
+        return self._independently("gravity_forces", (q,), answer, independent, options)
+
+    def energy(self, q: ArrayLike, v: ArrayLike, **options: Any) -> tuple[Any, Any]:
+        """Return kinetic and potential energy, J, floats or (...); see `ClosedLoopModel.energy`."""
+
+        def answer(m: ClosedLoopModel, q: Array, v: Array) -> Sequence[Any]:
+            return (np.array(m.energy(q, v)),)
+
+        both = self._one("energy", (q, v), answer, **options)
+        if both.ndim == 1:
+            return float(both[0]), float(both[1])
+        return both[..., 0], both[..., 1]
+
+    # Derivatives ----------------------------------------------------------------------------------
+
+    def inverse_dynamics_derivatives(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> InverseDynamicsDerivatives:
+        """Return derivatives of the actuator forces, (..., rows, columns); see `ClosedLoopModel`."""
+
+        def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
+            return m.inverse_dynamics_derivatives(q, v, a, wrenches=w)
+
+        if not self.code.partition.is_actuated:
+            found = self._by_samples(answer, (q, v, a), wrenches=wrenches, **options)
+        else:
+            name, given = "inverse_dynamics_derivatives", (q, v, a)
+            found = self._run(name, given, answer, wrenches, **options)
+        return InverseDynamicsDerivatives(*found)
+
+    def forward_dynamics_derivatives(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        independent: Sequence[str] | None = None,
+        *,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> ForwardDynamicsDerivatives:
+        """Return derivatives of the acceleration, (..., rows, columns); see `ClosedLoopModel`."""
+
+        def answer(m: ClosedLoopModel, q: Array, v: Array, tau: Array, w: Any) -> Sequence[Any]:
+            return m.forward_dynamics_derivatives(q, v, tau, independent, wrenches=w)
+
+        given = (q, v, tau)
+        if not self._has(independent):
+            found = self._by_samples(answer, given, wrenches=wrenches, **options)
+        else:
+            found = self._run("forward_dynamics_derivatives", given, answer, wrenches, **options)
+        return ForwardDynamicsDerivatives(*found)
+
+    def linearize(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        independent: Sequence[str] | None = None,
+        **options: Any,
+    ) -> Linearisation:
+        """Return A (..., 2 m, 2 m) and B (..., 2 m, na); see `ClosedLoopModel.linearize`."""
+        found = self.forward_dynamics_derivatives(q, v, tau, independent, **options)
+        return linearisation(found)
+
+    # Simulation -----------------------------------------------------------------------------------
+
+    def step(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        duration: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> tuple[Array, Array]:
+        """Return closed q (..., nq) and v (..., nv) after one step under constant actuator forces.
+
+        Of order 4, as `Stepper.advance` takes it; the dependent joints are closed, the independent
+        ones stay.
+        """
+
+        def answer(
+            m: ClosedLoopModel, q: Array, v: Array, tau: Array, h: Array, w: Any
+        ) -> Sequence[Any]:
+            stepper = Stepper(m, q, v, wrenches=w)
+            stepper.advance(tau, float(h[0]))
+            return stepper.q, stepper.v, np.nan
+
+        h = np.asarray(duration, dtype=np.float64)[..., None]
+        found = self._run("step", (q, v, tau, h), answer, wrenches, **options)
+        return found[0], found[1]
+
+    def simulate(
+        self, q: ArrayLike, v: ArrayLike | None = None, *, duration: float, **options: Any
+    ) -> Simulation:
+        """Return the motion from a closed state; see `ClosedLoopModel.simulate`."""
+        return simulate(self, q, v, duration=duration, **options)
+
+    # Calls ----------------------------------------------------------------------------------------
+
+    def reference(self) -> ClosedLoopModel:
+        """Return a copy of the mechanism, with scratch memory of its own, for this thread."""
+        try:
+            mechanism: ClosedLoopModel = self._local.mechanism
+        except AttributeError:
+            mechanism = self._local.mechanism = copy.copy(self.mechanism)
+        return mechanism
+
+    def run(
+        self,
+        name: str,
+        given: Sequence[ArrayLike],
+        answer: Reference,
+        wrenches: Wrenches | None = None,
+        *,
+        parameters: ArrayLike | None = None,
+        errors: Errors = "raise",
+        threads: int = 1,
+    ) -> Sequence[Any]:
+        """Return a function's results, those of flagged samples by the Pinocchio engine."""
+        code, extra = self._code(wrenches), self._extra(name, wrenches, parameters)
+        *found, status = code[name](*given, *extra, threads=threads)
+        return self._settled(found, status, given, answer, parameters, errors, wrenches)

@@ -1,0 +1,304 @@
+"""Dynamics of a mechanism with closed loops as sparse CasADi expressions.
+
+With s the scales that give the closures' rows one unit, A = diag(s) J their Jacobian in it, and
+velocities partitioned into independent ones u and dependent ones (columns A_d, full column rank),
+
+    A_d T_d = -A_u,      v = T u,      a = T w + a_0,      A_d a_0 = -s J' v,
+
+the forces f = rnea(q, v, a) + passive joint forces - external forces of a motion are carried by
+
+    A_d' y = (f - S' tau)_d,      lambda = s y,      T' S' tau = T' f,
+
+and (T' M T) w = T' (S' tau - f(a_0)) gives the acceleration. A_d is factorised once by orthogonal
+reflections (see `elimination`), which need no pivot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.constraints.equations import OPEN
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
+from rps_pin.closed_loop.editing.split import split
+from rps_pin.codegen.closures import ClosureRows, closure_rows
+from rps_pin.codegen.elimination import LDL, Householder
+from rps_pin.codegen.independent import Partition
+from rps_pin.codegen.parameters import Parameters
+from rps_pin.codegen.tree import Tree
+
+#: A CasADi SX expression.
+Expression = Any
+
+#: Sum of squared inverse pivots of A_d, in one unit, above which a state is handed to the Pinocchio
+#: engine: its rounding errors are still far below 1e-10 there.
+GROWTH = 1e5
+#: The same for the spread of the pivots of T' M T, above which a motion may move no mass.
+SPREAD = 1e12
+
+
+class Forces(NamedTuple):
+    """Actuator and constraint forces of a motion."""
+
+    tau: Expression
+    """Shape (na,)."""
+    multipliers: Expression
+    """lambda, shape (nc,), in the rows of `ClosureRows`."""
+    residual: Expression
+    """Norm of the error of the equations on the passive rows."""
+    unproduced: Expression
+    """Residual force of an underactuated mechanism, shape (nv,); structurally zero if there is none."""
+    missing: Expression
+    """Its squared size, relative to the reduced force's; structurally zero if there is none."""
+
+
+class MechanismExpressions:
+    """Expressions of one mechanism in q, v, a, and in what is left open.
+
+    Parameters
+    ----------
+    system
+        The mechanism.
+    partition
+        Its independent and dependent velocities.
+    parameters
+        Names of the parameters that stay symbols (see `Parameters`).
+    wrench_frames
+        Frames at which external wrenches act.
+
+    Attributes
+    ----------
+    tree : Tree
+    rows : ClosureRows
+    q, v, a, tau, wrenches, parameters : expressions
+        Symbols of shapes (nq,), (nv,), (nv,), (na,), (6 k,) and (np,).
+    """
+
+    def __init__(
+        self,
+        system: ConstraintSystem,
+        partition: Partition | None = None,
+        parameters: Sequence[str] = (),
+        wrench_frames: Sequence[str] = (),
+    ) -> None:
+        self.system = system
+        self.parameters = Parameters(system, parameters)
+        self.tree = tree = Tree(split(system.model), self.parameters)
+        self.rows: ClosureRows = closure_rows(tree, system.equations)
+        self.partition = partition or partition_of(system, self.rows.jacobian.sparsity())
+        self.q, self.v, self.a = tree.q, tree.v, tree.a
+        self.tau = ca.SX.sym("tau", system.actuated.size)
+        self.wrench_frames = tuple(wrench_frames)
+        self.wrenches = ca.SX.sym("wrenches", 6 * len(self.wrench_frames))
+
+    # Closures -------------------------------------------------------------------------------------
+
+    @property
+    def independent(self) -> Indices:
+        """Indices of the independent velocities, shape (m,)."""
+        return self.partition.independent
+
+    @cached_property
+    def jacobian(self) -> Expression:
+        """A, shape (nc, nv): the rows in one unit."""
+        return self.in_units(self.rows.jacobian)
+
+    @cached_property
+    def factors(self) -> Householder:
+        """Of A_d."""
+        dependent = self.partition.dependent.tolist()
+        return Householder(self.jacobian[:, dependent], self.partition.column_order)
+
+    @cached_property
+    def basis(self) -> Expression:
+        """T, shape (nv, m)."""
+        independent, dependent = self.independent.tolist(), self.partition.dependent.tolist()
+        basis = ca.SX(self.tree.model.nv, len(independent))
+        basis[independent, :] = ca.SX.eye(len(independent))
+        if dependent:
+            basis[dependent, :] = -self.factors.solve(self.jacobian[:, independent])
+        return ca.sparsify(basis)
+
+    def dependent(self, right: Expression) -> Expression:
+        """Return x (nv, k), zero for the independent velocities, with A x = right (nc, k)."""
+        x = ca.SX(self.tree.model.nv, right.shape[1])
+        if self.partition.dependent.size:
+            x[self.partition.dependent.tolist(), :] = self.factors.solve(ca.sparsify(right))
+        return x
+
+    def in_units(self, rows: Expression) -> Expression:
+        """Return quantities of the closures' rows, (nc, k), in one unit."""
+        return _rows_times(self.system.row_scale, rows)
+
+    @cached_property
+    def drift(self) -> Expression:
+        """a_0, shape (nv,)."""
+        return ca.densify(-self.dependent(self.in_units(self.rows.bias)))
+
+    @cached_property
+    def growth(self) -> Expression:
+        """Sum of the squared inverse pivots of A_d in one unit, over that of `GROWTH`."""
+        scale = self.system.column_scale[self.partition.dependent]
+        inverse = zip(self.factors.inverse_pivots, scale, strict=True)
+        return _sum_of_squares([pivot / unit for pivot, unit in inverse]) / GROWTH**2
+
+    @cached_property
+    def opening(self) -> Expression:
+        """Sum of the squared gaps, over that of `OPEN`."""
+        gaps = ca.densify(self.in_units(self.rows.gap))
+        limit = OPEN * self.system.equations.length
+        return _sum_of_squares(gaps.elements()) / limit**2
+
+    @property
+    def check(self) -> Expression:
+        """Opening and growth: at most 1 each where the answers hold."""
+        return ca.vertcat(self.opening, self.growth)
+
+    # Forces ---------------------------------------------------------------------------------------
+
+    @cached_property
+    def passive_forces(self) -> Expression:
+        """e(q, v) of damping, friction and springs, shape (nv,)."""
+        effects, force = self.system.effects, self.springs
+        if effects is not None:
+            for i, (d, f) in enumerate(zip(effects.damping, effects.friction, strict=True)):
+                if d or f:
+                    speed = effects.friction_speed
+                    force[i] += friction_force(self.v[i], float(d), float(f), speed)
+        return force
+
+    @property
+    def springs(self) -> Expression:
+        """The springs' part of e(q, v), shape (nv,)."""
+        force = ca.SX(self.tree.model.nv, 1)
+        for i, stiffness, stretch in self._stretched():
+            force[i] = stiffness * stretch
+        return force
+
+    @property
+    def spring_energy(self) -> Expression:
+        """Potential energy of the springs, J."""
+        return sum((k * x * x / 2 for _, k, x in self._stretched()), ca.SX(0))
+
+    def _stretched(self) -> Iterator[tuple[int, float, Expression]]:
+        """Return velocity, stiffness and q - q_0 of each spring."""
+        effects = self.system.effects
+        if effects is not None:
+            for i, (k, rest) in enumerate(zip(effects.stiffness, effects.rest, strict=True)):
+                if k:
+                    yield i, float(k), self.q[int(self.system.coordinates[i])] - float(rest)
+
+    @cached_property
+    def external_forces(self) -> Expression:
+        """Sum of J_f' w over the wrench frames, shape (nv,)."""
+        force = ca.SX(self.tree.model.nv, 1)
+        for k, name in enumerate(self.wrench_frames):
+            jacobian = self.tree.frame_jacobian(self.system.frame(name))
+            force += ca.sparsify(jacobian).T @ self.wrenches[6 * k : 6 * k + 6]
+        return force
+
+    def required(self, a: Expression) -> Expression:
+        """Return rnea(q, v, a) + passive joint forces - external forces, shape (nv,)."""
+        return self.tree.rnea(self.v, a) + self.passive_forces - self.external_forces
+
+    def reduced(self, force: Expression) -> tuple[Expression, Expression]:
+        """Return T' f, shape (m,), and y with A_d' y = f_d, shape (nc,)."""
+        independent, dependent = self.independent.tolist(), self.partition.dependent.tolist()
+        if not dependent:
+            return force[independent], ca.SX(self.jacobian.shape[0], 1)
+        y = self.factors.transposed(ca.sparsify(force[dependent]))
+        return force[independent] - self.jacobian[:, independent].T @ y, y
+
+    @cached_property
+    def forces(self) -> Forces:
+        """Actuator and constraint forces of the motion q, v, a."""
+        return self.carried(self.required(self.a))
+
+    def carried(self, force: Expression) -> Forces:
+        """Return the forces of actuators and closures that carry f, shape (nv,).
+
+        As many actuators as motions: the only ones. More: tau of least norm; fewer: least squares,
+        both in one unit.
+        """
+        actuated, none = self.system.actuated.tolist(), ca.SX(self.tree.model.nv, 1)
+        reduced, y = self.reduced(force)
+        if self.partition.is_actuated:
+            return self._forces(force, reduced, y, none, ca.SX(1, 1))
+        of_actuators = self.basis[actuated, :]  # S T, (na, m)
+        scale = self.system.column_scale[self.system.actuated]
+        if len(actuated) >= self.independent.size:
+            weighted = _rows_times(1 / scale, of_actuators)
+            tau = _rows_times(1 / scale, Householder(weighted).transposed(reduced))
+            unproduced = missing = none
+            share = ca.SX(1, 1)
+        else:
+            metric = _rows_times(1 / self.system.column_scale, self.basis)
+            lower = ca.chol(ca.densify(metric.T @ metric)).T  # (D^-1 T)' (D^-1 T) = L L'
+            whitened = ca.solve(lower, ca.densify(reduced))
+            tau = Householder(ca.solve(lower, ca.densify(of_actuators.T))).solve(whitened)
+            missing = ca.solve(lower, reduced - of_actuators.T @ tau)
+            share = ca.sumsqr(missing) / ca.sumsqr(whitened)
+            back = metric @ ca.solve(lower.T, missing)
+            unproduced = _rows_times(1 / self.system.column_scale, back)
+        rest = force - unproduced
+        rest[actuated] -= tau
+        return self._forces(force, tau, self.reduced(rest)[1], unproduced, share)
+
+    def _forces(
+        self,
+        force: Expression,
+        tau: Expression,
+        y: Expression,
+        unproduced: Expression,
+        missing: Expression,
+    ) -> Forces:
+        error = (force - unproduced - self.jacobian.T @ y)[self.system.passive.tolist()]
+        return Forces(tau, self.in_rows(y), ca.sqrt(ca.sumsqr(error)), unproduced, missing)
+
+    def in_rows(self, y: Expression) -> Expression:
+        """Return lambda of y, the multipliers of A."""
+        return _rows_times(self.system.row_scale, y)
+
+    # Motion under forces --------------------------------------------------------------------------
+
+    @cached_property
+    def mass_matrix(self) -> Expression:
+        """T' M T, shape (m, m)."""
+        basis = self.basis
+        return ca.sparsify(basis.T @ (self.tree.mass_matrix() @ basis))
+
+    @cached_property
+    def inertia(self) -> LDL:
+        """Factors of T' M T."""
+        return LDL(self.mass_matrix)
+
+    @cached_property
+    def acceleration(self) -> Expression:
+        """a under the forces tau, shape (nv,)."""
+        force = -self.required(self.drift)
+        force[self.system.actuated.tolist()] += self.tau
+        return ca.densify(self.basis @ self.inertia.solve(self.reduced(force)[0]) + self.drift)
+
+    @cached_property
+    def inertia_check(self) -> Expression:
+        """Spread of the pivots of T' M T over `SPREAD`: at most 1 where every motion moves mass."""
+        inverse = self.inertia.inverse_diagonal
+        largest = sum((ca.fabs(1 / d) for d in inverse), ca.SX(0))
+        return largest * sum((ca.fabs(d) for d in inverse), ca.SX(0)) / SPREAD
+
+
+def _rows_times(factors: Array, rows: Expression) -> Expression:
+    """Return diag(factors) times a matrix, without what is multiplied by one."""
+    if np.array_equal(factors, np.ones_like(factors)):
+        return rows
+    return ca.sparsify(ca.diag(ca.DM(factors)) @ rows)
+
+
+def _sum_of_squares(numbers: Sequence[Expression]) -> Expression:
+    return sum((x * x for x in numbers), ca.SX(0))

@@ -1,0 +1,67 @@
+"""Result of inverse dynamics in generated code, of one sample or a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.dynamics.inverse_dynamics import orientation
+from rps_pin.numerics.linear_algebra import condition_number
+
+
+class GeneratedForces:
+    """Actuator and constraint forces; as `InverseDynamics`, with leading batch dimensions.
+
+    Attributes
+    ----------
+    tau : (..., na) array
+    constraint_forces : (..., nc) array
+    residual : float, or (...) array
+    unproduced : (..., nv) array or None
+        None if the actuators produce the motion of every sample.
+    """
+
+    __slots__ = ("_passive_jacobian", "constraint_forces", "residual", "tau", "unproduced")
+
+    def __init__(
+        self,
+        tau: Array,
+        constraint_forces: Array,
+        residual: Any,
+        unproduced: Array | None,
+        passive_jacobian: Callable[[], Array],
+    ) -> None:
+        self.tau, self.constraint_forces, self.residual = tau, constraint_forces, residual
+        self.unproduced = unproduced
+        self._passive_jacobian = passive_jacobian
+
+    @property
+    def condition(self) -> Any:
+        """Condition number of the passive joints' Jacobian, float or (...); see `InverseDynamics`.
+
+        Computed when asked for.
+        """
+        return _each(condition_number, self._passive_jacobian(), float)
+
+    @property
+    def orientation(self) -> Any:
+        """Sign of det J_p, or 0, int or (...); see `InverseDynamics`. Computed when asked for."""
+        return _each(orientation, self._passive_jacobian(), int)
+
+    def __repr__(self) -> str:
+        return (
+            f"GeneratedForces(tau={self.tau}, constraint_forces={self.constraint_forces}, "
+            f"residual={self.residual}"
+            + (")" if self.unproduced is None else f", unproduced={self.unproduced})")
+        )
+
+
+def _each(of: Callable[[Array], Any], matrices: Array, kind: type) -> Any:
+    """Return a number of each matrix, (..., rows, columns)."""
+    if matrices.ndim == 2:
+        return of(matrices)
+    batch = matrices.shape[:-2]
+    return np.array([of(matrices[index]) for index in np.ndindex(batch)], kind).reshape(batch)

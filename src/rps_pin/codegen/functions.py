@@ -1,0 +1,283 @@
+r"""Quantities of a mechanism as named CasADi functions, from which C and CUDA are generated.
+
+Where it says (check), the last result
+of the function is ``check``: the opening of the loops and the growth of rounding errors, at most 1
+each where the other results hold (see `expressions`). External wrenches (6 for each frame, force
+and moment in world axes at the frame's origin) and parameters follow the arguments listed, if the
+mechanism was given any.
+
+=======================  ==============  ==========================================================
+name                     arguments       results
+=======================  ==============  ==========================================================
+gaps                     q               e (nc)
+jacobian                 q               J (nc nv)
+motion_basis             q               T (nv m) (check)
+velocity                 q, u            v (nv) (check)
+acceleration             q, v, w         a (nv) (check)
+inverse_dynamics         q, v, a         tau (na), lambda (nc), residual (1); if there are fewer
+                                         actuators than motions: residual force (nv), its squared
+                                         share (1) (check)
+forward_dynamics         q, v, tau       a (nv) (check)
+constraint_forces        q, v, a, tau    lambda (nc) (check)
+generalised_force        q, v, a         rnea + passive - external forces (nv)
+mass_matrix              q               T' M T (m m) (check)
+bias                     q, v            T' (required force of a_0) (m) (check)
+gravity_forces           q               T' g (m) (check)
+energy                   q, v            kinetic, potential (2)
+inverse_dynamics_\        q, v, a         derivatives of tau by q, v, a (m nv each), by position,
+derivatives                              velocity, acceleration (m m each) (check)
+forward_dynamics_\        q, v, tau       derivatives of a by q, v (nv nv), tau (nv na), and of its
+derivatives                              independent entries: position, velocity (m m), actuation
+                                         (m na) (check)
+integrate                q, dv           q (nq)
+closing_step             q               dv of the dependent velocities (nv), squared gap (1),
+                                         growth (1)
+stage                    q, v, tau       a (nv), power of actuators, wrenches, damping and friction
+                                         (1), growth (1)
+least_norm_step          q               dv of least norm (nv), squared gap (1), growth (1)
+projected_velocity       q, v            v (nv)
+=======================  ==============  ==========================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+
+from rps_pin.closed_loop.constraints.equations import OPEN
+from rps_pin.codegen.derivatives import Slopes
+from rps_pin.codegen.elimination import LDL
+from rps_pin.codegen.expressions import Expression, MechanismExpressions
+
+#: Opening rate that `acceleration` accepts, relative to the speed, as `kinematics` does.
+_CONSISTENT = 1e-8
+
+
+class MechanismFunctions:
+    """The functions of one mechanism, each made when it is asked for.
+
+    Parameters
+    ----------
+    expressions
+        The mechanism.
+    """
+
+    def __init__(self, expressions: MechanismExpressions) -> None:
+        self.expressions = expressions
+        self._made: dict[str, Any] = {}
+
+    def names(self) -> list[str]:
+        """Return the names of all functions."""
+        return list(_MAKERS)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the `casadi.Function` of a name."""
+        if name not in self._made:
+            self._made[name] = self._make(name)
+        return self._made[name]
+
+    def _make(self, name: str) -> Any:
+        x = self.expressions
+        given, results = _MAKERS[name](x)
+        if x.wrench_frames and name in _UNDER_WRENCHES:
+            given["wrenches"] = x.wrenches
+        if x.parameters.labels:
+            given["parameters"] = x.parameters.symbols
+        outputs = ca.cse([ca.densify(result) for result in results.values()])
+        return ca.Function(name, list(given.values()), outputs, list(given), list(results))
+
+
+Made = tuple[dict[str, Expression], dict[str, Expression]]
+_MAKERS: dict[str, Callable[[MechanismExpressions], Made]] = {}
+_UNDER_WRENCHES: set[str] = set()
+
+
+def _function(
+    wrenches: bool = False,
+) -> Callable[[Callable[[MechanismExpressions], Made]], Callable[[MechanismExpressions], Made]]:
+    """Register the maker of a function of its own name."""
+
+    def register(
+        maker: Callable[[MechanismExpressions], Made],
+    ) -> Callable[[MechanismExpressions], Made]:
+        name = maker.__name__.removeprefix("_")
+        _MAKERS[name] = maker
+        if wrenches:
+            _UNDER_WRENCHES.add(name)
+        return maker
+
+    return register
+
+
+# Closures and motions that keep them -------------------------------------------------------------
+
+
+@_function()
+def _gaps(x: MechanismExpressions) -> Made:
+    return {"q": x.q}, {"gaps": x.rows.in_package(x.rows.gap)}
+
+
+@_function()
+def _jacobian(x: MechanismExpressions) -> Made:
+    return {"q": x.q}, {"jacobian": x.rows.package_jacobian()}
+
+
+@_function()
+def _motion_basis(x: MechanismExpressions) -> Made:
+    return {"q": x.q}, {"basis": x.basis, "check": x.check}
+
+
+@_function()
+def _velocity(x: MechanismExpressions) -> Made:
+    u = ca.SX.sym("u", x.independent.size)
+    return {"q": x.q, "u": u}, {"v": _moved(x, u), "check": x.check}
+
+
+@_function()
+def _acceleration(x: MechanismExpressions) -> Made:
+    w = ca.SX.sym("w", x.independent.size)
+    opening = x.jacobian @ x.v
+    speed = 1 + ca.sumsqr(x.v / x.system.column_scale)
+    consistent = ca.sumsqr(opening) / speed / _CONSISTENT**2
+    check = ca.vertcat(x.opening + consistent, x.growth)
+    given = {"q": x.q, "v": x.v, "w": w}
+    # One solution for both: A_d a_d = -(A_u w + s J' v).
+    return given, {"a": _moved(x, w, x.in_units(x.rows.bias)), "check": check}
+
+
+def _moved(x: MechanismExpressions, u: Expression, bias: Expression | None = None) -> Expression:
+    """Return y with given independent entries and A y + bias = 0, shape (nv,)."""
+    independent = x.independent.tolist()
+    right = x.jacobian[:, independent] @ u
+    y = -x.dependent(right if bias is None else right + bias)
+    y[independent] = u
+    return y
+
+
+# Dynamics -----------------------------------------------------------------------------------------
+
+
+@_function(wrenches=True)
+def _inverse_dynamics(x: MechanismExpressions) -> Made:
+    found = x.forces
+    results = {
+        "tau": found.tau,
+        "multipliers": x.rows.in_package(found.multipliers),
+        "residual": found.residual,
+    }
+    if x.system.actuated.size < x.independent.size:
+        results |= {"unproduced": found.unproduced, "missing": found.missing}
+    return {"q": x.q, "v": x.v, "a": x.a}, results | {"check": x.check}
+
+
+@_function(wrenches=True)
+def _forward_dynamics(x: MechanismExpressions) -> Made:
+    check = ca.vertcat(x.opening, x.growth + x.inertia_check)
+    return {"q": x.q, "v": x.v, "tau": x.tau}, {"a": x.acceleration, "check": check}
+
+
+@_function(wrenches=True)
+def _constraint_forces(x: MechanismExpressions) -> Made:
+    rest = x.required(x.a)
+    rest[x.system.actuated.tolist()] -= x.tau
+    multipliers = x.in_rows(x.reduced(rest)[1])
+    given = {"q": x.q, "v": x.v, "a": x.a, "tau": x.tau}
+    return given, {"multipliers": x.rows.in_package(multipliers), "check": x.check}
+
+
+@_function(wrenches=True)
+def _generalised_force(x: MechanismExpressions) -> Made:
+    return {"q": x.q, "v": x.v, "a": x.a}, {"force": x.required(x.a)}
+
+
+@_function()
+def _mass_matrix(x: MechanismExpressions) -> Made:
+    return {"q": x.q}, {"mass": x.mass_matrix, "check": x.check}
+
+
+@_function()
+def _bias(x: MechanismExpressions) -> Made:
+    force = x.tree.rnea(x.v, x.drift) + x.passive_forces
+    return {"q": x.q, "v": x.v}, {"bias": x.reduced(force)[0], "check": x.check}
+
+
+@_function()
+def _gravity_forces(x: MechanismExpressions) -> Made:
+    still = ca.SX(x.tree.model.nv, 1)
+    return {"q": x.q}, {"force": x.reduced(x.tree.rnea(still, still))[0], "check": x.check}
+
+
+@_function()
+def _energy(x: MechanismExpressions) -> Made:
+    both = ca.vertcat(x.tree.kinetic_energy(), x.tree.potential_energy() + x.spring_energy)
+    return {"q": x.q, "v": x.v}, {"energy": both}
+
+
+# Derivatives --------------------------------------------------------------------------------------
+
+
+@_function(wrenches=True)
+def _inverse_dynamics_derivatives(x: MechanismExpressions) -> Made:
+    slopes, motion = Slopes(x), {"q": x.q, "v": x.v, "a": x.a}
+    found = slopes.at(x.forces.multipliers, slopes.inverse()._asdict())
+    return motion, found | {"check": x.check}
+
+
+@_function(wrenches=True)
+def _forward_dynamics_derivatives(x: MechanismExpressions) -> Made:
+    slopes = Slopes(x)
+    given, results = _MAKERS["forward_dynamics"](x)
+    rest = x.required(x.a)
+    rest[x.system.actuated.tolist()] -= x.tau
+    found = slopes.at(x.in_rows(x.reduced(rest)[1]), slopes.forward()._asdict())
+    names, values = list(found), list(found.values())
+    values = ca.substitute(values, [x.a], [results["a"]])
+    return given, dict(zip(names, values, strict=True)) | {"check": results["check"]}
+
+
+# Moves on the manifold ----------------------------------------------------------------------------
+
+
+@_function()
+def _integrate(x: MechanismExpressions) -> Made:
+    move = ca.SX.sym("move", x.tree.model.nv)
+    return {"q": x.q, "move": move}, {"moved": x.tree.integrate(x.q, move)}
+
+
+@_function()
+def _closing_step(x: MechanismExpressions) -> Made:
+    step = -x.dependent(x.in_units(x.rows.gap))
+    return {"q": x.q}, {"step": step, "squared_gap": _squared_gap(x), "growth": x.growth}
+
+
+@_function()
+def _least_norm_step(x: MechanismExpressions) -> Made:
+    """A particular step less its part in the allowed motions: y - T (T' D^-2 T)^-1 T' D^-2 y."""
+    step = -x.dependent(x.in_units(x.rows.gap))
+    if x.independent.size:
+        per_unit = ca.DM(1 / x.system.column_scale)
+        scaled = ca.diag(per_unit) @ x.basis  # D^-1 T
+        along = LDL(ca.sparsify(scaled.T @ scaled)).solve(scaled.T @ (per_unit * step))
+        step = step - x.basis @ along
+    return {"q": x.q}, {"step": step, "squared_gap": _squared_gap(x), "growth": x.growth}
+
+
+@_function(wrenches=True)
+def _stage(x: MechanismExpressions) -> Made:
+    acting = x.external_forces - x.passive_forces + x.springs
+    acting[x.system.actuated.tolist()] += x.tau
+    growth = x.growth + x.inertia_check
+    given = {"q": x.q, "v": x.v, "tau": x.tau}
+    return given, {"a": x.acceleration, "power": acting.T @ x.v, "growth": growth}
+
+
+@_function()
+def _projected_velocity(x: MechanismExpressions) -> Made:
+    return {"q": x.q, "v": x.v}, {"projected": _moved(x, x.v[x.independent.tolist()])}
+
+
+def _squared_gap(x: MechanismExpressions) -> Expression:
+    """Sum of the squared gaps in one unit, over the squared characteristic length."""
+    return x.opening * OPEN**2

@@ -1,0 +1,196 @@
+"""Generated code of one mechanism: its functions, built in groups, proven, and kept.
+
+A group is built when one of its functions is first asked for, or before, by `build`. What the cache
+holds is used without making a single expression.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.codegen import proof
+from rps_pin.codegen.build import Library, Source, build
+from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
+from rps_pin.codegen.expressions import MechanismExpressions
+from rps_pin.codegen.functions import MechanismFunctions
+from rps_pin.codegen.identity import digest
+from rps_pin.codegen.routines import routines
+from rps_pin.codegen.units import Kernel, Unit
+from rps_pin.errors import InputError, did_you_mean
+
+#: Functions that are built together.
+GROUPS: Mapping[str, tuple[str, ...]] = {
+    "dynamics": ("inverse_dynamics", "forward_dynamics"),
+    "kinematics": ("gaps", "jacobian", "motion_basis", "velocity", "acceleration"),
+    "closing": ("closed", "closed_near"),
+    "forces": (
+        "constraint_forces",
+        "generalised_force",
+        "mass_matrix",
+        "bias",
+        "gravity_forces",
+        "energy",
+    ),
+    "simulation": ("step", "steps"),
+    "derivatives": ("inverse_dynamics_derivatives", "forward_dynamics_derivatives"),
+}
+#: Functions whose last output is a check.
+_CHECKED = frozenset(
+    name
+    for group in GROUPS.values()
+    for name in group
+    if name not in ("gaps", "jacobian", "generalised_force", "energy")
+)
+
+
+class GeneratedCode:
+    """The functions of one mechanism in machine code.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism. It is copied; its scratch memory is not used.
+    parameters
+        Names of the parameters' groups (see `Parameters`).
+    wrench_frames
+        Frames at which wrenches act.
+    compiler
+        As for `build.build`.
+    """
+
+    def __init__(
+        self,
+        mechanism: ClosedLoopModel,
+        parameters: Sequence[str] = (),
+        wrench_frames: Sequence[str] = (),
+        compiler: str = "auto",
+    ) -> None:
+        self.mechanism = mechanism
+        self.parameters, self.wrench_frames = tuple(parameters), tuple(wrench_frames)
+        self.compiler = compiler
+        self._lock = threading.RLock()
+        self._functions: dict[str, CompiledFunction] = {}
+        #: Of each group that is built.
+        self.libraries: dict[str, Library] = {}
+
+    @cached_property
+    def functions(self) -> MechanismFunctions:
+        """The functions' expressions."""
+        system = self.mechanism.system
+        x = MechanismExpressions(
+            system, parameters=self.parameters, wrench_frames=self.wrench_frames
+        )
+        return MechanismFunctions(x)
+
+    @cached_property
+    def identity(self) -> str:
+        """Digest of all that the code depends on."""
+        options = self.parameters, self.wrench_frames
+        return digest(self.mechanism.system, options)
+
+    def __getitem__(self, name: str) -> CompiledFunction:
+        """Return a function; its group is built if it is not."""
+        try:
+            return self._functions[name]
+        except KeyError:
+            group = next((g for g, names in GROUPS.items() if name in names), name)
+            self.build(group)
+        return self._functions[name]
+
+    def build(self, *groups: str) -> None:
+        """Build groups that are not built yet.
+
+        Raises
+        ------
+        CompileError
+            If there is no compiler, or it fails, or the result does not agree with Pinocchio's.
+        """
+        with self._lock:
+            for group in groups:
+                if group not in self.libraries:
+                    self._build(group)
+
+    def _build(self, group: str) -> None:
+        unit = self._unit
+        names = self._names(group)
+        source = Source(
+            f"{self.mechanism.name or 'mechanism'}, {group}",
+            tuple(f"{name}_{end}" for name in names for end in ("one", "many")),
+            lambda: tuple(part.library() for part in unit(group)),
+            vectors=True,
+            determined_by=f"{self.identity} {group}",
+        )
+
+        def prove(library: Library) -> Mapping[str, Any]:
+            self._signatures(group)
+            functions = self._loaded(library, self._signatures(group))
+            return {
+                "signatures": self._signatures(group),
+                "partition": self.functions.expressions.partition.as_dict(),
+                "worst": proof.prove(self, functions),
+            }
+
+        def replace(library: Library) -> None:
+            for name in names:
+                self._functions[name].replace(_entry(library, name))
+
+        library = build(source, prove, self.compiler, replace)
+        self._functions |= self._loaded(library, library.proof["signatures"])
+        self.libraries[group] = library
+
+    def _names(self, group: str) -> tuple[str, ...]:
+        if group in GROUPS:
+            return GROUPS[group]
+        if group.startswith("frame_"):
+            return (group,)
+        raise InputError(
+            f"no group of functions {group!r}{did_you_mean(group, GROUPS)}; there are: "
+            f"{', '.join(GROUPS)}"
+        )
+
+    def _unit(self, group: str) -> list[Unit]:
+        """Return a unit for each function: they compile at the same time."""
+        return [self._unit_of(name) for name in self._names(group)]
+
+    def _unit_of(self, name: str) -> Unit:
+        checked = frozenset({name} & _CHECKED)
+        with_loops = {one.name: one for one in routines(self.functions)}
+        if name not in with_loops:
+            kernel = Kernel(self.functions[name])
+            return Unit(name, (kernel,), (), (name,), checked, limit=1.0)
+        needed = [name]
+        for one in needed:
+            needed += [call for call in getattr(with_loops.get(one), "calls", ()) if call not in needed]
+        kernels = tuple(Kernel(self.functions[one]) for one in needed if one not in with_loops)
+        loops = tuple(one for one in with_loops.values() if one.name in needed)
+        return Unit(f"{name}_unit", kernels, loops, (name,), checked, limit=1.0)
+
+    def _signatures(self, group: str) -> dict[str, Any]:
+        """Return names and shapes of the functions' inputs and outputs."""
+        found = {}
+        for name in self._names(group):
+            unit = self._unit_of(name)
+            one = unit.function(name)
+            shapes = [list(shape) for shape in one.shapes]
+            count, outputs = len(one.inputs), unit.handed_out(name)
+            inputs = [[key, shapes[i]] for i, (key, _) in enumerate(one.inputs)]
+            results = [[key, shapes[count + i]] for i, (key, _) in enumerate(outputs)]
+            found[name] = [inputs, results]
+        return found
+
+    def _loaded(self, library: Library, signatures: Mapping[str, Any]) -> dict[str, CompiledFunction]:
+        found = {}
+        for name, (inputs, outputs) in signatures.items():
+            given, results = (
+                [Argument(key, tuple(shape)) for key, shape in part] for part in (inputs, outputs)
+            )
+            found[name] = CompiledFunction(name, given, results, _entry(library, name))
+        return found
+
+
+def _entry(library: Library, name: str) -> Entry:
+    return Entry(library.address(f"{name}_one"), library.address(f"{name}_many"), library)

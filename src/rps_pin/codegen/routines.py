@@ -1,0 +1,154 @@
+"""Routines of C with loops: Newton's method on the closures, and steps in time.
+
+A step is that of `rps_pin.closed_loop.simulation.integrators.rk4_step`, and ends on the manifold of
+closed configurations: the dependent coordinates are closed by Newton's steps, the dependent
+velocities follow the independent ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rps_pin.closed_loop.constraints.equations import OPEN
+from rps_pin.codegen.functions import MechanismFunctions
+from rps_pin.codegen.units import Routine
+
+#: Steps in one call of `steps`.
+BLOCK = 64
+#: Squared gaps, in characteristic lengths: rounding error; and from where one more step of Newton's
+#: method leads to rounding error.
+_CLOSED, _LAST = 1e-28, 1e-16
+_NEWTON_STEPS = 20
+
+
+def routines(functions: MechanismFunctions) -> tuple[Routine, ...]:
+    """Return ``closed``, ``closed_near``, ``step`` and ``steps`` of a mechanism.
+
+    ========================  =====================  ============================================
+    name                      arguments              results
+    ========================  =====================  ============================================
+    closed                    q                      q, its independent coordinates as given;
+                                                     squared gap of the guess (1) (check)
+    closed_near               q                      the same by steps of least norm (check)
+    step                      q, v, tau, h (1)       q, v, work (1) (check)
+    steps                     q, v, tau, h (BLOCK)   all q, all v, all work, (BLOCK, ...) each
+                                                     (check)
+    ========================  =====================  ============================================
+
+    External wrenches and parameters follow the arguments, as for `functions`.
+    """
+    return (
+        _newton(functions, "closed", "closing_step"),
+        _newton(functions, "closed_near", "least_norm_step"),
+        _step(functions),
+        _steps(functions),
+    )
+
+
+def _extra(functions: MechanismFunctions, wrenches: bool) -> list[tuple[str, int]]:
+    x = functions.expressions
+    extra = [("wrenches", 6 * len(x.wrench_frames))] if wrenches and x.wrench_frames else []
+    count = len(x.parameters.labels)
+    return extra + ([("parameters", count)] if count else [])
+
+
+def _call(name: str, given: Sequence[str], extra: list[tuple[str, int]], *results: str) -> str:
+    return f"{name}({', '.join([*given, *(name for name, _ in extra), *results])});"
+
+
+def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
+    model = functions.expressions.tree.model
+    extra = _extra(functions, False)
+    body = f"""
+    REAL dv[{model.nv}], moved[{model.nq}], gap[1], growth[1], before = CONST(1e300);
+    int i, k;
+    for (i = 0; i < {model.nq}; ++i) closed[i] = q[i];
+    check[0] = check[1] = CONST(0);
+    for (k = 0; k < {_NEWTON_STEPS}; ++k) {{
+        {_call(kernel, ["closed"], extra, "dv", "gap", "growth")}
+        check[1] = FMAX(check[1], growth[0]);
+        if (k == 0) first[0] = gap[0];
+        /* A gap that grows, before it is rounding error, is not this routine's matter. */
+        check[0] = SELECT(AND(LT(before, gap[0]), LT(CONST({_CLOSED}), gap[0])),
+                          CONST(2), check[0]);
+        before = gap[0];
+        if (!ANY(LT(CONST({_CLOSED}), gap[0]))) break;
+        {_call("integrate", ["closed", "dv"], extra, "moved")}
+        for (i = 0; i < {model.nq}; ++i) closed[i] = moved[i];
+        if (!ANY(LT(CONST({_LAST}), gap[0]))) break;
+    }}
+    check[0] = SELECT(LT(CONST({_LAST}), before), CONST(2), check[0]);
+"""
+    outputs = (("closed", model.nq), ("first", 1), ("check", 2))
+    return Routine(name, (("q", model.nq), *extra), outputs, body, (kernel, "integrate"))
+
+
+def _step(functions: MechanismFunctions) -> Routine:
+    x = functions.expressions
+    nq, nv, extra, alone = x.tree.model.nq, x.tree.model.nv, _extra(functions, True), _extra(functions, False)
+
+    def stage(q: str, v: str, k: int) -> str:
+        call = _call("stage", [q, v, "tau"], extra, f"a{k}", f"p{k}", "c")
+        return f"{call} check[1] = FMAX(check[1], c[0]);"
+
+    def move(q: str, to: str) -> str:
+        return _call("integrate", [q, "d"], alone, to)
+
+    body = f"""
+    REAL a1[{nv}], a2[{nv}], a3[{nv}], a4[{nv}], v2[{nv}], v3[{nv}], v4[{nv}], d[{nv}];
+    REAL q2[{nq}], q3[{nq}], p1[1], p2[1], p3[1], p4[1], first[1], c[2];
+    const REAL t = h[0], half = t * CONST(0.5), twelfth = t / CONST(12), sixth = t / CONST(6);
+    int i;
+    check[1] = CONST(0);
+    {stage("q", "v", 1)}
+    for (i = 0; i < {nv}; ++i) {{ d[i] = half * v[i]; v2[i] = v[i] + half * a1[i]; }}
+    {move("q", "q2")}
+    {stage("q2", "v2", 2)}
+    for (i = 0; i < {nv}; ++i) {{ d[i] = half * v2[i]; v3[i] = v[i] + half * a2[i]; }}
+    {move("q", "q3")}
+    {stage("q3", "v3", 3)}
+    for (i = 0; i < {nv}; ++i) {{
+        d[i] = t * (v3[i] - CONST(0.5) * v[i]);
+        v4[i] = v[i] + t * a3[i];
+    }}
+    {move("q2", "q3")}
+    {stage("q3", "v4", 4)}
+    for (i = 0; i < {nv}; ++i)
+        d[i] = twelfth * (CONST(3) * v[i] + CONST(2) * v2[i] + CONST(2) * v3[i] - v4[i]);
+    {move("q", "q2")}
+    for (i = 0; i < {nv}; ++i)
+        d[i] = twelfth * (CONST(2) * v2[i] - v[i] + CONST(2) * v3[i] + CONST(3) * v4[i]);
+    {move("q2", "q3")}
+    for (i = 0; i < {nv}; ++i)
+        v2[i] = v[i] + sixth * (a1[i] + CONST(2) * a2[i] + CONST(2) * a3[i] + a4[i]);
+    work[0] = sixth * (p1[0] + CONST(2) * p2[0] + CONST(2) * p3[0] + p4[0]);
+    {_call("closed", ["q3"], alone, "q_next", "first", "c")}
+    /* From an open configuration, or far off the manifold: too long a step. */
+    check[0] = FMAX(first[0] / CONST({OPEN**2!r}), c[0]);
+    check[1] = FMAX(check[1], c[1]);
+    {_call("projected_velocity", ["q_next", "v2"], alone, "v_next")}
+"""
+    given = (("q", nq), ("v", nv), ("tau", x.system.actuated.size), ("h", 1), *extra)
+    outputs = (("q_next", nq), ("v_next", nv), ("work", 1), ("check", 2))
+    calls = ("stage", "integrate", "closed", "projected_velocity")
+    return Routine("step", given, outputs, body, calls)
+
+
+def _steps(functions: MechanismFunctions) -> Routine:
+    x = functions.expressions
+    nq, nv, extra = x.tree.model.nq, x.tree.model.nv, _extra(functions, True)
+    results = (f"qs + k * {nq}", f"vs + k * {nv}", "works + k", "c")
+    following = [f"k ? qs + (k - 1) * {nq} : q", f"k ? vs + (k - 1) * {nv} : v", "tau", "h + k"]
+    body = f"""
+    REAL c[2];
+    int k;
+    check[0] = check[1] = CONST(0);
+    for (k = 0; k < {BLOCK}; ++k) {{
+        {_call("step", following, extra, *results)}
+        check[0] = FMAX(check[0], c[0]);
+        check[1] = FMAX(check[1], c[1]);
+    }}
+"""
+    given = (("q", nq), ("v", nv), ("tau", x.system.actuated.size), ("h", BLOCK), *extra)
+    outputs = (("qs", BLOCK * nq), ("vs", BLOCK * nv), ("works", BLOCK), ("check", 2))
+    return Routine("steps", given, outputs, body, ("step",))
