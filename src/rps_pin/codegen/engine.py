@@ -23,17 +23,20 @@ from rps_pin.closed_loop.dynamics.derivatives import (
     ForwardDynamicsDerivatives,
     InverseDynamicsDerivatives,
     Linearisation,
+    linearisation,
 )
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import Simulation
+from rps_pin.closed_loop.simulation.stepper import Stepper
 from rps_pin.codegen.applied import with_parameters
 from rps_pin.codegen.batches import Errors, by_samples, settled
 from rps_pin.codegen.forces import GeneratedForces
+from rps_pin.codegen.functions import UNDER_WRENCHES
 from rps_pin.codegen.generated import GeneratedCode
 from rps_pin.codegen.simulation import simulate
 from rps_pin.errors import InputError
-from rps_pin.validation import choice, numbers
+from rps_pin.validation import choice, numbers, whole_number
 
 #: Answers of the Pinocchio engine for one sample, in the order of a function's outputs.
 Reference = Callable[..., Sequence[Any]]
@@ -63,6 +66,7 @@ class CompiledMechanism:
         self._codes: dict[tuple[str, ...], GeneratedCode] = {code.wrench_frames: code}
         self._lock, self._local = threading.Lock(), threading.local()
         self._plain = not (code.parameters or code.wrench_frames)
+        self._forward = code["forward_dynamics"]
 
     # Structure ------------------------------------------------------------------------------------
 
@@ -94,7 +98,7 @@ class CompiledMechanism:
     @property
     def home(self) -> Array:
         """Closed configuration to start from, shape (nq,); a copy."""
-        return self._reference().home
+        return self.reference().home
 
     @property
     def constraint_size(self) -> int:
@@ -183,7 +187,7 @@ class CompiledMechanism:
         """
         if isinstance(values, Mapping):
             if any(np.ndim(value) for value in values.values()) or set(values) != set(self.actuated):
-                return self._reference().complete(values, q_guess, within_limits=within_limits)
+                return self.reference().complete(values, q_guess, within_limits=within_limits)
             values = [values[name] for name in self.actuated]
         system, count = self.mechanism.system, len(self.actuated)
         given = numbers(values, "values", f"numbers of shape (..., {count})")
@@ -196,7 +200,7 @@ class CompiledMechanism:
         at = np.array(
             [self.model.joints[self.model.getJointId(name)].idx_q for name in self.actuated]
         )
-        guess = self._reference()._start if q_guess is None else self._normalised(q_guess)
+        guess = self.reference()._start if q_guess is None else self._normalised(q_guess)
         start = np.broadcast_to(guess, given.shape[:-1] + (self.model.nq,)).copy()
         start[..., at] = given
         simple = system.actuated.size == count and np.all(
@@ -211,14 +215,13 @@ class CompiledMechanism:
     ) -> Array:
         """Return what a routine of Newton's steps finds, if that is within the limits."""
         limits = self.mechanism.system.limits
-        parameters, errors = options.pop("parameters", None), options.pop("errors", "raise")
-        code, extra = self._code(None), self._numbers(parameters)
-        q, first, status = code[name](start, *extra, **options)
-        if within_limits and limits.q.size:
+
+        def outside(q: Array) -> Any:
             x = q[..., limits.q]
-            outside = ((x < limits.lower) | (x > limits.upper)).any(axis=-1)
-            status = status | outside if q.ndim > 1 else status | int(outside)
-        return self._settled((q, first), status, (start,), answer, parameters, errors)[0]
+            return ((x < limits.lower) | (x > limits.upper)).any(axis=-1)
+
+        refused = outside if within_limits and limits.q.size else None
+        return np.asarray(self._run(name, (start,), answer, refused=refused, **options)[0])
 
     def _normalised(self, q: ArrayLike) -> Array:
         """Return configurations with quaternions of unit length."""
@@ -319,20 +322,22 @@ class CompiledMechanism:
         threads: int = 1,
     ) -> GeneratedForces:
         """Return the forces of motions; see `ClosedLoopModel.inverse_dynamics`."""
-        code, extra = self._code(wrenches), self._extra(wrenches, parameters, (q, v, a))
-        *found, status = code["inverse_dynamics"](q, v, a, *extra, threads=threads)
+        found: Sequence[Any]
+        *found, status = self._generated(wrenches)["inverse_dynamics"](
+            q, v, a, *self._extra("inverse_dynamics", wrenches, parameters), threads=threads
+        )
         if status.__class__ is not int or status:
+            size = len(found)
 
             def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
                 result = m.inverse_dynamics(q, v, a, wrenches=w)
-                answers = [result.tau, result.constraint_forces, result.residual]
-                if len(found) > 3:
-                    lacking = result.unproduced is not None
-                    answers += [result.unproduced if lacking else 0.0, float(lacking)]
-                return answers
+                lacking = result.unproduced is not None
+                answers = [result.tau, result.constraint_forces, np.array([result.residual])]
+                return [*answers, result.unproduced if lacking else 0.0, float(lacking)][:size]
 
-            found = list(
-                self._settled(found, status, (q, v, a), answer, parameters, errors, wrenches)
+            given = (q, v, a)
+            found = self._settled(
+                "inverse_dynamics", found, status, given, answer, wrenches, parameters, errors
             )
         tau, multipliers, residual, *rest = found
         unproduced = None
@@ -399,7 +404,7 @@ class CompiledMechanism:
     ) -> Array:
         """Return accelerations under actuator forces, (..., nv); see `ClosedLoopModel`."""
         if self._plain and wrenches is None and not options:
-            a, status = self.code["forward_dynamics"](q, v, tau)
+            a, status = self._forward(q, v, tau)
             if status.__class__ is int and not status:
                 return np.asarray(a)
 
@@ -544,14 +549,14 @@ class CompiledMechanism:
     # Calls ----------------------------------------------------------------------------------------
 
     def reference(self) -> ClosedLoopModel:
-        """Return a copy of the mechanism, with scratch memory of its own, for this thread."""
+        """Return a copy of the mechanism for this thread, with scratch memory of its own."""
         try:
             mechanism: ClosedLoopModel = self._local.mechanism
         except AttributeError:
             mechanism = self._local.mechanism = copy.copy(self.mechanism)
         return mechanism
 
-    def run(
+    def _run(
         self,
         name: str,
         given: Sequence[ArrayLike],
@@ -561,8 +566,147 @@ class CompiledMechanism:
         parameters: ArrayLike | None = None,
         errors: Errors = "raise",
         threads: int = 1,
+        refused: Callable[[Array], Any] | None = None,
     ) -> Sequence[Any]:
-        """Return a function's results, those of flagged samples by the Pinocchio engine."""
-        code, extra = self._code(wrenches), self._extra(name, wrenches, parameters)
-        *found, status = code[name](*given, *extra, threads=threads)
-        return self._settled(found, status, given, answer, parameters, errors, wrenches)
+        """Return a function's results, those of flagged samples by the Pinocchio engine.
+
+        `refused` tells of the first result which samples are flagged too.
+        """
+        extra = self._extra(name, wrenches, parameters)
+        *found, status = self._generated(wrenches)[name](*given, *extra, threads=threads)
+        if refused is not None:
+            status = status | refused(found[0])
+            status = int(status) if found[0].ndim == 1 else status
+        return self._settled(name, found, status, given, answer, wrenches, parameters, errors)
+
+    def _one(
+        self,
+        name: str,
+        given: Sequence[ArrayLike],
+        answer: Reference,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> Array:
+        """Return the only result of a function."""
+        return np.asarray(self._run(name, given, answer, wrenches, **options)[0])
+
+    def _independently(
+        self,
+        name: str,
+        given: Sequence[ArrayLike],
+        answer: Reference,
+        independent: Sequence[str] | None,
+        options: Any,
+    ) -> Array:
+        """Return the result of a function of independent joints, if it is generated for these."""
+        if self._has(independent):
+            return self._one(name, given, answer, **options)
+        return np.asarray(self._by_samples(answer, given, **options)[0])
+
+    def _has(self, independent: Sequence[str] | None) -> bool:
+        """Return whether these are the independent velocities of the generated code."""
+        if independent is None:
+            return self.code.partition.is_actuated
+        chosen = self.mechanism.system.independent(independent)
+        return np.array_equal(chosen, self.code.partition.independent)
+
+    def _by_samples(
+        self,
+        answer: Reference,
+        given: Sequence[ArrayLike],
+        *,
+        wrenches: Wrenches | None = None,
+        parameters: ArrayLike | None = None,
+        errors: Errors = "raise",
+        threads: int = 1,
+    ) -> Sequence[Any]:
+        """Return the Pinocchio engine's answers; `threads` are no use to it."""
+        whole_number(threads, "threads")
+        under = wrenches is not None
+        code = self._generated(wrenches)
+        extra = self._inputs(code, under, wrenches, parameters)
+        return by_samples(self._answers(answer, len(given), code, under), (*given, *extra), errors)
+
+    def _settled(
+        self,
+        name: str,
+        found: Sequence[Any],
+        status: Any,
+        given: Sequence[ArrayLike],
+        answer: Reference,
+        wrenches: Wrenches | None,
+        parameters: ArrayLike | None,
+        errors: Errors,
+    ) -> Sequence[Any]:
+        if status.__class__ is int and not status:
+            return found
+        code, under = self._generated(wrenches), name in UNDER_WRENCHES
+        extra = self._inputs(code, under, wrenches, parameters)
+        answers = self._answers(answer, len(given), code, under)
+        return settled(found, status, (*given, *extra), answers, errors)
+
+    def _answers(
+        self, answer: Reference, count: int, code: GeneratedCode, under: bool
+    ) -> Reference:
+        """Return the answer of a sample's arguments with wrenches and parameters behind them."""
+
+        def of_sample(*arrays: Any) -> Sequence[Any]:
+            motion, rest = arrays[:count], list(arrays[count:])
+            mechanism = self.reference()
+            if code.parameters:
+                mechanism = with_parameters(mechanism, code.parameters, rest.pop())
+            if not under:
+                return answer(mechanism, *motion)
+            frames = code.wrench_frames
+            acting = dict(zip(frames, np.reshape(rest.pop(), (-1, 6)), strict=True)) if rest else {}
+            return answer(mechanism, *motion, acting or None)
+
+        return of_sample
+
+    def _generated(self, wrenches: Wrenches | None) -> GeneratedCode:
+        """Return the code for wrenches at these frames; it is built if it is not there."""
+        if not wrenches or set(wrenches) <= set(self.code.wrench_frames):
+            return self.code
+        frames = tuple(sorted(wrenches))
+        for name in frames:
+            self.mechanism.system.frame(name)
+        with self._lock:
+            if frames not in self._codes:
+                self._codes[frames] = self.code.with_wrenches(frames)
+            return self._codes[frames]
+
+    def _extra(
+        self, name: str, wrenches: Wrenches | None, parameters: ArrayLike | None
+    ) -> Sequence[ArrayLike]:
+        """Return wrenches and parameters as a function takes them."""
+        if self._plain and not wrenches and parameters is None:
+            return ()
+        return self._inputs(self._generated(wrenches), name in UNDER_WRENCHES, wrenches, parameters)
+
+    def _inputs(
+        self,
+        code: GeneratedCode,
+        under: bool,
+        wrenches: Wrenches | None,
+        parameters: ArrayLike | None,
+    ) -> list[ArrayLike]:
+        extra: list[ArrayLike] = []
+        if under and code.wrench_frames:
+            given = wrenches or {}
+            none = np.zeros(6)
+            extra.append(_stacked([given.get(name, none) for name in code.wrench_frames]))
+        if code.parameters:
+            extra.append(code.nominal if parameters is None else parameters)
+        elif parameters is not None:
+            raise InputError("the mechanism was compiled without parameters; name them in compile")
+        return extra
+
+
+def _stacked(wrenches: Sequence[ArrayLike]) -> Array:
+    """Return wrenches, (..., 6) each, one behind the other, (..., 6 k)."""
+    arrays = [numbers(w, "a wrench", "numbers of shape (..., 6)") for w in wrenches]
+    for array in arrays:
+        if array.shape[-1:] != (6,):
+            raise InputError(f"a wrench has shape {array.shape}; expected (..., 6)")
+    batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    return np.concatenate([np.broadcast_to(array, (*batch, 6)) for array in arrays], axis=-1)

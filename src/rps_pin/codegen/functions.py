@@ -80,8 +80,12 @@ class MechanismFunctions:
 
     def _make(self, name: str) -> Any:
         x = self.expressions
-        given, results = _MAKERS[name](x)
-        if x.wrench_frames and name in _UNDER_WRENCHES:
+        kind, _, index = name.rpartition("_")
+        if kind in ("frame", "frame_jacobian"):
+            given, results = _of_frame(x, int(index), kind)
+        else:
+            given, results = _MAKERS[name](x)
+        if x.wrench_frames and name in UNDER_WRENCHES:
             given["wrenches"] = x.wrenches
         if x.parameters.labels:
             given["parameters"] = x.parameters.symbols
@@ -91,7 +95,8 @@ class MechanismFunctions:
 
 Made = tuple[dict[str, Expression], dict[str, Expression]]
 _MAKERS: dict[str, Callable[[MechanismExpressions], Made]] = {}
-_UNDER_WRENCHES: set[str] = set()
+#: Functions that take wrenches.
+UNDER_WRENCHES: set[str] = {"step", "steps"}
 
 
 def _function(
@@ -105,7 +110,7 @@ def _function(
         name = maker.__name__.removeprefix("_")
         _MAKERS[name] = maker
         if wrenches:
-            _UNDER_WRENCHES.add(name)
+            UNDER_WRENCHES.add(name)
         return maker
 
     return register
@@ -154,6 +159,17 @@ def _moved(x: MechanismExpressions, u: Expression, bias: Expression | None = Non
     y = -x.dependent(right if bias is None else right + bias)
     y[independent] = u
     return y
+
+
+def _of_frame(x: MechanismExpressions, frame: int, kind: str) -> Made:
+    """Return the placement of a frame, and its closed-loop Jacobian in world axes."""
+    turn, place = x.tree.frame_placement(frame)
+    last = ca.DM([[0.0, 0.0, 0.0, 1.0]])
+    placement = {"placement": ca.vertcat(ca.horzcat(turn, place), last)}
+    if kind == "frame":
+        return {"q": x.q}, placement
+    jacobian = ca.sparsify(x.tree.frame_jacobian(frame)) @ x.basis
+    return {"q": x.q}, placement | {"jacobian": jacobian, "check": x.check}
 
 
 # Dynamics -----------------------------------------------------------------------------------------

@@ -222,7 +222,13 @@ def following(
 
 
 def linearisation(derivatives: ForwardDynamicsDerivatives) -> Linearisation:
-    """Return A and B of the derivatives in independent coordinates."""
-    m, na = derivatives.actuation.shape
-    A = np.block([[np.zeros((m, m)), np.eye(m)], [derivatives.position, derivatives.velocity]])
-    return Linearisation(A, np.vstack([np.zeros((m, na)), derivatives.actuation]))
+    """Return A and B of the derivatives in independent coordinates, (..., rows, columns)."""
+    position, velocity, actuation = derivatives[3:]
+    *batch, m, na = actuation.shape
+    still = np.zeros((*batch, m, m))
+    kept = np.broadcast_to(np.eye(m), still.shape)
+    A = np.concatenate(
+        [np.concatenate([still, kept], axis=-1), np.concatenate([position, velocity], axis=-1)],
+        axis=-2,
+    )
+    return Linearisation(A, np.concatenate([np.zeros((*batch, m, na)), actuation], axis=-2))
