@@ -556,6 +556,10 @@ class CompiledMechanism:
             mechanism = self._local.mechanism = copy.copy(self.mechanism)
         return mechanism
 
+    def generated(self, name: str, wrenches: Wrenches | None, *given: ArrayLike) -> tuple[Any, ...]:
+        """Return a function's results and status, for nominal parameters."""
+        return self._generated(wrenches)[name](*given, *self._extra(name, wrenches, None))
+
     def _run(
         self,
         name: str,

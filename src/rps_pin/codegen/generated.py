@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen import proof
 from rps_pin.codegen.build import Library, Source, build
@@ -18,6 +19,8 @@ from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
 from rps_pin.codegen.expressions import MechanismExpressions
 from rps_pin.codegen.functions import MechanismFunctions
 from rps_pin.codegen.identity import digest
+from rps_pin.codegen.independent import Partition
+from rps_pin.codegen.parameters import Parameters
 from rps_pin.codegen.routines import routines
 from rps_pin.codegen.units import Kernel, Unit
 from rps_pin.errors import InputError, did_you_mean
@@ -85,6 +88,27 @@ class GeneratedCode:
             system, parameters=self.parameters, wrench_frames=self.wrench_frames
         )
         return MechanismFunctions(x)
+
+    def with_wrenches(self, frames: Sequence[str]) -> GeneratedCode:
+        """Return the code of the same mechanism for wrenches at other frames."""
+        return GeneratedCode(self.mechanism, self.parameters, frames, self.compiler)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """What each parameter is."""
+        return Parameters(self.mechanism.system, self.parameters).labels
+
+    @cached_property
+    def nominal(self) -> Array:
+        """The parameters' numbers of the mechanism, shape (np,)."""
+        return Parameters(self.mechanism.system, self.parameters).nominal
+
+    @cached_property
+    def partition(self) -> Partition:
+        """Independent and dependent velocities."""
+        for library in self.libraries.values():
+            return Partition.of_dict(library.proof["partition"])
+        return self.functions.expressions.partition
 
     @cached_property
     def identity(self) -> str:

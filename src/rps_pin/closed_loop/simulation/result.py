@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -160,6 +161,18 @@ class Recorder:
             lower, upper = float(limits.lower[index]), float(limits.upper[index])
             passed = JointLimitPassed(limits.names[index], time, float(x[index]), lower, upper)
             self._passed.append(passed)
+
+    def watch_all(self, time: Array, q: Array) -> None:
+        """Watch all rows (n,) and (n, nq) of a motion."""
+        x = q[:, self._limits.q]
+        outside = ((x < self._limits.lower) | (x > self._limits.upper)).any(axis=1)
+        for row in np.flatnonzero(outside):
+            self.watch(float(time[row]), q[row])
+
+    def whole(self, columns: Mapping[str, Array]) -> Simulation:
+        """Return a motion of whole arrays, by their names in `Simulation`."""
+        given = {"constraint_forces": None, **columns}
+        return Simulation(**given, **self._names, limits_passed=tuple(self._passed))
 
     def add(self, **row: Any) -> None:
         """Keep a row of all arrays of a `Simulation`, by name."""

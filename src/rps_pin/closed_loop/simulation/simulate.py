@@ -129,7 +129,7 @@ def simulate(
     drive = Drive(system, controller, tau, wrenches)
     start = closed_start(system, q, v)
     motion = Motion(system, start, drive, baumgarte_gain if closing == "baumgarte" else 0.0)
-    advance = _fixed(motion)
+    advance = fixed_steps(motion)
     if method == "adaptive":
         stepper = integrators.AdaptiveStepper(system.model, tolerance, min(step, duration))
         advance = _Adaptive(motion, stepper, start, None if controller else duration)
@@ -179,7 +179,7 @@ def simulate(
 _Advance = Callable[[float, State, float, Array], tuple[State, float, float]]
 
 
-def _fixed(motion: Motion) -> _Advance:
+def fixed_steps(motion: Motion) -> _Advance:
     """Return the function that takes one step of fixed length."""
 
     def advance(

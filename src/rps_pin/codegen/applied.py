@@ -1,0 +1,87 @@
+"""A mechanism with parameters of other numbers, for the Pinocchio engine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.closures import Closure, LoopClosure, joint_id
+from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.codegen.parameters import Parameters
+
+
+def with_parameters(
+    mechanism: ClosedLoopModel, groups: Sequence[str], values: Array
+) -> ClosedLoopModel:
+    """Return a mechanism with other numbers, in the order of `Parameters`; home is not kept.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism with the nominal numbers.
+    groups
+        Names of the groups.
+    values
+        Their numbers, shape (np,).
+    """
+    model, closures = mechanism.model.copy(), list(mechanism.closures)
+    start = 0
+    for group in groups:
+        size = Parameters(mechanism.system, [group]).nominal.size
+        _apply(model, closures, group, np.array(values[start : start + size]))
+        start += size
+    return ClosedLoopModel(
+        model,
+        closures,
+        mechanism.actuated,
+        effects=mechanism.effects,
+        name=mechanism.name,
+        characteristic_length=mechanism.characteristic_length,
+        max_condition=mechanism.max_condition,
+    )
+
+
+def _apply(model: pin.Model, closures: list[Closure], group: str, values: Array) -> None:
+    kind, _, name = group.partition(":")
+    if kind == "gravity":
+        model.gravity.linear = values
+    elif kind == "inertia":
+        model.inertias[joint_id(model, name, group)] = pin.Inertia.FromDynamicParameters(values)
+    elif kind == "mass":
+        joint = joint_id(model, name, group)
+        body = model.inertias[joint]
+        scaled = body.toDynamicParameters() * (values[0] / body.mass)
+        model.inertias[joint] = pin.Inertia.FromDynamicParameters(scaled)
+    elif kind == "placement":
+        joint = joint_id(model, name, group)
+        model.jointPlacements[joint] = model.jointPlacements[joint] * _move(values)
+    elif kind == "closure":
+        index = next(i for i, closure in enumerate(closures) if closure.name == name)
+        closures[index] = _moved_ends(model, closures[index], values)
+    else:
+        frame = model.frames[model.getFrameId(name)]
+        body = frame.placement.act(pin.Inertia.FromDynamicParameters(values))
+        model.inertias[frame.parentJoint] = model.inertias[frame.parentJoint] + body
+
+
+def _moved_ends(model: pin.Model, closure: Closure, values: Array) -> LoopClosure:
+    """Return a closure of two new frames; others may use the old ones."""
+    assert isinstance(closure, LoopClosure)  # a coupling has no placements
+    ends = []
+    for end, name in enumerate((closure.frame_a, closure.frame_b)):
+        old = model.frames[model.getFrameId(name)]
+        placement = old.placement * _move(values[6 * end : 6 * end + 6])
+        new = f"{closure.name}, frame {'ab'[end]}"
+        model.addFrame(
+            pin.Frame(new, old.parentJoint, old.parentFrame, placement, pin.FrameType.OP_FRAME)
+        )
+        ends.append(new)
+    return replace(closure, frame_a=ends[0], frame_b=ends[1])
+
+
+def _move(values: Array) -> pin.SE3:
+    return pin.SE3(pin.rpy.rpyToMatrix(*values[3:]), values[:3])

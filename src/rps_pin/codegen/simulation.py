@@ -1,0 +1,178 @@
+"""Simulation in generated code: whole steps in C, several at a time where nothing happens between.
+
+Fixed steps with projection, under a controller or constant forces and under constant wrenches, are
+generated; everything else that `rps_pin.closed_loop.simulation.simulate` can do is left to it. A
+step that the code flags is taken by the Pinocchio engine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.closed_loop.simulation import simulate as pinocchio_engine
+from rps_pin.closed_loop.simulation.integrators import times
+from rps_pin.closed_loop.simulation.motion import Controller, Drive, Motion, State, closed_start
+from rps_pin.closed_loop.simulation.result import Recorder, Simulation
+from rps_pin.codegen.routines import BLOCK
+from rps_pin.errors import RPSPinError
+from rps_pin.validation import positive_number, whole_number
+
+if TYPE_CHECKING:
+    from rps_pin.codegen.engine import CompiledMechanism
+
+
+def simulate(
+    compiled: CompiledMechanism,
+    q: ArrayLike,
+    v: ArrayLike | None = None,
+    *,
+    duration: float,
+    step: float = 1e-3,
+    controller: Controller | None = None,
+    tau: ArrayLike | None = None,
+    wrenches: Wrenches | None = None,
+    record_every: int = 1,
+    forces: bool = False,
+    progress: Callable[[float], None] | None = None,
+    **others: Any,
+) -> Simulation:
+    """Return the motion from a closed state; see `ClosedLoopModel.simulate` for the options."""
+    given: dict[str, Any] = {
+        "duration": duration,
+        "step": step,
+        "controller": controller,
+        "tau": tau,
+        "wrenches": wrenches,
+        "record_every": record_every,
+        "forces": forces,
+        "progress": progress,
+    }
+    method, closing = others.get("method", "rk4"), others.get("closing", "projection")
+    if (method, closing) != ("rk4", "projection") or callable(wrenches):
+        return pinocchio_engine.simulate(compiled.reference(), q, v, **given, **others)
+    positive_number(duration, "duration", "s")
+    positive_number(step, "step", "s")
+    whole_number(record_every, "record_every")
+    return _Run(compiled, q, v, given).simulation()
+
+
+class _Run:
+    """One simulation: the states of all steps, then everything that is computed from them."""
+
+    def __init__(
+        self, compiled: CompiledMechanism, q: ArrayLike, v: ArrayLike | None, given: dict[str, Any]
+    ) -> None:
+        self._compiled, self._reference, self._given = compiled, compiled.reference(), given
+        self._wrenches: Wrenches | None = given["wrenches"]
+        system = self._reference.system
+        self._drive = Drive(system, given["controller"], given["tau"], self._wrenches)
+        self._controlled = given["controller"] is not None
+        self._time = np.array([t for _, t in times(given["duration"], given["step"])])
+        rows = len(self._time)
+        self._q, self._v = np.empty((rows, system.model.nq)), np.empty((rows, system.model.nv))
+        self._tau, self._work = np.empty((rows, system.actuated.size)), np.zeros(rows)
+        self._q[0], self._v[0] = closed_start(system, q, v)
+        self._done = 0  # rows whose state and tau are known, less one
+
+    def simulation(self) -> Simulation:
+        """Return the whole motion; where it breaks off, the error has what there is of it."""
+        try:
+            self._advance()
+        except BaseException as error:
+            if isinstance(error, RPSPinError):
+                text = f"at t = {self._time[self._done]:.6g} s: {error}"
+                error.args = (text, *error.args[1:])
+            vars(error)["partial"] = self._recorded(self._done)
+            raise
+        return self._recorded(len(self._time))
+
+    def _advance(self) -> None:
+        last, progress, shown = len(self._time) - 1, self._given["progress"], 0.0
+        self._command(0)
+        while self._done < last:
+            fraction = self._time[self._done] / self._time[-1]
+            if progress and fraction >= shown + 0.005:
+                shown = fraction
+                progress(float(fraction))
+            if not self._controlled and last - self._done >= BLOCK and self._block():
+                continue
+            self._single()
+        if progress:
+            progress(1.0)
+
+    def _command(self, row: int) -> None:
+        self._drive.command(float(self._time[row]), self._q[row], self._v[row])
+        self._tau[row] = self._drive.tau
+
+    def _block(self) -> bool:
+        """Take a block of steps under constant forces; False if the code flags one of them."""
+        k = self._done
+        h = np.diff(self._time[k : k + BLOCK + 1])
+        names, state = ("steps", self._wrenches), (self._q[k], self._v[k])
+        q, v, work, status = self._compiled.generated(*names, *state, self._drive.tau, h)
+        if status:
+            return False
+        rows = slice(k + 1, k + BLOCK + 1)
+        self._q[rows], self._v[rows] = q.reshape(BLOCK, -1), v.reshape(BLOCK, -1)
+        self._work[rows] = self._work[k] + np.cumsum(work)
+        self._tau[rows] = self._drive.tau
+        self._done += BLOCK
+        return True
+
+    def _single(self) -> None:
+        """Take one step; what the code flags is the Pinocchio engine's matter."""
+        k = self._done
+        state, h = (self._q[k], self._v[k]), self._time[k + 1] - self._time[k]
+        q, v, work, status = self._compiled.generated(
+            "step", self._wrenches, *state, self._drive.tau, np.array([h])
+        )
+        done = float(work[0])
+        if status:
+            (q, v), done = self._by_pinocchio(state, k)
+        self._q[k + 1], self._v[k + 1] = q, v
+        self._work[k + 1] = self._work[k] + done
+        self._command(k + 1)
+        self._done += 1
+
+    def _by_pinocchio(self, state: State, k: int) -> tuple[State, float]:
+        motion = Motion(self._reference.system, state, self._drive, 0.0)
+        time, following = float(self._time[k]), float(self._time[k + 1])
+        with np.errstate(over="ignore", invalid="ignore"):  # refused in words
+            a = motion.acceleration(time, *state)
+            moved, _, work = pinocchio_engine.fixed_steps(motion)(time, state, following, a)
+        return moved, work
+
+    def _recorded(self, rows: int) -> Simulation:
+        """Return what follows from the first rows' states."""
+        compiled, system = self._compiled, self._reference.system
+        every = self._given["record_every"]
+        kept = np.arange(0, rows, every)
+        if rows == len(self._time) and kept[-1] != rows - 1:
+            kept = np.append(kept, rows - 1)
+        recorder = Recorder(system.model, system.actuated)
+        recorder.watch_all(self._time[:rows], self._q[:rows])
+        q, v, tau = self._q[kept], self._v[kept], self._tau[kept]
+        a = compiled.forward_dynamics(q, v, tau, wrenches=self._wrenches)
+        kinetic, potential = compiled.energy(q, v)
+        columns = {
+            "time": self._time[kept],
+            "q": q,
+            "v": v,
+            "a": a,
+            "tau": tau,
+            "kinetic": kinetic,
+            "potential": potential,
+            "gap": compiled.loop_gap(q),
+            "work": self._work[kept],
+        }
+        if self._given["forces"]:
+            columns["constraint_forces"] = compiled.constraint_forces(
+                q, v, a, tau, wrenches=self._wrenches
+            )
+        return recorder.whole(columns)
