@@ -468,6 +468,19 @@ class ClosedLoopModel:
         chosen = self.system.independent(independent)
         return kinematics.motion_basis(self.system, self._configuration(q), chosen)
 
+    def frame_placement(self, q: ArrayLike, frame: str) -> Array:
+        """Return the homogeneous matrix that places a frame in the world, shape (4, 4), m.
+
+        Raises
+        ------
+        MechanismError
+            If there is no such frame; lists those there are.
+        """
+        index = self.system.frame(frame)
+        model, data = self.model, self.system.data
+        pin.framesForwardKinematics(model, data, self._configuration(q))
+        return np.array(data.oMf[index].homogeneous)
+
     def frame_jacobian(
         self,
         q: ArrayLike,

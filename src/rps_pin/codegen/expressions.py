@@ -26,7 +26,6 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.equations import OPEN
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
-from rps_pin.closed_loop.editing.split import split
 from rps_pin.codegen.closures import ClosureRows, closure_rows
 from rps_pin.codegen.elimination import LDL, Householder
 from rps_pin.codegen.independent import Partition
@@ -83,15 +82,15 @@ class MechanismExpressions:
     def __init__(
         self,
         system: ConstraintSystem,
-        partition: Partition | None = None,
+        partition: Partition,
         parameters: Sequence[str] = (),
         wrench_frames: Sequence[str] = (),
     ) -> None:
         self.system = system
         self.parameters = Parameters(system, parameters)
-        self.tree = tree = Tree(split(system.model), self.parameters)
+        self.tree = tree = Tree(self.parameters.model, self.parameters)
         self.rows: ClosureRows = closure_rows(tree, system.equations)
-        self.partition = partition or partition_of(system, self.rows.jacobian.sparsity())
+        self.partition = partition
         self.q, self.v, self.a = tree.q, tree.v, tree.a
         self.tau = ca.SX.sym("tau", system.actuated.size)
         self.wrench_frames = tuple(wrench_frames)
@@ -113,7 +112,7 @@ class MechanismExpressions:
     def factors(self) -> Householder:
         """Of A_d."""
         dependent = self.partition.dependent.tolist()
-        return Householder(self.jacobian[:, dependent], self.partition.column_order)
+        return Householder(self.jacobian[:, dependent])
 
     @cached_property
     def basis(self) -> Expression:
@@ -144,9 +143,11 @@ class MechanismExpressions:
     @cached_property
     def growth(self) -> Expression:
         """Sum of the squared inverse pivots of A_d in one unit, over that of `GROWTH`."""
-        scale = self.system.column_scale[self.partition.dependent]
-        inverse = zip(self.factors.inverse_pivots, scale, strict=True)
-        return _sum_of_squares([pivot / unit for pivot, unit in inverse]) / GROWTH**2
+        if not self.partition.dependent.size:
+            return ca.SX(0)
+        units = self.system.column_scale[self.partition.dependent]
+        inverse = [pivot.value / units[pivot.column] for pivot in self.factors.inverse_pivots]
+        return _sum_of_squares(inverse) / GROWTH**2
 
     @cached_property
     def opening(self) -> Expression:
@@ -288,7 +289,7 @@ class MechanismExpressions:
     @cached_property
     def inertia_check(self) -> Expression:
         """Spread of the pivots of T' M T over `SPREAD`: at most 1 where every motion moves mass."""
-        inverse = self.inertia.inverse_diagonal
+        inverse = self.inertia.inverse_diagonal.elements()
         largest = sum((ca.fabs(1 / d) for d in inverse), ca.SX(0))
         return largest * sum((ca.fabs(d) for d in inverse), ca.SX(0)) / SPREAD
 

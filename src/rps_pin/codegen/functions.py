@@ -47,7 +47,7 @@ from typing import Any
 import casadi as ca
 
 from rps_pin.closed_loop.constraints.equations import OPEN
-from rps_pin.codegen.derivatives import Slopes
+from rps_pin.codegen.derivatives import ForwardSlopes, InverseSlopes, Slopes
 from rps_pin.codegen.elimination import LDL
 from rps_pin.codegen.expressions import Expression, MechanismExpressions
 
@@ -237,8 +237,13 @@ def _energy(x: MechanismExpressions) -> Made:
 @_function(wrenches=True)
 def _inverse_dynamics_derivatives(x: MechanismExpressions) -> Made:
     slopes, motion = Slopes(x), {"q": x.q, "v": x.v, "a": x.a}
-    found = slopes.at(x.forces.multipliers, slopes.inverse()._asdict())
+    found = slopes.at(x.forces.multipliers, _by(slopes.inverse()))
     return motion, found | {"check": x.check}
+
+
+def _by(slopes: InverseSlopes | ForwardSlopes) -> dict[str, Expression]:
+    """Return derivatives by names that are not those of arguments."""
+    return {f"by_{name}": slope for name, slope in slopes._asdict().items()}
 
 
 @_function(wrenches=True)
@@ -247,7 +252,7 @@ def _forward_dynamics_derivatives(x: MechanismExpressions) -> Made:
     given, results = _MAKERS["forward_dynamics"](x)
     rest = x.required(x.a)
     rest[x.system.actuated.tolist()] -= x.tau
-    found = slopes.at(x.in_rows(x.reduced(rest)[1]), slopes.forward()._asdict())
+    found = slopes.at(x.in_rows(x.reduced(rest)[1]), _by(slopes.forward()))
     names, values = list(found), list(found.values())
     values = ca.substitute(values, [x.a], [results["a"]])
     return given, dict(zip(names, values, strict=True)) | {"check": results["check"]}

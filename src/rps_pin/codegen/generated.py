@@ -19,7 +19,7 @@ from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
 from rps_pin.codegen.expressions import MechanismExpressions
 from rps_pin.codegen.functions import MechanismFunctions
 from rps_pin.codegen.identity import digest
-from rps_pin.codegen.independent import Partition
+from rps_pin.codegen.independent import Partition, choose, regular_samples
 from rps_pin.codegen.parameters import Parameters
 from rps_pin.codegen.routines import routines
 from rps_pin.codegen.units import Kernel, Unit
@@ -84,10 +84,11 @@ class GeneratedCode:
     def functions(self) -> MechanismFunctions:
         """The functions' expressions."""
         system = self.mechanism.system
-        x = MechanismExpressions(
-            system, parameters=self.parameters, wrench_frames=self.wrench_frames
+        samples = regular_samples(system, self.mechanism.home)
+        partition = choose(system, samples.jacobians)
+        return MechanismFunctions(
+            MechanismExpressions(system, partition, self.parameters, self.wrench_frames)
         )
-        return MechanismFunctions(x)
 
     def with_wrenches(self, frames: Sequence[str]) -> GeneratedCode:
         """Return the code of the same mechanism for wrenches at other frames."""
