@@ -245,11 +245,21 @@ class MechanismExpressions:
             tau = Householder(ca.solve(lower, ca.densify(of_actuators.T))).solve(whitened)
             missing = ca.solve(lower, reduced - of_actuators.T @ tau)
             share = ca.sumsqr(missing) / ca.sumsqr(whitened)
-            back = metric @ ca.solve(lower.T, missing)
-            unproduced = _rows_times(1 / self.system.column_scale, back)
+            unproduced = self.least_force(reduced - of_actuators.T @ tau)
         rest = force - unproduced
         rest[actuated] -= tau
         return self._forces(force, tau, self.reduced(rest)[1], unproduced, share)
+
+    def least_force(self, reduced: Expression) -> Expression:
+        """Return the least force f in one unit, (nv,), with a given T' f: D^-2 T (T' D^-2 T)^-1 T' f.
+
+        Closures carry nothing of it, and all of what is left.
+        """
+        if not self.independent.size:
+            return ca.SX(self.tree.model.nv, 1)
+        metric = _rows_times(1 / self.system.column_scale, self.basis)  # D^-1 T
+        along = LDL(ca.sparsify(metric.T @ metric)).solve(ca.sparsify(reduced))
+        return _rows_times(1 / self.system.column_scale, metric @ along)
 
     def _forces(
         self,

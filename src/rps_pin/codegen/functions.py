@@ -198,6 +198,7 @@ def _forward_dynamics(x: MechanismExpressions) -> Made:
 def _constraint_forces(x: MechanismExpressions) -> Made:
     rest = x.required(x.a)
     rest[x.system.actuated.tolist()] -= x.tau
+    rest -= x.least_force(x.reduced(rest)[0])  # what closures cannot carry
     multipliers = x.in_rows(x.reduced(rest)[1])
     given = {"q": x.q, "v": x.v, "a": x.a, "tau": x.tau}
     return given, {"multipliers": x.rows.in_package(multipliers), "check": x.check}

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.model import ClosedLoopModel
-from rps_pin.codegen import proof
 from rps_pin.codegen.build import Library, Source, build
 from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
 from rps_pin.codegen.expressions import MechanismExpressions
@@ -21,6 +23,7 @@ from rps_pin.codegen.functions import MechanismFunctions
 from rps_pin.codegen.identity import digest
 from rps_pin.codegen.independent import Partition, choose, regular_samples
 from rps_pin.codegen.parameters import Parameters
+from rps_pin.codegen.proof import Proof
 from rps_pin.codegen.routines import routines
 from rps_pin.codegen.units import Kernel, Unit
 from rps_pin.errors import InputError, did_you_mean
@@ -84,10 +87,8 @@ class GeneratedCode:
     def functions(self) -> MechanismFunctions:
         """The functions' expressions."""
         system = self.mechanism.system
-        samples = regular_samples(system, self.mechanism.home)
-        partition = choose(system, samples.jacobians)
         return MechanismFunctions(
-            MechanismExpressions(system, partition, self.parameters, self.wrench_frames)
+            MechanismExpressions(system, self.partition, self.parameters, self.wrench_frames)
         )
 
     def with_wrenches(self, frames: Sequence[str]) -> GeneratedCode:
@@ -108,8 +109,14 @@ class GeneratedCode:
     def partition(self) -> Partition:
         """Independent and dependent velocities."""
         for library in self.libraries.values():
-            return Partition.of_dict(library.proof["partition"])
-        return self.functions.expressions.partition
+            return _of_dict(library.proof["partition"])
+        system = self.mechanism.system
+        return choose(system, regular_samples(system, self.mechanism.home).jacobians)
+
+    @cached_property
+    def _proof(self) -> Proof:
+        independent = self.partition.independent
+        return Proof(self.mechanism, independent, self.parameters, self.wrench_frames)
 
     @cached_property
     def identity(self) -> str:
@@ -151,12 +158,15 @@ class GeneratedCode:
         )
 
         def prove(library: Library) -> Mapping[str, Any]:
-            self._signatures(group)
-            functions = self._loaded(library, self._signatures(group))
+            signatures = self._signatures(group)
+            functions = self._loaded(library, signatures)
             return {
-                "signatures": self._signatures(group),
-                "partition": self.functions.expressions.partition.as_dict(),
-                "worst": proof.prove(self, functions),
+                "signatures": signatures,
+                "partition": _as_dict(self.partition),
+                "differences": {
+                    name: self._proof.compare(name, function)
+                    for name, function in functions.items()
+                },
             }
 
         def replace(library: Library) -> None:
@@ -219,3 +229,14 @@ class GeneratedCode:
 
 def _entry(library: Library, name: str) -> Entry:
     return Entry(library.address(f"{name}_one"), library.address(f"{name}_many"), library)
+
+
+def _as_dict(partition: Partition) -> dict[str, Any]:
+    """Return a partition as JSON holds it."""
+    values = asdict(partition)
+    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()}
+
+
+def _of_dict(values: Mapping[str, Any]) -> Partition:
+    indices = ("independent", "dependent", "idle")
+    return Partition(**{**values, **{name: np.array(values[name], np.intp) for name in indices}})

@@ -1,7 +1,8 @@
 """Proof of generated code: every function against the Pinocchio engine, each time it is built.
 
-The states are closed and random: near home, farther away, and one as near to a singularity as is
-found among them. Each function is called for one state after another and for all in a batch.
+The states are closed and random: near home, farther away, and one as near to a singularity as a
+short walk leads. With parameters, the mechanism has other numbers than the nominal ones. Each
+function is called for one state after another and for all in a batch.
 """
 
 from __future__ import annotations
@@ -10,56 +11,268 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.dynamics.generalised_forces import tree_mass
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation.stepper import Stepper
 from rps_pin.codegen.applied import with_parameters
 from rps_pin.codegen.calls import CompiledFunction
-from rps_pin.codegen.independent import Partition, regular_samples
+from rps_pin.codegen.independent import regular_samples
+from rps_pin.codegen.parameters import Parameters
 from rps_pin.codegen.routines import BLOCK
 from rps_pin.errors import CompileError, RPSPinError
+from rps_pin.numerics.linear_algebra import Decomposition, condition_number, null_space
 
 #: Largest difference from the Pinocchio engine, relative to the largest number of a result.
 ACCEPTED = 1e-10
-#: Of the steps that the proof takes, s.
-_STEP = 1e-4
+#: Numbers below this count as rounding errors of zero, in SI units.
+_ZERO = 1e-6
+#: Of a proof's steps in time, s, and of Newton's guesses, rad or characteristic lengths.
+_STEP, _AWAY = 1e-4, 1e-3
+#: Condition number of J_d that the walk towards a singularity does not pass.
+_SINGULAR = 1e3
+#: Condition number of J_d above which generated code may flag a state.
+_MAY_FLAG = 1e3
 
 
-class State(NamedTuple):
-    """A closed state with forces on it, and the arguments of all functions by their names."""
+class Sample(NamedTuple):
+    """A closed state of a mechanism, forces on it, and a guess near it."""
 
     q: Array
     v: Array
     a: Array
     tau: Array
-    wrenches: dict[str, Array]
-    """By frame."""
+    u: Array
+    w: Array
+    wrenches: Array
+    """Of all frames, shape (6 k,)."""
+    parameters: Array
+    near: Array
+    """q with its dependent velocities moved a little."""
+    condition: float
+    """Of J_d, in one unit."""
 
 
-Reference = Callable[[ClosedLoopModel, State], Sequence[Any]]
+class Proof:
+    """States of a mechanism, and what the Pinocchio engine answers there.
 
+    Parameters
+    ----------
+    mechanism
+        The mechanism; a copy of it is used.
+    independent
+        Indices of the independent velocities.
+    parameters, wrench_frames
+        As for `MechanismExpressions`.
+    """
 
-def _wrenches(state: State) -> dict[str, Array] | None:
-    return state.wrenches or None
+    def __init__(
+        self,
+        mechanism: ClosedLoopModel,
+        independent: Indices,
+        parameters: Sequence[str],
+        wrench_frames: Sequence[str],
+    ) -> None:
+        self._rng = np.random.default_rng(0)
+        self._parameters = Parameters(mechanism.system, parameters).nominal
+        if parameters:
+            size = np.where(self._parameters, 0.03 * np.abs(self._parameters), 1e-3)
+            self._parameters = self._parameters + size * self._rng.uniform(size=size.size)
+        self._m = with_parameters(mechanism, parameters, self._parameters)
+        self._frames, self._independent = tuple(wrench_frames), independent
+        nv = mechanism.model.nv
+        self._dependent = np.setdiff1d(np.arange(nv), independent)
+        home = self._m.close(mechanism.home, within_limits=False)
+        places = [*regular_samples(self._m.system, home).configurations[:5]]
+        self.samples = [self._sample(q) for q in (*places, self._towards_singularity(places[-1]))]
 
+    def _sample(self, q: Array) -> Sample:
+        rng, m, model = self._rng, self._m, self._m.model
+        q = self._closed(self._closed(q))
+        basis = self._basis(q)
+        u, w = rng.normal(size=(2, self._independent.size))
+        v = basis @ u
+        move = np.zeros(model.nv)
+        move[self._dependent] = rng.normal(size=self._dependent.size)
+        near = pin.integrate(model, q, _AWAY * move * m.system.column_scale)
+        a = self._acceleration(q, v, w)
+        weight = float(np.abs(pin.computeGeneralizedGravity(model, m.system.data, q)).max(initial=0))
+        wrenches = max(weight, _ZERO) * rng.normal(size=6 * len(self._frames))
+        tau = m.inverse_dynamics(q, v, a, wrenches=self._acting(wrenches)).tau
+        jacobian = m.system.scaled(m.jacobian(q))[:, self._dependent]
+        return Sample(
+            q, v, a, tau, u, w, wrenches, self._parameters, near, condition_number(jacobian)
+        )
 
-def _inverse_dynamics(m: ClosedLoopModel, s: State) -> Sequence[Any]:
-    found = m.inverse_dynamics(s.q, s.v, s.a, wrenches=_wrenches(s))
-    unproduced = np.zeros(m.model.nv) if found.unproduced is None else found.unproduced
-    return found.tau, found.constraint_forces, None, unproduced
+    def _closed(self, q: Array) -> Array:
+        """Return q after one of Newton's steps of least norm: closed to rounding error."""
+        system = self._m.system
+        factors = Decomposition(system.scaled(self._m.jacobian(q)))
+        gaps = system.row_scale * self._m.loop_errors(q).position
+        step = -system.column_scale * factors.least_norm(gaps)
+        return np.asarray(pin.integrate(self._m.model, q, step))
 
+    def _towards_singularity(self, q: Array) -> Array:
+        """Return the end of a walk in an allowed direction, short of a singularity."""
+        m, best, worst = self._m, q, 0.0
+        direction = self._rng.normal(size=self._independent.size)
+        for _ in range(30):
+            try:
+                step = self._basis(q) @ direction
+                step *= 0.1 * m.characteristic_length / np.linalg.norm(step / m.velocity_scale)
+                q = m.close(pin.integrate(m.model, q, step), within_limits=False, restarts=0)
+            except (RPSPinError, np.linalg.LinAlgError):
+                break
+            now = condition_number(m.system.scaled(m.jacobian(q))[:, self._dependent])
+            if not now < _SINGULAR:
+                break
+            if now > worst:
+                best, worst = q, now
+        return best
 
-def _step(m: ClosedLoopModel, s: State) -> Sequence[Any]:
-    stepper = Stepper(m, s.q, s.v, wrenches=_wrenches(s))
-    stepper.advance(s.tau, _STEP)
-    return stepper.q, stepper.v
+    # Comparison -----------------------------------------------------------------------------------
 
+    def compare(self, name: str, function: CompiledFunction) -> float:
+        """Return the largest relative difference of a function from the Pinocchio engine.
 
-def _steps(m: ClosedLoopModel, s: State) -> Sequence[Any]:
-    stepper, qs, vs = Stepper(m, s.q, s.v, wrenches=_wrenches(s)), [], []
-    for _ in range(BLOCK):
-        stepper.advance(s.tau, _STEP)
-        qs.append(stepper.q)
-        vs.append(stepper.v)
-    return np.concatenate(qs), np.concatenate(vs)
+        Raises
+        ------
+        CompileError
+            If it is above `ACCEPTED`, or the function flags a state that is regular.
+        """
+        worst, compared = 0.0, 0
+        given = [self._arguments(function, sample) for sample in self.samples]
+        *batch, flags = function(*(np.array(one) for one in zip(*given, strict=True)))
+        for i, (sample, arguments) in enumerate(zip(self.samples, given, strict=True)):
+            *found, status = function(*arguments)
+            if status or flags[i]:
+                if sample.condition < _MAY_FLAG:
+                    raise CompileError(
+                        f"generated code of {name} flags a regular state (status {status}, in a "
+                        f"batch {flags[i]}; condition number {sample.condition:.3g})",
+                        "",
+                    )
+                continue
+            expected = self._expected(name, sample, found)
+            for k, (one, of_batch, wanted) in enumerate(zip(found, batch, expected, strict=False)):
+                if wanted is not None:
+                    for result in (one, of_batch[i]):
+                        worst = self._refused(name, function, k, result, wanted, worst)
+            compared += 1
+        if not compared:
+            raise CompileError(f"generated code of {name} flags all {len(given)} states", "")
+        return worst
+
+    def _refused(
+        self, name: str, function: CompiledFunction, k: int, found: Array, wanted: Any, worst: float
+    ) -> float:
+        """Return the worse of two differences; raise if it is above what is accepted."""
+        wanted = np.reshape(wanted, found.shape)
+        error = np.abs(found - wanted)
+        size = max(float(np.abs(wanted).max(initial=0.0)), _ZERO)
+        relative = float(error.max(initial=0.0)) / size
+        if not relative <= ACCEPTED:
+            at = np.unravel_index(int(np.argmax(error)), error.shape)
+            raise CompileError(
+                f"generated code of {name} does not agree with the Pinocchio engine: "
+                f"{function.outputs[k].name}{list(map(int, at))} = {found[at]!r}, not "
+                f"{wanted[at]!r}: {relative:.3g} relative, at most {ACCEPTED:g} is accepted",
+                "",
+            )
+        return max(worst, relative)
+
+    def _arguments(self, function: CompiledFunction, sample: Sample) -> list[Array]:
+        values = sample._asdict()
+        if function.name in ("gaps", "closed", "closed_near"):
+            values["q"] = sample.near
+        sizes = {one.name: one.shape[0] for one in function.inputs}
+        values["h"] = np.full(sizes.get("h", 0), _STEP)
+        return [values[one.name] for one in function.inputs]
+
+    # What the Pinocchio engine answers ------------------------------------------------------------
+
+    def _expected(self, name: str, s: Sample, found: Sequence[Array]) -> Sequence[Any]:
+        m, acting = self._m, self._acting(s.wrenches)
+        if name.startswith("frame_"):
+            frame = m.model.frames[int(name.rpartition("_")[2])].name
+            return m.frame_placement(s.q, frame), self._frame_jacobian(s.q, frame)
+        if name == "closed_near":
+            # The answer is any closed configuration.
+            return (found[0] + m.loop_gap(found[0]),)
+        answers: Mapping[str, Callable[[], Sequence[Any]]] = {
+            "gaps": lambda: (m.loop_errors(s.near).position,),
+            "jacobian": lambda: (m.jacobian(s.q),),
+            "motion_basis": lambda: (self._basis(s.q),),
+            "velocity": lambda: (s.v,),
+            "acceleration": lambda: (s.a,),
+            "inverse_dynamics": lambda: self._inverse_dynamics(s),
+            "forward_dynamics": lambda: (m.forward_dynamics(s.q, s.v, s.tau, wrenches=acting),),
+            "constraint_forces": lambda: (
+                m.constraint_forces(s.q, s.v, s.a, s.tau, wrenches=acting),
+            ),
+            "generalised_force": lambda: (m.generalised_force(s.q, s.v, s.a, wrenches=acting),),
+            "mass_matrix": lambda: (self._reduced(s.q, tree_mass(m.system, s.q) @ self._basis(s.q)),),
+            "bias": lambda: (self._bias(s),),
+            "gravity_forces": lambda: (
+                self._reduced(s.q, pin.computeGeneralizedGravity(m.model, m.system.data, s.q)),
+            ),
+            "energy": lambda: (np.array(m.energy(s.q, s.v)),),
+            "closed": lambda: (s.q,),
+            "step": lambda: self._steps(s, 1),
+            "steps": lambda: self._steps(s, BLOCK),
+            "inverse_dynamics_derivatives": lambda: m.inverse_dynamics_derivatives(
+                s.q, s.v, s.a, wrenches=acting
+            ),
+            "forward_dynamics_derivatives": lambda: m._derivatives.forward(
+                s.q, s.v, s.tau, self._independent, acting
+            ),
+        }
+        return answers[name]()
+
+    def _acting(self, wrenches: Array) -> dict[str, Array] | None:
+        parts = wrenches.reshape(-1, 6)
+        return dict(zip(self._frames, parts, strict=True)) or None
+
+    def _basis(self, q: Array) -> Array:
+        """Return T, shape (nv, m), of the independent velocities."""
+        m = self._m
+        motions = m.velocity_scale[:, None] * null_space(m.system.scaled(m.jacobian(q)))
+        return np.asarray(np.linalg.solve(motions[self._independent].T, motions.T).T)
+
+    def _acceleration(self, q: Array, v: Array, w: Array) -> Array:
+        """Return a with J a + J' v = 0 and independent entries w."""
+        system = self._m.system
+        bias = system.row_scale * system.equations.bias(q, v)
+        factors = Decomposition(system.scaled(self._m.jacobian(q)))
+        some = -system.column_scale * factors.least_norm(bias)
+        return np.asarray(some + self._basis(q) @ (w - some[self._independent]))
+
+    def _reduced(self, q: Array, force: Array) -> Array:
+        return np.asarray(self._basis(q).T @ force)
+
+    def _bias(self, s: Sample) -> Array:
+        drift = self._acceleration(s.q, s.v, np.zeros(self._independent.size))
+        return self._reduced(s.q, self._m.generalised_force(s.q, s.v, drift))
+
+    def _inverse_dynamics(self, s: Sample) -> Sequence[Any]:
+        found = self._m.inverse_dynamics(s.q, s.v, s.a, wrenches=self._acting(s.wrenches))
+        none = np.zeros(self._m.model.nv)
+        unproduced = none if found.unproduced is None else found.unproduced
+        return found.tau, found.constraint_forces, None, unproduced, None
+
+    def _frame_jacobian(self, q: Array, frame: str) -> Array:
+        m = self._m
+        index, axes = m.system.frame(frame), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian = pin.computeFrameJacobian(m.model, m.system.data, q, index, axes)
+        return np.asarray(jacobian.reshape(6, -1) @ self._basis(q))
+
+    def _steps(self, s: Sample, count: int) -> Sequence[Any]:
+        stepper = Stepper(self._m, s.q, s.v, wrenches=self._acting(s.wrenches))
+        states = []
+        for _ in range(count):
+            stepper.advance(s.tau, _STEP)
+            states.append((stepper.q, stepper.v))
+        qs, vs = zip(*states, strict=True)
+        return np.concatenate(qs), np.concatenate(vs)

@@ -62,10 +62,10 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
     body = f"""
     REAL dv[{model.nv}], moved[{model.nq}], gap[1], growth[1], before = CONST(1e300);
     int i, k;
-    for (i = 0; i < {model.nq}; ++i) closed[i] = q[i];
+    for (i = 0; i < {model.nq}; ++i) q_closed[i] = q[i];
     check[0] = check[1] = CONST(0);
     for (k = 0; k < {_NEWTON_STEPS}; ++k) {{
-        {_call(kernel, ["closed"], extra, "dv", "gap", "growth")}
+        {_call(kernel, ["q_closed"], extra, "dv", "gap", "growth")}
         check[1] = FMAX(check[1], growth[0]);
         if (k == 0) first[0] = gap[0];
         /* A gap that grows, before it is rounding error, is not this routine's matter. */
@@ -73,13 +73,13 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
                           CONST(2), check[0]);
         before = gap[0];
         if (!ANY(LT(CONST({_CLOSED}), gap[0]))) break;
-        {_call("integrate", ["closed", "dv"], extra, "moved")}
-        for (i = 0; i < {model.nq}; ++i) closed[i] = moved[i];
+        {_call("integrate", ["q_closed", "dv"], extra, "moved")}
+        for (i = 0; i < {model.nq}; ++i) q_closed[i] = moved[i];
         if (!ANY(LT(CONST({_LAST}), gap[0]))) break;
     }}
     check[0] = SELECT(LT(CONST({_LAST}), before), CONST(2), check[0]);
 """
-    outputs = (("closed", model.nq), ("first", 1), ("check", 2))
+    outputs = (("q_closed", model.nq), ("first", 1), ("check", 2))
     return Routine(name, (("q", model.nq), *extra), outputs, body, (kernel, "integrate"))
 
 
