@@ -152,9 +152,7 @@ class MechanismExpressions:
     @cached_property
     def opening(self) -> Expression:
         """Sum of the squared gaps, over that of `OPEN`."""
-        gaps = ca.densify(self.in_units(self.rows.gap))
-        limit = OPEN * self.system.equations.length
-        return _sum_of_squares(gaps.elements()) / limit**2
+        return self.rows.opening / (OPEN * self.system.equations.length) ** 2
 
     @property
     def check(self) -> Expression:

@@ -30,7 +30,7 @@ ACCEPTED = 1e-10
 #: Numbers below this count as rounding errors of zero, in SI units.
 _ZERO = 1e-6
 #: Of a proof's steps in time, s, and of Newton's guesses, rad or characteristic lengths.
-_STEP, _AWAY = 1e-4, 1e-3
+_STEP, _AWAY = 1e-5, 1e-3
 #: Condition number of J_d that the walk towards a singularity does not pass.
 _SINGULAR = 1e3
 #: Condition number of J_d above which generated code may flag a state.
@@ -92,7 +92,10 @@ class Proof:
         rng, m, model = self._rng, self._m, self._m.model
         q = self._closed(self._closed(q))
         basis = self._basis(q)
-        u, w = rng.normal(size=(2, self._independent.size))
+        # Near a singularity dependent velocities are many times larger than independent ones.
+        fastest = float(np.abs(basis / m.velocity_scale[:, None]).max(initial=0.0))
+        slow = 1 / max(fastest * m.velocity_scale[self._independent].max(initial=1.0), 1.0)
+        u, w = slow * rng.normal(size=(2, self._independent.size))
         v = basis @ u
         move = np.zeros(model.nv)
         move[self._dependent] = rng.normal(size=self._dependent.size)
