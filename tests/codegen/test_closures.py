@@ -17,9 +17,9 @@ from rps_pin import ClosedLoopModel, JointCoupling, LoopClosure
 from rps_pin.closed_loop.constraints.closures import KINDS, Closure
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
-from rps_pin.codegen.closures import closure_rows
-from rps_pin.codegen.parameters import Parameters
-from rps_pin.codegen.tree import Tree
+from rps_pin.codegen.expressions.closures import closure_rows
+from rps_pin.codegen.expressions.parameters import Parameters
+from rps_pin.codegen.expressions.tree import Tree
 from rps_pin.errors import MechanismError
 from tests.closed_loop.random_mechanisms import (
     ALL_KINDS,

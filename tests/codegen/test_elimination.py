@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rps_pin.codegen.elimination import LDL, Householder, blocks
+from rps_pin.codegen.expressions.elimination import LDL, Householder, blocks
 from rps_pin.errors import InputError
 from tests.worst import worst
 

@@ -14,11 +14,11 @@ from benchmarks.legged import biped, leg
 from rps_pin import ClosedLoopModel, LoopClosure
 from rps_pin.closed_loop.assembly.closing import closed_gap
 from rps_pin.closed_loop.editing.split import split
-from rps_pin.codegen.closures import closure_rows
-from rps_pin.codegen.elimination import Householder
-from rps_pin.codegen.independent import Partition, choose, regular_samples
-from rps_pin.codegen.parameters import Parameters
-from rps_pin.codegen.tree import Tree
+from rps_pin.codegen.expressions.closures import closure_rows
+from rps_pin.codegen.expressions.elimination import Householder
+from rps_pin.codegen.expressions.independent import Partition, choose, regular_samples
+from rps_pin.codegen.expressions.parameters import Parameters
+from rps_pin.codegen.expressions.tree import Tree
 from rps_pin.errors import InputError, MechanismError
 from tests.closed_loop.random_mechanisms import pooled
 from tests.worst import worst

@@ -11,7 +11,7 @@ import pytest
 import scipy.linalg
 
 from rps_pin import MechanismError
-from rps_pin.codegen.joints import Joint, _half_angle, clean
+from rps_pin.codegen.expressions.joints import Joint, _half_angle, clean
 from tests.closed_loop.editing.test_split import CHANGING, CONSTANT, PX, composite, unit, with_axis
 from tests.each import each
 from tests.worst import worst

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from rps_pin import ClosedLoopModel, InputError, JointCoupling, LoopClosure, MechanismError
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.editing.split import split
-from rps_pin.codegen.parameters import Parameters, moved_inertia
-from rps_pin.codegen.tree import Tree
+from rps_pin.codegen.expressions.parameters import Parameters, moved_inertia
+from rps_pin.codegen.expressions.tree import Tree
 from tests.closed_loop.editing.test_split import composite, somewhere, unit, universal
 from tests.closed_loop.random_mechanisms import random_inertia
 from tests.each import each

@@ -13,8 +13,8 @@ import pytest
 
 from rps_pin import ClosedLoopModel, MechanismError, RPSRobot
 from rps_pin.closed_loop.editing.split import split
-from rps_pin.codegen.parameters import Parameters
-from rps_pin.codegen.tree import Tree
+from rps_pin.codegen.expressions.parameters import Parameters
+from rps_pin.codegen.expressions.tree import Tree
 from tests.closed_loop.random_mechanisms import random_inertia, random_tree, rotation, unit
 from tests.each import each
 from tests.worst import worst

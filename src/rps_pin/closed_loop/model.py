@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
+from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
@@ -874,6 +875,23 @@ class ClosedLoopModel:
             ``step``, ``method``, ``controller``, ``tau``, ``wrenches``, ``closing`` and others.
         """
         return simulate(self, q, v, duration=duration, **options)
+
+    # Other engines --------------------------------------------------------------------------------
+
+    def compile(self, **options: Any) -> Any:
+        """Return the mechanism in generated code: the same calls, ten to a hundred times faster.
+
+        Needs ``pip install rps-pin[compile]``. See `rps_pin.codegen.compile_mechanism` for the
+        options, and `rps_pin.codegen.CompiledMechanism` for the result.
+        """
+        return import_module("rps_pin.codegen").compile_mechanism(self, **options)
+
+    def to_casadi(self, **options: Any) -> Any:
+        """Return the mechanism's quantities as CasADi functions; see `rps_pin.codegen.to_casadi`.
+
+        Needs ``pip install rps-pin[compile]``.
+        """
+        return import_module("rps_pin.codegen").to_casadi(self, **options)
 
     # Arguments and lazily made parts --------------------------------------------------------------
 

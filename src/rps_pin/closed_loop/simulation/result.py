@@ -171,7 +171,7 @@ class Recorder:
 
     def whole(self, columns: Mapping[str, Array]) -> Simulation:
         """Return a motion of whole arrays, by their names in `Simulation`."""
-        given = {"constraint_forces": None, **columns}
+        given: dict[str, Any] = {"constraint_forces": None, **columns}
         return Simulation(**given, **self._names, limits_passed=tuple(self._passed))
 
     def add(self, **row: Any) -> None:

@@ -8,27 +8,57 @@ step that the code flags is taken by the Pinocchio engine.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation import simulate as pinocchio_engine
 from rps_pin.closed_loop.simulation.integrators import times
 from rps_pin.closed_loop.simulation.motion import Controller, Drive, Motion, State, closed_start
 from rps_pin.closed_loop.simulation.result import Recorder, Simulation
-from rps_pin.codegen.routines import BLOCK
+from rps_pin.codegen.expressions.routines import BLOCK
 from rps_pin.errors import RPSPinError
 from rps_pin.validation import positive_number, whole_number
 
-if TYPE_CHECKING:
-    from rps_pin.codegen.engine import CompiledMechanism
+
+class Compiled(Protocol):
+    """What is used of a `CompiledMechanism`."""
+
+    def reference(self) -> ClosedLoopModel:
+        """Return the mechanism of the Pinocchio engine."""
+
+    def generated(self, name: str, wrenches: Wrenches | None, *given: ArrayLike) -> tuple[Any, ...]:
+        """Return a function's results and status."""
+
+    def forward_dynamics(
+        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Array:
+        """Return accelerations."""
+
+    def constraint_forces(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+    ) -> Array:
+        """Return the closures' multipliers."""
+
+    def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[Any, Any]:
+        """Return kinetic and potential energy."""
+
+    def loop_gap(self, q: ArrayLike) -> Any:
+        """Return the largest gaps."""
 
 
 def simulate(
-    compiled: CompiledMechanism,
+    compiled: Compiled,
     q: ArrayLike,
     v: ArrayLike | None = None,
     *,
@@ -66,7 +96,7 @@ class _Run:
     """One simulation: the states of all steps, then everything that is computed from them."""
 
     def __init__(
-        self, compiled: CompiledMechanism, q: ArrayLike, v: ArrayLike | None, given: dict[str, Any]
+        self, compiled: Compiled, q: ArrayLike, v: ArrayLike | None, given: dict[str, Any]
     ) -> None:
         self._compiled, self._reference, self._given = compiled, compiled.reference(), given
         self._wrenches: Wrenches | None = given["wrenches"]

@@ -19,9 +19,9 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import JointCoupling, LoopClosure
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
 from rps_pin.closed_loop.constraints.rows import across
-from rps_pin.codegen.chains import Chains, End, Motion, constant, cross, tidy
-from rps_pin.codegen.joints import Expression
-from rps_pin.codegen.tree import Tree
+from rps_pin.codegen.expressions.chains import Chains, End, Motion, constant, cross, tidy
+from rps_pin.codegen.expressions.joints import Expression
+from rps_pin.codegen.expressions.tree import Tree
 
 #: A sine that vanishes beside rounding errors, in place of 0 in the quotient of an angle and its
 #: sine. Its square is a normal number in single precision too.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import asdict
 from functools import cached_property
 from typing import Any
@@ -17,14 +18,15 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen.build import Library, Source, build
+from rps_pin.codegen.build.builder import CompilerName
 from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
-from rps_pin.codegen.expressions import MechanismExpressions
-from rps_pin.codegen.functions import MechanismFunctions
-from rps_pin.codegen.identity import digest
-from rps_pin.codegen.independent import Partition, choose, regular_samples
-from rps_pin.codegen.parameters import Parameters
-from rps_pin.codegen.proof import Proof
-from rps_pin.codegen.routines import routines
+from rps_pin.codegen.engine.identity import digest
+from rps_pin.codegen.engine.proof import Proof
+from rps_pin.codegen.expressions.functions import MechanismFunctions
+from rps_pin.codegen.expressions.independent import Partition, choose, regular_samples
+from rps_pin.codegen.expressions.mechanism import MechanismExpressions
+from rps_pin.codegen.expressions.parameters import Parameters
+from rps_pin.codegen.expressions.routines import routines
 from rps_pin.codegen.units import Kernel, Unit
 from rps_pin.errors import InputError, did_you_mean
 
@@ -73,13 +75,14 @@ class GeneratedCode:
         mechanism: ClosedLoopModel,
         parameters: Sequence[str] = (),
         wrench_frames: Sequence[str] = (),
-        compiler: str = "auto",
+        compiler: CompilerName = "auto",
     ) -> None:
         self.mechanism = mechanism
         self.parameters, self.wrench_frames = tuple(parameters), tuple(wrench_frames)
         self.compiler = compiler
         self._lock = threading.RLock()
         self._functions: dict[str, CompiledFunction] = {}
+        self._better: list[Future[Library]] = []
         #: Of each group that is built.
         self.libraries: dict[str, Library] = {}
 
@@ -147,12 +150,11 @@ class GeneratedCode:
                     self._build(group)
 
     def _build(self, group: str) -> None:
-        unit = self._unit
         names = self._names(group)
         source = Source(
             f"{self.mechanism.name or 'mechanism'}, {group}",
             tuple(f"{name}_{end}" for name in names for end in ("one", "many")),
-            lambda: tuple(part.library() for part in unit(group)),
+            lambda: tuple(part.library() for part in self._unit(group)),
             vectors=True,
             determined_by=f"{self.identity} {group}",
         )
@@ -169,13 +171,22 @@ class GeneratedCode:
                 },
             }
 
-        def replace(library: Library) -> None:
-            for name in names:
-                self._functions[name].replace(_entry(library, name))
+        def replace(better: Library) -> None:
+            with self._lock:
+                for name in names:
+                    self._functions[name].replace(_entry(better, name))
+                self.libraries[group] = better
 
         library = build(source, prove, self.compiler, replace)
         self._functions |= self._loaded(library, library.proof["signatures"])
         self.libraries[group] = library
+        if library.better is not None:
+            self._better.append(library.better)
+
+    def wait(self) -> None:
+        """Wait for the code of better compilers that is being built in the background."""
+        for better in list(self._better):
+            better.result()
 
     def _names(self, group: str) -> tuple[str, ...]:
         if group in GROUPS:
@@ -199,7 +210,9 @@ class GeneratedCode:
             return Unit(name, (kernel,), (), (name,), checked, limit=1.0)
         needed = [name]
         for one in needed:
-            needed += [call for call in getattr(with_loops.get(one), "calls", ()) if call not in needed]
+            needed += [
+                call for call in getattr(with_loops.get(one), "calls", ()) if call not in needed
+            ]
         kernels = tuple(Kernel(self.functions[one]) for one in needed if one not in with_loops)
         loops = tuple(one for one in with_loops.values() if one.name in needed)
         return Unit(f"{name}_unit", kernels, loops, (name,), checked, limit=1.0)
@@ -217,7 +230,9 @@ class GeneratedCode:
             found[name] = [inputs, results]
         return found
 
-    def _loaded(self, library: Library, signatures: Mapping[str, Any]) -> dict[str, CompiledFunction]:
+    def _loaded(
+        self, library: Library, signatures: Mapping[str, Any]
+    ) -> dict[str, CompiledFunction]:
         found = {}
         for name, (inputs, outputs) in signatures.items():
             given, results = (

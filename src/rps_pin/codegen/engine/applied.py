@@ -11,7 +11,7 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure, LoopClosure, joint_id
 from rps_pin.closed_loop.model import ClosedLoopModel
-from rps_pin.codegen.parameters import Parameters
+from rps_pin.codegen.expressions.parameters import Parameters
 
 
 def with_parameters(

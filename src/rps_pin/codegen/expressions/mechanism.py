@@ -26,11 +26,11 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.equations import OPEN
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
-from rps_pin.codegen.closures import ClosureRows, closure_rows
-from rps_pin.codegen.elimination import LDL, Householder
-from rps_pin.codegen.independent import Partition
-from rps_pin.codegen.parameters import Parameters
-from rps_pin.codegen.tree import Tree
+from rps_pin.codegen.expressions.closures import ClosureRows, closure_rows
+from rps_pin.codegen.expressions.elimination import LDL, Householder
+from rps_pin.codegen.expressions.independent import Partition
+from rps_pin.codegen.expressions.parameters import Parameters
+from rps_pin.codegen.expressions.tree import Tree
 
 #: A CasADi SX expression.
 Expression = Any
@@ -52,9 +52,9 @@ class Forces(NamedTuple):
     residual: Expression
     """Norm of the error of the equations on the passive rows."""
     unproduced: Expression
-    """Residual force of an underactuated mechanism, shape (nv,); structurally zero if there is none."""
+    """Residual force of an underactuated mechanism, shape (nv,); else structurally zero."""
     missing: Expression
-    """Its squared size, relative to the reduced force's; structurally zero if there is none."""
+    """Its squared size, relative to that of the reduced force."""
 
 
 class MechanismExpressions:
@@ -137,7 +137,7 @@ class MechanismExpressions:
 
     @cached_property
     def drift(self) -> Expression:
-        """a_0, shape (nv,)."""
+        """The acceleration a_0, shape (nv,)."""
         return ca.densify(-self.dependent(self.in_units(self.rows.bias)))
 
     @cached_property
@@ -249,9 +249,9 @@ class MechanismExpressions:
         return self._forces(force, tau, self.reduced(rest)[1], unproduced, share)
 
     def least_force(self, reduced: Expression) -> Expression:
-        """Return the least force f in one unit, (nv,), with a given T' f: D^-2 T (T' D^-2 T)^-1 T' f.
+        """Return the least force f (nv,) with a given T' f, D^-2 T (T' D^-2 T)^-1 T' f.
 
-        Closures carry nothing of it, and all of what is left.
+        Least in one unit. Closures carry nothing of it, and all of what is left.
         """
         if not self.independent.size:
             return ca.SX(self.tree.model.nv, 1)
@@ -289,7 +289,7 @@ class MechanismExpressions:
 
     @cached_property
     def acceleration(self) -> Expression:
-        """a under the forces tau, shape (nv,)."""
+        """The acceleration under the forces tau, shape (nv,)."""
         force = -self.required(self.drift)
         force[self.system.actuated.tolist()] += self.tau
         return ca.densify(self.basis @ self.inertia.solve(self.reduced(force)[0]) + self.drift)

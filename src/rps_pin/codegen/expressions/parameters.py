@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.editing.split import split
-from rps_pin.codegen.joints import Expression, Placement, clean, sparse
+from rps_pin.codegen.expressions.joints import Expression, Placement, clean, sparse
 from rps_pin.errors import InputError, MechanismError, did_you_mean, shown
 from rps_pin.validation import real_vector
 

@@ -1,4 +1,4 @@
-"""A mechanism in generated code, with the names, arguments, results and errors of `ClosedLoopModel`.
+"""A mechanism in generated code: the names, arguments, results and errors of `ClosedLoopModel`.
 
 Every array argument takes leading batch dimensions, which are broadcast. Generated code answers
 with a status for each sample; what it flags (numbers that are not finite, open loops, a nearly
@@ -29,12 +29,12 @@ from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.stepper import Stepper
-from rps_pin.codegen.applied import with_parameters
-from rps_pin.codegen.batches import Errors, by_samples, settled
-from rps_pin.codegen.forces import GeneratedForces
-from rps_pin.codegen.functions import UNDER_WRENCHES
-from rps_pin.codegen.generated import GeneratedCode
-from rps_pin.codegen.simulation import simulate
+from rps_pin.codegen.engine.applied import with_parameters
+from rps_pin.codegen.engine.batches import Errors, by_samples, settled
+from rps_pin.codegen.engine.forces import GeneratedForces
+from rps_pin.codegen.engine.generated import GeneratedCode
+from rps_pin.codegen.engine.simulation import simulate
+from rps_pin.codegen.expressions.functions import UNDER_WRENCHES
 from rps_pin.errors import InputError
 from rps_pin.validation import choice, numbers, whole_number
 
@@ -115,6 +115,21 @@ class CompiledMechanism:
         """The parameters' numbers of the mechanism as it is, shape (np,)."""
         return self.code.nominal.copy()
 
+    @property
+    def compilers(self) -> dict[str, str]:
+        """What compiled each group of functions that is in use now."""
+        return {group: library.compiler for group, library in self.code.libraries.items()}
+
+    def wait(self) -> None:
+        """Wait for a better compiler's code that is being built in the background.
+
+        Raises
+        ------
+        CompileError
+            If that build failed; the code in use stays in use.
+        """
+        self.code.wait()
+
     def rows(self, closure: str) -> slice:
         """Return the rows of a closure, by its name; see `ClosedLoopModel.rows`."""
         return self.mechanism.rows(closure)
@@ -161,8 +176,10 @@ class CompiledMechanism:
             return (m.close(q, fixed=fixed, within_limits=within_limits, restarts=restarts), 0.0)
 
         if fixed:
-            return self._by_samples(answer, (q_guess,), **options)
-        return self._closed("closed_near", self._normalised(q_guess), answer, within_limits, options)
+            return np.asarray(self._by_samples(answer, (q_guess,), **options)[0])
+        return self._closed(
+            "closed_near", self._normalised(q_guess), answer, within_limits, options
+        )
 
     def project(self, q_guess: ArrayLike, *, within_limits: bool = True, **options: Any) -> Array:
         """Return the closed configurations nearest to guesses; by the Pinocchio engine."""
@@ -170,7 +187,7 @@ class CompiledMechanism:
         def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
             return (m.project(q, within_limits=within_limits),)
 
-        return self._by_samples(answer, (q_guess,), **options)
+        return np.asarray(self._by_samples(answer, (q_guess,), **options)[0])
 
     def complete(
         self,
@@ -186,11 +203,15 @@ class CompiledMechanism:
         joints, shape (..., na), and these determine the motion.
         """
         if isinstance(values, Mapping):
-            if any(np.ndim(value) for value in values.values()) or set(values) != set(self.actuated):
+            if any(np.ndim(value) for value in values.values()) or set(values) != set(
+                self.actuated
+            ):
                 return self.reference().complete(values, q_guess, within_limits=within_limits)
-            values = [values[name] for name in self.actuated]
+            ordered: ArrayLike = [float(np.asarray(values[name])) for name in self.actuated]
+        else:
+            ordered = values
         system, count = self.mechanism.system, len(self.actuated)
-        given = numbers(values, "values", f"numbers of shape (..., {count})")
+        given = numbers(ordered, "values", f"numbers of shape (..., {count})")
         if given.shape[-1:] != (count,):
             raise InputError(f"values has shape {given.shape}; expected (..., {count})")
 
@@ -201,13 +222,13 @@ class CompiledMechanism:
             [self.model.joints[self.model.getJointId(name)].idx_q for name in self.actuated]
         )
         guess = self.reference()._start if q_guess is None else self._normalised(q_guess)
-        start = np.broadcast_to(guess, given.shape[:-1] + (self.model.nq,)).copy()
+        start = np.broadcast_to(guess, (*given.shape[:-1], self.model.nq)).copy()
         start[..., at] = given
         simple = system.actuated.size == count and np.all(
             [self.model.joints[self.model.getJointId(name)].nq == 1 for name in self.actuated]
         )
         if not (simple and self.code.partition.is_actuated):
-            return self._by_samples(answer, (start,), **options)
+            return np.asarray(self._by_samples(answer, (start,), **options)[0])
         return self._closed("closed", start, answer, within_limits, options)
 
     def _closed(
@@ -228,7 +249,7 @@ class CompiledMechanism:
         system = self.mechanism.system
         if all(joint.nq == joint.nv for joint in list(self.model.joints)[1:]):
             return numbers(q, "q_guess", f"numbers of shape (..., {self.model.nq})")
-        return by_samples(lambda one: (system.normalised(one, "q_guess"),), (q,))[0]
+        return np.asarray(by_samples(lambda one: (system.normalised(one, "q_guess"),), (q,))[0])
 
     # Velocity and acceleration --------------------------------------------------------------------
 
@@ -276,10 +297,10 @@ class CompiledMechanism:
         """Return homogeneous placements of a frame, (..., 4, 4); see `ClosedLoopModel`."""
 
         def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
-            return (m.frame_placement(q, frame), np.nan)
+            return (m.frame_placement(q, frame),)
 
         name = f"frame_{self.mechanism.system.frame(frame)}"
-        return self._run(name, (q,), answer, **options)[0]
+        return np.asarray(self._run(name, (q,), answer, **options)[0])
 
     def frame_jacobian(
         self,
@@ -300,7 +321,7 @@ class CompiledMechanism:
             return m.frame_placement(q, frame), m.frame_jacobian(q, frame, independent)
 
         if not self._has(independent):
-            return self._by_samples(answer, (q,), **options)
+            return np.asarray(self._by_samples(answer, (q,), **options)[0])
         name = f"frame_jacobian_{self.mechanism.system.frame(frame)}"
         placement, jacobian = self._run(name, (q,), world, **options)
         if axes == "world":
@@ -353,7 +374,7 @@ class CompiledMechanism:
             jacobian = self.jacobian(at, parameters=parameters)
             return np.asarray(rows * jacobian[..., passive.passive] * columns)
 
-        size = residual[..., 0] if residual.ndim > 1 else float(residual[0])
+        size: Any = residual[..., 0] if residual.ndim > 1 else float(residual[0])
         return GeneratedForces(tau, multipliers, size, unproduced, passive_jacobian)
 
     def generalised_force(
@@ -465,7 +486,7 @@ class CompiledMechanism:
         wrenches: Wrenches | None = None,
         **options: Any,
     ) -> InverseDynamicsDerivatives:
-        """Return derivatives of the actuator forces, (..., rows, columns); see `ClosedLoopModel`."""
+        """Return derivatives of actuator forces, (..., rows, columns); see `ClosedLoopModel`."""
 
         def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
             return m.inverse_dynamics_derivatives(q, v, a, wrenches=w)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from rps_pin.codegen.expressions import Expression, MechanismExpressions
+from rps_pin.codegen.expressions.mechanism import Expression, MechanismExpressions
 
 
 class InverseSlopes(NamedTuple):

@@ -47,9 +47,9 @@ from typing import Any
 import casadi as ca
 
 from rps_pin.closed_loop.constraints.equations import OPEN
-from rps_pin.codegen.derivatives import ForwardSlopes, InverseSlopes, Slopes
-from rps_pin.codegen.elimination import LDL
-from rps_pin.codegen.expressions import Expression, MechanismExpressions
+from rps_pin.codegen.expressions.derivatives import ForwardSlopes, InverseSlopes, Slopes
+from rps_pin.codegen.expressions.elimination import LDL
+from rps_pin.codegen.expressions.mechanism import Expression, MechanismExpressions
 
 #: Opening rate that `acceleration` accepts, relative to the speed, as `kinematics` does.
 _CONSISTENT = 1e-8
@@ -276,7 +276,7 @@ def _closing_step(x: MechanismExpressions) -> Made:
 
 @_function()
 def _least_norm_step(x: MechanismExpressions) -> Made:
-    """A particular step less its part in the allowed motions: y - T (T' D^-2 T)^-1 T' D^-2 y."""
+    """Return a step less its part in the allowed motions: y - T (T' D^-2 T)^-1 T' D^-2 y."""
     step = -x.dependent(x.in_units(x.rows.gap))
     if x.independent.size:
         per_unit = ca.DM(1 / x.system.column_scale)

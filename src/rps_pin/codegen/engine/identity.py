@@ -59,7 +59,7 @@ def _bytes(part: object) -> bytes:
 def _generator() -> str:
     """Return a digest of the modules that write the code, and of CasADi's version."""
     found = hashlib.sha256(metadata.version("casadi").encode())
-    for folder in (Path(__file__).parent, Path(__file__).parents[1] / "closed_loop"):
+    for folder in (Path(__file__).parents[1], Path(__file__).parents[2] / "closed_loop"):
         for path in sorted(folder.rglob("*")):
             if path.suffix in (".py", ".h", ".c"):
                 found.update(path.read_bytes())

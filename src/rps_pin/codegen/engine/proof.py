@@ -17,11 +17,11 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.dynamics.generalised_forces import tree_mass
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation.stepper import Stepper
-from rps_pin.codegen.applied import with_parameters
 from rps_pin.codegen.calls import CompiledFunction
-from rps_pin.codegen.independent import regular_samples
-from rps_pin.codegen.parameters import Parameters
-from rps_pin.codegen.routines import BLOCK
+from rps_pin.codegen.engine.applied import with_parameters
+from rps_pin.codegen.expressions.independent import regular_samples
+from rps_pin.codegen.expressions.parameters import Parameters
+from rps_pin.codegen.expressions.routines import BLOCK
 from rps_pin.errors import CompileError, RPSPinError
 from rps_pin.numerics.linear_algebra import Decomposition, condition_number, null_space
 
@@ -101,7 +101,9 @@ class Proof:
         move[self._dependent] = rng.normal(size=self._dependent.size)
         near = pin.integrate(model, q, _AWAY * move * m.system.column_scale)
         a = self._acceleration(q, v, w)
-        weight = float(np.abs(pin.computeGeneralizedGravity(model, m.system.data, q)).max(initial=0))
+        weight = float(
+            np.abs(pin.computeGeneralizedGravity(model, m.system.data, q)).max(initial=0)
+        )
         wrenches = max(weight, _ZERO) * rng.normal(size=6 * len(self._frames))
         tau = m.inverse_dynamics(q, v, a, wrenches=self._acting(wrenches)).tau
         jacobian = m.system.scaled(m.jacobian(q))[:, self._dependent]
@@ -216,7 +218,9 @@ class Proof:
                 m.constraint_forces(s.q, s.v, s.a, s.tau, wrenches=acting),
             ),
             "generalised_force": lambda: (m.generalised_force(s.q, s.v, s.a, wrenches=acting),),
-            "mass_matrix": lambda: (self._reduced(s.q, tree_mass(m.system, s.q) @ self._basis(s.q)),),
+            "mass_matrix": lambda: (
+                self._reduced(s.q, tree_mass(m.system, s.q) @ self._basis(s.q)),
+            ),
             "bias": lambda: (self._bias(s),),
             "gravity_forces": lambda: (
                 self._reduced(s.q, pin.computeGeneralizedGravity(m.model, m.system.data, s.q)),

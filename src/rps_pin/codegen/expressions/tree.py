@@ -21,8 +21,8 @@ import casadi as ca
 import numpy as np
 
 from rps_pin.arrays import Array
-from rps_pin.codegen.joints import Expression, Joint, Placement, sparse
-from rps_pin.codegen.parameters import Inertia, Parameters, moved_inertia, summed
+from rps_pin.codegen.expressions.joints import Expression, Joint, Placement, sparse
+from rps_pin.codegen.expressions.parameters import Inertia, Parameters, moved_inertia, summed
 from rps_pin.errors import MechanismError
 
 #: Force and moment about a point, each of shape (3, k).

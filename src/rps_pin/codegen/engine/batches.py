@@ -49,7 +49,8 @@ def settled(
     if not flagged.size:
         return found
     arrays = [_spread(array, status.shape) for array in given]
-    failed, first = np.zeros(status.shape, dtype=bool), None
+    failed = np.zeros(status.shape, dtype=bool)
+    first: tuple[tuple[int, ...], RPSPinError] | None = None
     for row in flagged:
         index = tuple(int(i) for i in row)
         try:
@@ -61,10 +62,10 @@ def settled(
         for whole, part in zip(found, answers, strict=True):
             whole[index] = part
     if first is not None and errors == "raise":
-        index, error = first
-        error.args = (f"sample {index}: {error}", *error.args[1:])
-        error.failed = failed
-        raise error
+        index, raised = first
+        raised.args = (f"sample {index}: {raised}", *raised.args[1:])
+        raised.failed = failed
+        raise raised
     return found
 
 

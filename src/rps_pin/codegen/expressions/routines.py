@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rps_pin.closed_loop.constraints.equations import OPEN
-from rps_pin.codegen.functions import MechanismFunctions
+from rps_pin.codegen.expressions.functions import MechanismFunctions
 from rps_pin.codegen.units import Routine
 
 #: Steps in one call of `steps`.
@@ -85,7 +85,12 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
 
 def _step(functions: MechanismFunctions) -> Routine:
     x = functions.expressions
-    nq, nv, extra, alone = x.tree.model.nq, x.tree.model.nv, _extra(functions, True), _extra(functions, False)
+    nq, nv, extra, alone = (
+        x.tree.model.nq,
+        x.tree.model.nv,
+        _extra(functions, True),
+        _extra(functions, False),
+    )
 
     def stage(q: str, v: str, k: int) -> str:
         call = _call("stage", [q, v, "tau"], extra, f"a{k}", f"p{k}", "c")

@@ -24,8 +24,8 @@ import casadi as ca
 import numpy as np
 
 from rps_pin.arrays import Array
-from rps_pin.codegen.joints import ROUNDING, Expression
-from rps_pin.codegen.tree import Tree
+from rps_pin.codegen.expressions.joints import ROUNDING, Expression
+from rps_pin.codegen.expressions.tree import Tree
 
 
 class End(NamedTuple):

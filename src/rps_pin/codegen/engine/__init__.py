@@ -1,0 +1,1 @@
+"""A mechanism in generated code: its functions, their proof, and the calls of a user."""

@@ -1,0 +1,61 @@
+"""From a mechanism to its generated code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.codegen.build.builder import CompilerName
+from rps_pin.codegen.engine.compiled import CompiledMechanism
+from rps_pin.codegen.engine.generated import GROUPS, GeneratedCode
+from rps_pin.errors import InputError
+
+
+def compile_mechanism(
+    mechanism: ClosedLoopModel,
+    *,
+    parameters: Sequence[str] = (),
+    wrench_frames: Sequence[str] = (),
+    functions: Sequence[str] = tuple(GROUPS),
+    compiler: CompilerName = "auto",
+    device: str = "cpu",
+) -> CompiledMechanism:
+    """Return a mechanism in generated code, proven against the Pinocchio engine.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism. Later changes of it do not change the code.
+    parameters
+        Groups of numbers that are given with each call: ``"gravity"``, ``"inertia:JOINT"``,
+        ``"mass:JOINT"``, ``"placement:JOINT"``, ``"closure:NAME"``, ``"payload:FRAME"`` (see
+        `rps_pin.codegen.expressions.parameters`).
+    wrench_frames
+        Frames at which external wrenches will act. Others are possible: code for them is built when
+        they are first named, which takes seconds.
+    functions
+        What is built now, of ``"dynamics"``, ``"kinematics"``, ``"closing"``, ``"forces"``,
+        ``"simulation"`` and ``"derivatives"``. The rest is built when it is first called.
+    compiler
+        ``"auto"``, ``"gcc"``, ``"clang"``, ``"cc"`` or ``"tcc"``; see
+        `rps_pin.codegen.build.build`. With ``"auto"`` TinyCC, if it is installed, answers within
+        a second or so, until the code of a better compiler replaces it; `CompiledMechanism.wait`
+        waits for that.
+    device
+        ``"cpu"`` or ``"cuda"``.
+
+    Raises
+    ------
+    InputError
+        If an argument is not one of those.
+    MechanismError
+        If a joint has no expressions.
+    CompileError
+        If there is no compiler, or it fails; or if the code does not agree with the Pinocchio
+        engine to 1e-10.
+    """
+    code = GeneratedCode(mechanism, parameters, wrench_frames, compiler)
+    if device != "cpu":
+        raise InputError(f"device = {device!r}: it must be 'cpu' or 'cuda'")
+    code.build(*functions)
+    return CompiledMechanism(code)

@@ -1,0 +1,1 @@
+"""Expressions of a mechanism: its tree, its closures, its dynamics, in CasADi symbols."""
