@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from rps_pin.codegen.rnea_derivatives import rnea_derivatives
+from rps_pin.codegen.expressions.rnea_derivatives import rnea_derivatives
 from tests.codegen.test_tree import SEEDS, case, relative
 from tests.each import each
 from tests.worst import worst

@@ -348,13 +348,13 @@ class CompiledMechanism:
             q, v, a, *self._extra("inverse_dynamics", wrenches, parameters), threads=threads
         )
         if status.__class__ is not int or status:
-            size = len(found)
+            count = len(found)
 
             def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
                 result = m.inverse_dynamics(q, v, a, wrenches=w)
                 lacking = result.unproduced is not None
                 answers = [result.tau, result.constraint_forces, np.array([result.residual])]
-                return [*answers, result.unproduced if lacking else 0.0, float(lacking)][:size]
+                return [*answers, result.unproduced if lacking else 0.0, float(lacking)][:count]
 
             given = (q, v, a)
             found = self._settled(

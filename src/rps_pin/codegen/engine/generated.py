@@ -154,7 +154,7 @@ class GeneratedCode:
         source = Source(
             f"{self.mechanism.name or 'mechanism'}, {group}",
             tuple(f"{name}_{end}" for name in names for end in ("one", "many")),
-            lambda: tuple(part.library() for part in self._unit(group)),
+            lambda: self._texts(group),
             vectors=True,
             determined_by=f"{self.identity} {group}",
         )
@@ -198,11 +198,14 @@ class GeneratedCode:
             f"{', '.join(GROUPS)}"
         )
 
-    def _unit(self, group: str) -> list[Unit]:
-        """Return a unit for each function: they compile at the same time."""
-        return [self._unit_of(name) for name in self._names(group)]
+    def _texts(self, group: str) -> tuple[str, ...]:
+        """Return the texts of the functions; they compile at the same time."""
+        texts: list[str] = []
+        for name in self._names(group):
+            texts += self._unit(name).library(lanes=name != "steps")  # one motion at a time
+        return tuple(texts)
 
-    def _unit_of(self, name: str) -> Unit:
+    def _unit(self, name: str) -> Unit:
         checked = frozenset({name} & _CHECKED)
         with_loops = {one.name: one for one in routines(self.functions)}
         if name not in with_loops:
@@ -221,7 +224,7 @@ class GeneratedCode:
         """Return names and shapes of the functions' inputs and outputs."""
         found = {}
         for name in self._names(group):
-            unit = self._unit_of(name)
+            unit = self._unit(name)
             one = unit.function(name)
             shapes = [list(shape) for shape in one.shapes]
             count, outputs = len(one.inputs), unit.handed_out(name)

@@ -11,7 +11,8 @@ and in independent coordinates y, which the rest follows,
     dq = T dy,    dv = T dy' + V_y dy,    da = T dy'' + A_y dy + A_y' dy',
     J V_y = -(J v)_q T,    J A_y = -(c_q T + c_v V_y),    J A_y' = -c_v T.
 
-Only F, J v and c are differentiated, by CasADi: the factors of A_d are used again, not
+The derivatives of rnea are in closed form (see `rnea_derivatives`); of the rest of F, of J v and of
+c, CasADi's: the factors of A_d are used again, not
 differentiated. Derivatives by q are along the tangent of the configuration.
 """
 
@@ -23,6 +24,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from rps_pin.codegen.expressions.mechanism import Expression, MechanismExpressions
+from rps_pin.codegen.expressions.rnea_derivatives import rnea_derivatives
 
 
 class InverseSlopes(NamedTuple):
@@ -60,7 +62,9 @@ class Slopes:
         self.x = x
         self.multipliers = ca.SX.sym("multipliers", x.rows.gap.shape[0])
         self._tangent = x.tree.tangent(x.q)
-        self._force = x.required(x.a) - x.rows.jacobian.T @ self.multipliers
+        #: F without rnea, whose derivatives are known in closed form.
+        self._rest = x.passive_forces - x.external_forces - x.rows.jacobian.T @ self.multipliers
+        self._rnea_slopes = rnea_derivatives(x.tree, x.v, x.a)
         self._opening = x.rows.jacobian @ x.a + x.rows.bias
 
     def _by_q(self, expression: Expression) -> Expression:
@@ -69,12 +73,12 @@ class Slopes:
     @cached_property
     def force_q(self) -> Expression:
         """F_q, shape (nv, nv)."""
-        return self._by_q(self._force)
+        return ca.sparsify(self._rnea_slopes[0] + self._by_q(self._rest))
 
     @cached_property
     def force_v(self) -> Expression:
         """F_v, shape (nv, nv)."""
-        return ca.jacobian(self._force, self.x.v)
+        return ca.sparsify(self._rnea_slopes[1] + ca.jacobian(self._rest, self.x.v))
 
     @cached_property
     def _follow(self) -> tuple[Expression, Expression, Expression]:

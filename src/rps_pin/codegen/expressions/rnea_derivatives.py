@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from rps_pin.codegen.joints import Expression
-from rps_pin.codegen.parameters import Inertia, moved_inertia, summed
-from rps_pin.codegen.tree import BodyMotion, Tree, Wrench, cross, inertial_force, skew
+from rps_pin.codegen.expressions.joints import Expression
+from rps_pin.codegen.expressions.parameters import Inertia, moved_inertia, summed
+from rps_pin.codegen.expressions.tree import BodyMotion, Tree, Wrench, cross, inertial_force, skew
 
 #: Linear and angular velocities or accelerations of several motions, each of shape (3, k).
 _Twist = tuple[Expression, Expression]
