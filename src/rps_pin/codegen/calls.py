@@ -53,6 +53,11 @@ class Argument(NamedTuple):
     name: str
     shape: tuple[int, ...]
 
+    @property
+    def wanted(self) -> str:
+        """Return the shape of a batch, for errors."""
+        return f"(..., {', '.join(map(str, self.shape))})" if self.shape else "(...)"
+
 
 class CompiledFunction:
     """Generated machine code as a function of NumPy arrays.
@@ -152,53 +157,59 @@ class CompiledFunction:
         threads = whole_number(threads, "threads")
         batch, arrays = self._broadcast(inputs)
         n = math.prod(batch)
-        outputs = [np.empty((n, size)) for size in self._sizes[len(self.inputs) :]]
-        status = np.empty(n, dtype=np.int32)
+        sizes = self._sizes
+        samples = [
+            _samples(array, batch, one.shape, size)
+            for array, one, size in zip(arrays, self.inputs, sizes, strict=False)
+        ]
+        outputs = [np.empty((*batch, *one.shape)) for one in self.outputs]
+        status = np.empty(batch, dtype=np.int32)
+        places = [(_address(array), 8 * stride) for array, stride in samples]
+        steps = [8 * size for size in sizes[len(arrays) :]]
+        results = [(_address(array), step) for array, step in zip(outputs, steps, strict=True)]
+        marks = _address(status)
+        strides = (ctypes.c_long * max(1, len(samples)))(*(stride for _, stride in samples))
         many = self._many
-        strides = [a.strides[0] // 8 if n > 1 else 0 for a in arrays]
-        stride = (ctypes.c_long * max(1, len(strides)))(*strides)
 
         def part(start: int, stop: int) -> None:
-            ins = [a.ctypes.data + 8 * start * s for a, s in zip(arrays, strides, strict=True)]
-            outs = [a.ctypes.data + start * a.strides[0] for a in outputs]
+            ins = [place + start * step for place, step in places]
+            outs = [place + start * step for place, step in results]
             many(
                 stop - start,
                 (ctypes.c_void_p * max(1, len(ins)))(*ins),
-                stride,
+                strides,
                 (ctypes.c_void_p * max(1, len(outs)))(*outs),
-                status.ctypes.data + 4 * start,
+                marks + 4 * start,
             )
 
         if n:
             _in_slices(part, n, threads)
-        shaped = [
-            array.reshape(batch + one.shape)
-            for array, one in zip(outputs, self.outputs, strict=True)
-        ]
-        return (*shaped, status.reshape(batch) if batch else int(status[0]))
+        return (*outputs, status if batch else int(status))
 
     def _broadcast(self, inputs: Sequence[ArrayLike]) -> tuple[tuple[int, ...], list[Array]]:
-        """Return the batch's shape, and inputs as (n, size): stride 0 where all are the same."""
+        """Return the batch's shape, and the inputs as arrays of right shapes."""
         if len(inputs) != len(self.inputs):
             names = ", ".join(one.name for one in self.inputs)
             raise InputError(
                 f"{self.name} takes {len(self.inputs)} inputs ({names}); {len(inputs)} were given"
             )
         arrays = []
-        for value, (name, shape) in zip(inputs, self.inputs, strict=True):
-            wanted = f"(..., {', '.join(map(str, shape))})" if shape else "(...)"
-            array = numbers(value, name, f"numbers of shape {wanted}")
-            if array.ndim < len(shape) or array.shape[array.ndim - len(shape) :] != shape:
+        batches = []
+        for value, one in zip(inputs, self.inputs, strict=True):
+            array = value
+            if not isinstance(array, np.ndarray) or array.dtype != np.float64:
+                array = numbers(value, one.name, f"numbers of shape {one.wanted}")
+            leading = array.ndim - len(one.shape)
+            if leading < 0 or array.shape[leading:] != one.shape:
                 raise InputError(
-                    f"{name} of {self.name} has shape {array.shape}; it must be {wanted}"
+                    f"{one.name} of {self.name} has shape {array.shape}; it must be {one.wanted}"
                 )
             arrays.append(array)
-        batches = [
-            array.shape[: array.ndim - len(one.shape)]
-            for array, one in zip(arrays, self.inputs, strict=True)
-        ]
+            batches.append(array.shape[:leading])
+        if len(set(batches)) == 1:
+            return batches[0], arrays
         try:
-            batch = np.broadcast_shapes(*batches)
+            return np.broadcast_shapes(*batches), arrays
         except ValueError:
             given = ", ".join(
                 f"{one.name} {array.shape}" for one, array in zip(self.inputs, arrays, strict=True)
@@ -206,11 +217,36 @@ class CompiledFunction:
             raise InputError(
                 f"the leading dimensions of the inputs of {self.name} do not go together: {given}"
             ) from None
-        n = math.prod(batch)
-        return batch, [
-            _samples(np.broadcast_to(array, batch + one.shape), n, size)
-            for array, one, size in zip(arrays, self.inputs, self._sizes, strict=False)
-        ]
+
+
+def _held(function: Any, entry: Entry) -> Any:
+    """Return a ctypes function that keeps its machine code in memory."""
+    function.entry = entry
+    return function
+
+
+def _address(array: NDArray[Any]) -> int:
+    """Return where an array's memory begins; faster than ``array.ctypes.data``."""
+    address: int = array.__array_interface__["data"][0]
+    return address
+
+
+def _samples(
+    array: Array, batch: tuple[int, ...], shape: tuple[int, ...], size: int
+) -> tuple[Array, int]:
+    """Return an array whose samples are contiguous, and the step between them in numbers.
+
+    The step is 0 if all samples are the same. The array is copied only if it must be.
+    """
+    if array.size == size:  # one sample
+        flat = array.reshape(1, size)
+        return (flat if flat.flags.aligned and flat.flags.c_contiguous else flat.copy()), 0
+    if array.size != math.prod(batch) * size:
+        array = np.broadcast_to(array, batch + shape)
+    flat = array.reshape(-1, size)
+    if (size > 1 and flat.strides[1] != 8) or flat.strides[0] % 8 or not flat.flags.aligned:
+        flat = flat.copy()
+    return flat, flat.strides[0] // 8
 
 
 def _call_of(shapes: Sequence[tuple[int, ...]], outputs: int) -> str:
@@ -239,24 +275,6 @@ def _call_of(shapes: Sequence[tuple[int, ...]], outputs: int) -> str:
     lines += ["    status = one(address)"]
     lines += [f"    return {', '.join([*(f'{copy}()' for copy in copies), 'status'])},"]
     return "\n".join(lines)
-
-
-def _held(function: Any, entry: Entry) -> Any:
-    """Return a ctypes function that keeps its machine code in memory."""
-    function.entry = entry
-    return function
-
-
-def _samples(array: Array, n: int, size: int) -> Array:
-    """Return an array as (n, size) in which each sample is contiguous; a copy only if needed."""
-    flat = array.reshape(n, size)
-    if (
-        (size > 1 and n and flat.strides[1] != flat.itemsize)
-        or flat.strides[0] % flat.itemsize
-        or not flat.flags.aligned
-    ):
-        return np.ascontiguousarray(flat)
-    return flat
 
 
 def _in_slices(part: Callable[[int, int], None], n: int, threads: int) -> None:
