@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from rps_pin.cli.doctor import _BROWSERS, PARTS, _browser
+from rps_pin.cli.doctor import _BROWSERS, PARTS, _browser, _cache, _compilers
 from rps_pin.viewer.files.browser import BROWSERS
 from tests import processes
 from tests.cli.commands import rps_pin
@@ -85,6 +85,28 @@ def test_a_browser_that_is_a_stub_is_no_browser(
     assert "apt-get install chromium" in _browser().trouble
     stub.write_text("#!/bin/sh\nexit 0\n")
     assert _browser().found == str(stub)
+
+
+def test_compilers_and_what_they_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    for name in ("CC", "RPS_PIN_CC"):
+        monkeypatch.delenv(name, raising=False)
+    assert _compilers().trouble == "none found: apt-get install gcc"
+    for name, says in (("gcc", "gcc version 9.1 (Debian)"), ("clang", "Debian clang version 8.2")):
+        (tmp_path / name).write_text(f"#!/bin/sh\necho '{says}'\n")
+        (tmp_path / name).chmod(0o755)
+    found = _compilers()
+    assert found == ("C compiler", "gcc 9.1", "fast code (also clang 8.2)", False, "")
+    monkeypatch.setenv("RPS_PIN_CACHE", str(tmp_path / "new" / "cache"))
+    assert _cache() == ("compiled code", "0 kept, 0 MB", str(tmp_path / "new/cache"), False, "")
+    monkeypatch.setenv("RPS_PIN_CACHE", str(tmp_path / "gcc" / "cache"))
+    assert _cache().trouble.endswith("gcc/cache cannot be written to: set RPS_PIN_CACHE")
+    monkeypatch.setitem(sys.modules, "filelock", None)
+    for module in ("cache", "compilers"):
+        monkeypatch.delitem(sys.modules, f"rps_pin.codegen.build.{module}", raising=False)
+    monkeypatch.delitem(sys.modules, "rps_pin.codegen.build", raising=False)
+    for finding in (_compilers(), _cache()):
+        assert finding.trouble == "not looked for: pip install 'rps-pin[compile]'"
 
 
 def test_it_looks_for_the_browsers_that_are_used() -> None:

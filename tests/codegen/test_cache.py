@@ -233,6 +233,26 @@ def test_a_folder_that_cannot_be_written_to(
 
 
 @pytest.mark.usefixtures("own")
+def test_a_full_disk_that_breaks_the_linker(
+    fake: FakeCompiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It dies of a bus error."""
+
+    class Usage:
+        free = 0
+
+    fake.path.write_text(fake.path.read_text().replace("PATH=", "exit 1; PATH="))
+    real = compilers.shutil.disk_usage
+    monkeypatch.setattr(
+        compilers.shutil,
+        "disk_usage",
+        lambda folder: Usage if str(folder).startswith(str(cache_folder())) else real(folder),
+    )
+    with useless("No space left"), pytest.raises(CompileError, match="status 1"):
+        build(sine(), Proof(), "gcc")
+
+
+@pytest.mark.usefixtures("own")
 def test_a_disk_that_is_full_for_the_compiler(fake: FakeCompiler) -> None:
     """It says so in its words; both folders are on that disk."""
     fake.path.write_text(
@@ -273,7 +293,7 @@ def test_a_folder_without_execution(fake: FakeCompiler, monkeypatch: pytest.Monk
         return real(path, *rest)
 
     monkeypatch.setattr(builder, "load", load)
-    with useless(".*failed to map segment"):
+    with useless("failed to map segment"):
         library = build(sine(), Proof(), "gcc")
     np.testing.assert_array_equal(called(library, X), 2.0 * np.sin(X))
     assert fake.compiled == 2
@@ -334,6 +354,17 @@ def entry_files() -> list[Path]:
 
 def _age(record: Path) -> int:
     return record.stat().st_mtime_ns
+
+
+def test_old_remains_of_others_go(fake: FakeCompiler) -> None:
+    cache_folder().mkdir()
+    old, new = (cache_folder() / f"abc.part-{name}" for name in ("old", "new"))
+    for part in (old, new):
+        part.mkdir()
+        (part / "0.c").write_text("")
+    os.utime(old, (10**9, 10**9))
+    build(sine(), Proof(), "gcc")
+    assert (old.exists(), new.exists(), fake.compiled) == (False, True, 1)
 
 
 def test_clearing(fake: FakeCompiler) -> None:

