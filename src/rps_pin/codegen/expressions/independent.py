@@ -29,6 +29,8 @@ from rps_pin.numerics.linear_algebra import (
 
 #: Lengths of the random steps from home, in radians or characteristic lengths of all motions.
 _STEPS = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4)
+#: A matrix larger than this counts as large: fewer steps, and pivots for singular values.
+_LARGE = 100
 #: A step that does not close is halved so often.
 _HALVINGS = 4
 #: mu in [1 J'; J -mu], which gives steps of least norm also where rows are redundant.
@@ -71,7 +73,9 @@ class Partition:
     is_actuated : bool
         Whether the independent velocities are the actuated ones.
     condition : float
-        The largest condition number of J_d (all entries in one unit) at the samples.
+        The largest condition number of J_d (all entries in one unit) at the samples; of more than
+        100 velocities an estimate by the pivots of QR, which is too small (20 times for a chain of
+        256 loops).
     """
 
     independent: Indices
@@ -111,13 +115,14 @@ def regular_samples(system: ConstraintSystem, home: Array, seed: int = 0) -> Sam
 
 def _around(system: ConstraintSystem, q: Array, rng: np.random.Generator) -> list[Array]:
     """Return closed configurations after steps of all lengths, as far as they close."""
-    found = [_moved(system, q, size, rng.normal(size=system.model.nv)) for size in _STEPS]
+    steps = _STEPS[::2] if system.model.nv > _LARGE else _STEPS
+    found = [_moved(system, q, size, rng.normal(size=system.model.nv)) for size in steps]
     return [place for place in found if place is not None]
 
 
 def _regular(system: ConstraintSystem, places: list[Array]) -> Array:
     """Return the least singular value over the largest of J, or 0 where it is not regular."""
-    values = [singular_values(system.scaled(system.equations.jacobian(q))) for q in places]
+    values = [_values(system.scaled(system.equations.jacobian(q))) for q in places]
     ranks = np.array([rank(one) for one in values])
     best = int(ranks.max(initial=0))
     least = np.array([one[best - 1] / one[0] if best else 1.0 for one in values])
@@ -190,6 +195,23 @@ def _solution(jacobian: Array, near: Array | None, right: Array | None) -> Array
     return np.asarray(splu(matrix).solve(both)[:columns], np.float64)
 
 
+def _values(matrix: Array) -> Array:
+    """Return the singular values; of large matrices the pivots of QR, which tell the rank."""
+    if min(matrix.shape) <= _LARGE:
+        return singular_values(matrix)
+    (upper,) = qr(matrix, mode="r", pivoting=True)[:1]
+    return np.abs(np.diagonal(upper))
+
+
+def _condition(matrix: Array) -> float:
+    """Return the condition number of a matrix that must not lose a column, by `_values`."""
+    if min(matrix.shape) <= _LARGE:
+        return condition_number(matrix)
+    values = _values(matrix)
+    lost = rank(values) < matrix.shape[1]
+    return np.inf if lost else float(values[0] / values[-1])
+
+
 # Choice -------------------------------------------------------------------------------------------
 
 
@@ -223,7 +245,7 @@ def choose(system: ConstraintSystem, jacobians: Array, pattern: Bools | None = N
     if pattern is not None and pattern.shape != (rows, columns):
         raise InputError(f"the pattern has the shape ({rows}, {columns}), not {pattern.shape}")
     jacobians, idle = _without_noise(jacobians, pattern)
-    ranks = {rank(singular_values(jacobian)) for jacobian in jacobians}
+    ranks = {rank(_values(jacobian)) for jacobian in jacobians}
     if len(ranks) > 1:
         raise MechanismError(
             f"the closures' Jacobian has rank {min(ranks)} at some samples and {max(ranks)} at "
@@ -233,7 +255,7 @@ def choose(system: ConstraintSystem, jacobians: Array, pattern: Bools | None = N
 
     def partition(independent: Indices) -> Partition:
         dependent = np.setdiff1d(np.arange(columns), independent)
-        worst = max(condition_number(jacobian[:, dependent]) for jacobian in jacobians)
+        worst = max(_condition(jacobian[:, dependent]) for jacobian in jacobians)
         is_actuated = np.array_equal(independent, system.actuated)
         return Partition(
             independent, dependent, idle, found, rows - found, is_actuated, float(worst)
