@@ -54,7 +54,8 @@ def test_one_sample(product: CompiledFunction) -> None:
     assert worst(total[0] - A.sum()) < 1e-15
     assert isinstance(status, int)
     assert (z.shape, total.shape, status) == ((2,), (1,), 0)
-    again, _, _ = product(A, x + 1, y)
+    again, _, _ = product.call(A, x + 1, y)
+    assert worst(again - right(A, x + 1, y)) < 1e-15
     assert again is not z
     assert worst(z - right(A, x, y)) < 1e-15, "results are the caller's"
 

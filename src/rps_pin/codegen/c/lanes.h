@@ -11,43 +11,44 @@ typedef long long lanes_bits __attribute__((vector_size(8 * LANES)));
 #undef REAL
 #define REAL lanes_real
 
-/* A function of C for each lane. */
-#define EACH_LANE(name) \
-    static inline REAL name##_each(REAL x) \
+/* A function of C for each lane; not inline where it is a call for each. */
+#define EACH_LANE(kind, name) \
+    static kind REAL name##_each(REAL x) \
     { \
         REAL r; \
         for (int l = 0; l < LANES; ++l) r[l] = name(x[l]); \
         return r; \
     }
-#define EACH_LANE_2(name) \
-    static inline REAL name##_each(REAL x, REAL y) \
+#define EACH_LANE_2(kind, name) \
+    static kind REAL name##_each(REAL x, REAL y) \
     { \
         REAL r; \
         for (int l = 0; l < LANES; ++l) r[l] = name(x[l], y[l]); \
         return r; \
     }
-EACH_LANE(sqrt)
-EACH_LANE(tan)
-EACH_LANE(asin)
-EACH_LANE(acos)
-EACH_LANE(atan)
-EACH_LANE(sinh)
-EACH_LANE(cosh)
-EACH_LANE(tanh)
-EACH_LANE(asinh)
-EACH_LANE(acosh)
-EACH_LANE(atanh)
-EACH_LANE(exp)
-EACH_LANE(log)
-EACH_LANE(expm1)
-EACH_LANE(log1p)
-EACH_LANE(erf)
-EACH_LANE(floor)
-EACH_LANE(ceil)
-EACH_LANE_2(pow)
-EACH_LANE_2(atan2)
-EACH_LANE_2(hypot)
-EACH_LANE_2(fmod)
+#define CALLED __attribute__((noinline, unused))
+EACH_LANE(inline, sqrt)
+EACH_LANE(inline, floor)
+EACH_LANE(inline, ceil)
+EACH_LANE(CALLED, tan)
+EACH_LANE(CALLED, asin)
+EACH_LANE(CALLED, acos)
+EACH_LANE(CALLED, atan)
+EACH_LANE(CALLED, sinh)
+EACH_LANE(CALLED, cosh)
+EACH_LANE(CALLED, tanh)
+EACH_LANE(CALLED, asinh)
+EACH_LANE(CALLED, acosh)
+EACH_LANE(CALLED, atanh)
+EACH_LANE(CALLED, exp)
+EACH_LANE(CALLED, log)
+EACH_LANE(CALLED, expm1)
+EACH_LANE(CALLED, log1p)
+EACH_LANE(CALLED, erf)
+EACH_LANE_2(CALLED, pow)
+EACH_LANE_2(CALLED, atan2)
+EACH_LANE_2(CALLED, hypot)
+EACH_LANE_2(CALLED, fmod)
 #undef MATH
 #define MATH(name) name##_each
 
@@ -67,8 +68,8 @@ REAL _ZGVbN2v_sin(REAL), _ZGVbN2v_cos(REAL);
 #define cos_each _ZGVbN2v_cos
 #endif
 #else
-EACH_LANE(sin)
-EACH_LANE(cos)
+EACH_LANE(CALLED, sin)
+EACH_LANE(CALLED, cos)
 #endif
 
 #define ALL_LANES(x) ((x) - (REAL){0}) /* keeps the sign of -0.0 */
