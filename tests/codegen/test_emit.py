@@ -66,7 +66,7 @@ def test_two_and_four_lanes(march: str, flags: tuple[str, ...], tmp_path: Path) 
 def test_random_functions_in_chunks(chunk: int, tmp_path: Path) -> None:
     """Large and small chunks, sparse outputs, matrices."""
     rng = np.random.default_rng(1)
-    function = random_function(rng, 700)
+    function = random_function(rng, 400)
     f = loaded(unit_of(function, chunk=chunk), tmp_path)["drawn"]
     x, y = rng.standard_normal((13, 5)), rng.standard_normal((13, 3, 2))
     expected = reference(function, x, y)

@@ -147,7 +147,7 @@ static const host_index blockIdx = {0}, blockDim = {1}, threadIdx = {0}, gridDim
 
 def cuda_unit() -> Unit:
     root = root_unit()
-    drawn = random_function(np.random.default_rng(6), 200)
+    drawn = random_function(np.random.default_rng(6), 100)
     return Unit(
         "robot",
         (*root.kernels, Kernel(every_operation()), Kernel(drawn, 50)),
