@@ -24,10 +24,15 @@ class MujocoTwin:
     """A mechanism in MuJoCo, with default or with the stiffest constraints that its step allows."""
 
     def __init__(
-        self, mechanism: ClosedLoopModel, *, stiff: bool, integrator: str = "Euler"
+        self,
+        mechanism: ClosedLoopModel,
+        *,
+        stiff: bool,
+        integrator: str = "Euler",
+        step: float = 1e-3,
     ) -> None:
         self.mechanism = mechanism
-        self.model = model = mujoco_model(mechanism, stiff, integrator)
+        self.model = model = mujoco_model(mechanism, stiff, integrator, step)
         self.data = mujoco.MjData(model)
         pairs = zip(model.eq_obj1id, model.eq_obj2id, strict=True)
         self.sites = np.array([list(pair) for pair in pairs])
@@ -86,11 +91,14 @@ class MujocoTwin:
         return found
 
 
-def mujoco_model(mechanism: ClosedLoopModel, stiff: bool, integrator: str) -> mujoco.MjModel:
+def mujoco_model(
+    mechanism: ClosedLoopModel, stiff: bool, integrator: str, step: float
+) -> mujoco.MjModel:
     """Return the compiled model; raise if MuJoCo has no such joint or closure."""
     tree, spec = mechanism.model, mujoco.MjSpec()
     spec.compiler.balanceinertia = False
     spec.compiler.autolimits = False
+    spec.option.timestep = step
     spec.option.gravity = tree.gravity.linear
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT

@@ -1,4 +1,7 @@
-"""Times of calls measured in turns, so that a change of the machine's speed meets all of them."""
+"""Times of calls measured in turns, so that a change of the machine's speed meets all of them.
+
+Times are the processor's for this process: what other processes run meanwhile is not counted.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +27,9 @@ def medians(calls: Mapping[str, Callable[[], object]], rounds: int = ROUNDS) -> 
 
 def _count(call: Callable[[], object]) -> int:
     """Return how many calls take about one block, after some calls to warm up."""
-    began = time.perf_counter()
+    began = time.process_time()
     call()
-    first = time.perf_counter() - began
+    first = time.process_time() - began
     if first > BLOCK:
         return 1
     for _ in range(20):
@@ -37,7 +40,7 @@ def _count(call: Callable[[], object]) -> int:
 def _block(call: Callable[[], object], count: int) -> float:
     """Return the time of one of `count` calls, s."""
     each = range(count)
-    began = time.perf_counter()
+    began = time.process_time()
     for _ in each:
         call()
-    return (time.perf_counter() - began) / count
+    return (time.process_time() - began) / count

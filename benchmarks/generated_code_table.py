@@ -1,0 +1,242 @@
+"""Generated code against its peers: one run, with what was asked and what was found.
+
+    python -m benchmarks.generated_code_table [--markdown] [--only NAME ...]
+
+Every time is a median of processor times, the engines measured in turns on one core; the call from
+Python is included. Mechanisms: `generated_cases` and `legged`; peers: `generated_peers`, `mujoco_twin`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from benchmarks.generated_cases import LOOPS, MECHANISMS, Case, case, chain_case
+from benchmarks.generated_goals import Figures, goals_table, table
+from benchmarks.generated_peers import forward_peers, inverse_peers, relative
+from benchmarks.mujoco_twin import MujocoTwin
+from benchmarks.timing import medians
+from rps_pin.closed_loop.simulation.stepper import Stepper
+from rps_pin.errors import RPSPinError
+
+Array = NDArray[np.float64]
+
+OURS, TODAY = "generated", "Pinocchio engine"
+"""Columns: `ClosedLoopModel.compile()`, and the same call of `ClosedLoopModel`."""
+STEPS, STEP = 1000, 1e-3
+SAMPLES = 100_000
+PLANAR = (0, 2)
+"""Rows of world axes that plain Pinocchio keeps of a closure in the plane x, z."""
+
+
+def main() -> None:
+    """Measure, and print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--markdown", action="store_true", help="print the tables alone")
+    parser.add_argument("--only", nargs="*", help="names of mechanisms, or 'chains'")
+    options = parser.parse_args()
+    if not options.markdown:
+        print(machine(), file=sys.stderr)
+    figures = measured(options.only)
+    for section, text in tables(figures).items():
+        print(f"\n### {section}\n\n{text}")
+    if not options.markdown:
+        print(machine(), file=sys.stderr)
+
+
+def machine() -> str:
+    """Return the machine's load and the versions."""
+    return (
+        f"load {os.getloadavg()[0]:.2f} on {os.cpu_count()} cores; pin {pin.__version__}, "
+        f"MuJoCo {mujoco.__version__}, NumPy {np.__version__}"
+    )
+
+
+def tables(figures: Figures) -> dict[str, str]:
+    """Return the table of goals, and one of each kind of figure."""
+    return {"goals": goals_table(figures), **{name: table(figures, name) for name in figures}}
+
+
+def measured(only: list[str] | None = None) -> Figures:
+    """Measure everything: figures by kind, mechanism and engine."""
+    figures = Figures()
+    for one, axes in cases(only):
+        print(one.name, file=sys.stderr, flush=True)
+        seconds, fast = built(one)
+        figures.add("build (s)", one.name, {OURS: seconds})
+        add_single_calls(figures, one, fast, axes)
+        if "four-bar" not in one.name:
+            add_derivatives(figures, one, fast)
+            add_steps(figures, one, fast)
+            add_batch(figures, one, fast)
+    return figures
+
+
+def cases(only: list[str] | None) -> Iterator[tuple[Case, tuple[int, ...]]]:
+    """Make each mechanism; with the rows that plain Pinocchio needs of its closures."""
+    for name in MECHANISMS:
+        if not only or name in only:
+            yield case(name), PLANAR if name == "five-bar" else (0, 1, 2)
+    for loops in LOOPS:
+        if not only or "chains" in only:
+            yield chain_case(loops), PLANAR
+
+
+def built(one: Case) -> tuple[float, Any]:
+    """Build a mechanism's code with gcc in an empty cache; return how long that takes, s."""
+    with tempfile.TemporaryDirectory() as folder:
+        began = time.perf_counter()
+        fast = one.mechanism.compile(compiler="gcc", cache=Path(folder))
+        return time.perf_counter() - began, fast
+
+
+# Single calls -------------------------------------------------------------------------------------
+
+
+def add_single_calls(figures: Figures, one: Case, fast: Any, axes: tuple[int, ...]) -> None:
+    """Measure inverse and forward dynamics at one state."""
+    exact, q, v, a, tau = one.mechanism, one.q, one.v, one.a, one.tau
+    same(fast.inverse_dynamics(q, v, a).tau, tau)
+    calls: dict[str, Callable[[], object]] = {
+        OURS: lambda: fast.inverse_dynamics(q, v, a),
+        TODAY: lambda: exact.inverse_dynamics(q, v, a),
+        **inverse_peers(one, axes),
+    }
+    figures.add("inverse dynamics (us)", one.name, medians(calls))
+    found = fast.forward_dynamics(q, v, tau)
+    same(found, a)
+    peers, differences = forward_peers(one, axes)
+    calls = {
+        OURS: lambda: fast.forward_dynamics(q, v, tau),
+        TODAY: lambda: exact.forward_dynamics(q, v, tau),
+        **peers,
+    }
+    figures.add("forward dynamics (us)", one.name, medians(calls))
+    differences = {OURS: relative(found, a), **differences}
+    figures.add("relative difference of accelerations", one.name, differences)
+
+
+def same(found: Array, expected: Array) -> None:
+    """Refuse to measure what is wrong."""
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+
+
+def add_derivatives(figures: Figures, one: Case, fast: Any) -> None:
+    """Measure the derivatives of inverse and forward dynamics, where both engines have them."""
+    exact, q, v, a, tau = one.mechanism, one.q, one.v, one.a, one.tau
+    both: dict[str, Callable[[Any], Any]] = {
+        "inverse": lambda engine: engine.inverse_dynamics_derivatives(q, v, a),
+        "forward": lambda engine: engine.forward_dynamics_derivatives(q, v, tau, one.independent),
+    }
+    for which, call in both.items():
+        try:
+            expected = call(exact)
+        except RPSPinError:  # the actuators do not determine the motion
+            continue
+        for mine, theirs in zip(call(fast), expected, strict=True):
+            same(mine, theirs)
+        calls = {OURS: lambda: call(fast), TODAY: lambda: call(exact)}  # noqa: B023
+        figures.add(f"derivatives of {which} dynamics (us)", one.name, medians(calls))
+
+
+# Steps --------------------------------------------------------------------------------------------
+
+
+def add_steps(figures: Figures, one: Case, fast: Any) -> None:
+    """Measure steps of 1 ms along the same motion, and the largest gap on it."""
+    engines = stepped(one, fast)
+    gaps = {name: largest_gap(make) for name, make in engines.items()}
+    figures.add("largest gap in 1000 steps (m)", one.name, gaps)
+    figures.add("step of 1 ms (us)", one.name, step_times(engines))
+
+
+Motion = tuple[Callable[[], None], Callable[[], float]]
+"""Functions that take a step, and that return the gap now."""
+
+
+def stepped(one: Case, fast: Any) -> dict[str, Callable[[], Motion]]:
+    """Return functions that start the case's simulation in each engine."""
+    q, v, tau = one.start()
+
+    def generated() -> Motion:
+        state = [q, v]
+
+        def step() -> None:
+            state[:] = fast.step(*state, tau, STEP)
+
+        return step, lambda: one.mechanism.loop_gap(state[0])
+
+    def today() -> Motion:
+        stepper = Stepper(one.mechanism, q, v)
+        return lambda: stepper.advance(tau, STEP), lambda: one.mechanism.loop_gap(stepper.q)
+
+    def mujoco_of(integrator: str, stiff: bool) -> Motion:
+        twin = MujocoTwin(one.mechanism, stiff=stiff, integrator=integrator, step=STEP)
+        twin.put(q, v, tau)
+        model, data = twin.model, twin.data
+        return lambda: mujoco.mj_step(model, data), twin.gap
+
+    engines: dict[str, Callable[[], Motion]] = {OURS: generated, TODAY: today}
+    for integrator in ("Euler", "RK4"):
+        engines[f"mj_step {integrator}"] = lambda i=integrator: mujoco_of(i, False)
+        engines[f"mj_step {integrator}, stiffest"] = lambda i=integrator: mujoco_of(i, True)
+    return engines
+
+
+def largest_gap(make: Callable[[], Motion]) -> float:
+    """Return the largest gap after any step, m."""
+    step, gap = make()
+    gaps = []
+    for _ in range(STEPS):
+        step()
+        gaps.append(gap())
+    return float(np.max(gaps))
+
+
+def step_times(engines: dict[str, Callable[[], Motion]]) -> dict[str, float]:
+    """Return the median time of a step in us: fifty steps of each engine in turn."""
+    block, times = 50, {name: [] for name in engines}
+    for _ in range(2):
+        steps = {name: make()[0] for name, make in engines.items()}
+        for _ in range(STEPS // block):
+            for name, step in steps.items():
+                began = time.process_time()
+                for _ in range(block):
+                    step()
+                times[name].append((time.process_time() - began) / block)
+    return {name: 1e6 * float(np.median(found)) for name, found in times.items()}
+
+
+# Batches ------------------------------------------------------------------------------------------
+
+
+def add_batch(figures: Figures, one: Case, fast: Any) -> None:
+    """Measure inverse and forward dynamics of 10^5 states on one thread."""
+    states = one.states(50, 0.02, np.random.default_rng(2))
+    q, v, a, tau = (
+        np.ascontiguousarray(np.tile(part, (SAMPLES // len(states), 1)))
+        for part in map(np.array, zip(*states, strict=True))
+    )
+    one_by_one = [one.mechanism.inverse_dynamics(*state[:3]).tau for state in states]
+    same(fast.inverse_dynamics(q, v, a, threads=1).tau[: len(states)], np.array(one_by_one))
+    calls = {
+        "inverse dynamics": lambda: fast.inverse_dynamics(q, v, a, threads=1),
+        "forward dynamics": lambda: fast.forward_dynamics(q, v, tau, threads=1),
+    }
+    times = {name: time / SAMPLES for name, time in medians(calls, rounds=7).items()}
+    figures.add("batch of 10^5, one thread (us a sample)", one.name, times)
+
+
+if __name__ == "__main__":
+    main()
