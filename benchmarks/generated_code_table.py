@@ -3,7 +3,7 @@
     python -m benchmarks.generated_code_table [--markdown] [--only NAME ...]
 
 Every time is a median of processor times, the engines measured in turns on one core; the call from
-Python is included. Mechanisms: `generated_cases` and `legged`; peers: `generated_peers`, `mujoco_twin`.
+Python is included. Mechanisms: `generated_cases`, `legged`; peers: `generated_peers`, `mujoco_twin`.
 """
 
 from __future__ import annotations
