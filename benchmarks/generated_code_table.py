@@ -1,14 +1,15 @@
 """Generated code against its peers: one run, with what was asked and what was found.
 
-    python -m benchmarks.generated_code_table [--markdown] [--only NAME ...]
+    python -m benchmarks.generated_code_table [--markdown] [--json FILE] [--only NAME ...]
 
 Every time is a median of processor times, the engines measured in turns on one core; the call from
-Python is included. Mechanisms: `generated_cases`, `legged`; peers: `generated_peers`, `mujoco_twin`.
+Python is included. Mechanisms: `generated_cases`, `legged`. Peers: `generated_peers`, `mujoco_twin`
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 import tempfile
@@ -19,7 +20,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from benchmarks.generated_cases import LOOPS, MECHANISMS, Case, case, chain_case
@@ -45,22 +45,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--markdown", action="store_true", help="print the tables alone")
     parser.add_argument("--only", nargs="*", help="names of mechanisms, or 'chains'")
+    parser.add_argument("--json", type=Path, help="write the tables, by name, to a file too")
     options = parser.parse_args()
-    if not options.markdown:
-        print(machine(), file=sys.stderr)
-    figures = measured(options.only)
-    for section, text in tables(figures).items():
-        print(f"\n### {section}\n\n{text}")
-    if not options.markdown:
-        print(machine(), file=sys.stderr)
+    before = machine()
+    found = tables(measured(options.only)) | {"machine": f"{before} before, {machine()} after."}
+    if options.json:
+        options.json.write_text(json.dumps(found), "utf-8")
+    for name, text in found.items():
+        if name != "machine" or not options.markdown:
+            print(f"\n### {name}\n\n{text}")
 
 
 def machine() -> str:
-    """Return the machine's load and the versions."""
-    return (
-        f"load {os.getloadavg()[0]:.2f} on {os.cpu_count()} cores; pin {pin.__version__}, "
-        f"MuJoCo {mujoco.__version__}, NumPy {np.__version__}"
-    )
+    """Return the machine's load."""
+    return f"load {os.getloadavg()[0]:.2f} of {os.cpu_count()} cores"
 
 
 def tables(figures: Figures) -> dict[str, str]:
