@@ -29,7 +29,7 @@ from rps_pin.numerics.linear_algebra import Decomposition, condition_number, nul
 ACCEPTED = 1e-10
 #: Numbers below this count as rounding errors of zero, in SI units.
 _ZERO = 1e-6
-#: Of a proof's steps in time, s, and of Newton's guesses, rad or characteristic lengths.
+#: Of a proof's steps in time, all of a call together, s, and of Newton's guesses, rad or characteristic lengths.
 _STEP, _AWAY = 1e-5, 1e-3
 #: Condition number of J_d that the walk towards a singularity does not pass.
 _SINGULAR = 1e3
@@ -193,7 +193,8 @@ class Proof:
         if function.name in ("gaps", "closed", "closed_near"):
             values["q"] = sample.near
         sizes = {one.name: one.shape[0] for one in function.inputs}
-        values["h"] = np.full(sizes.get("h", 0), _STEP)
+        count = sizes.get("h", 0)
+        values["h"] = np.full(count, _STEP / max(count, 1))
         return [values[one.name] for one in function.inputs]
 
     # What the Pinocchio engine answers ------------------------------------------------------------
@@ -279,7 +280,7 @@ class Proof:
         stepper = Stepper(self._m, s.q, s.v, wrenches=self._acting(s.wrenches))
         states = []
         for _ in range(count):
-            stepper.advance(s.tau, _STEP)
+            stepper.advance(s.tau, _STEP / count)
             states.append((stepper.q, stepper.v))
         qs, vs = zip(*states, strict=True)
         return np.concatenate(qs), np.concatenate(vs)

@@ -105,7 +105,7 @@ class Slopes:
 
     def at(self, multipliers: Expression, slopes: dict[str, Expression]) -> dict[str, Expression]:
         """Return derivatives with an expression in place of the multipliers."""
-        values = ca.substitute(list(slopes.values()), [self.multipliers], [multipliers])
+        values = ca.substitute(list(slopes.values()), [self.multipliers], [ca.densify(multipliers)])
         return dict(zip(slopes, values, strict=True))
 
     def inverse(self) -> InverseSlopes:
