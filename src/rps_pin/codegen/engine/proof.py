@@ -29,7 +29,8 @@ from rps_pin.numerics.linear_algebra import Decomposition, condition_number, nul
 ACCEPTED = 1e-10
 #: Numbers below this count as rounding errors of zero, in SI units.
 _ZERO = 1e-6
-#: Of a proof's steps in time, all of a call together, s, and of Newton's guesses, rad or characteristic lengths.
+#: Of a proof's steps in time, those of a call together, s, and of Newton's guesses, rad or
+#: characteristic lengths.
 _STEP, _AWAY = 1e-5, 1e-3
 #: Condition number of J_d that the walk towards a singularity does not pass.
 _SINGULAR = 1e3
