@@ -20,7 +20,7 @@ from rps_pin.codegen.units import Unit
 
 COMPILERS = [one for one in ("gcc", "clang") if shutil.which(one)]
 MVEC = has_libmvec()
-FLAGS = [*compilers.FLAGS, "-shared", "-march=native", *(["-DRPS_PIN_MVEC"] if MVEC else [])]
+FLAGS = [*compilers.FLAGS, "-shared", "-march=native", *([] if MVEC else ["-DNO_MVEC"])]
 STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O1"]
 
 if not COMPILERS:

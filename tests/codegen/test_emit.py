@@ -51,7 +51,7 @@ def test_every_operation_in_scalars_and_lanes(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="widths of x86-64")
 @pytest.mark.parametrize("march", ["x86-64", "x86-64-v3"])
-@pytest.mark.parametrize("flags", [(), ("-URPS_PIN_MVEC",)])
+@pytest.mark.parametrize("flags", [(), ("-DNO_MVEC",)])
 def test_two_and_four_lanes(march: str, flags: tuple[str, ...], tmp_path: Path) -> None:
     """And with the sines of the C library where its vectors' are not wanted."""
     function = every_operation()

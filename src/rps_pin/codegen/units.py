@@ -276,8 +276,8 @@ class Unit:
         ----------
         lanes
             Whether NAME_many computes 8, 4 or 2 samples at once, in vectors of GNU C: it takes as
-            long to compile as the first text. tcc leaves them out. With the macro RPS_PIN_MVEC, it
-            uses the sine and cosine of glibc's libmvec.
+            long to compile as the first text. tcc leaves them out. Without the macro NO_MVEC, it
+            uses functions of glibc's libmvec (sin, cos; from 2.35 on also tanh, atan2).
         """
         needed = list(self._needed())
         one = [prelude("scalar.h"), prelude("status.h"), *_renamed(needed, "scalar")]

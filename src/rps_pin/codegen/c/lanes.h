@@ -36,7 +36,6 @@ EACH_LANE(CALLED, acos)
 EACH_LANE(CALLED, atan)
 EACH_LANE(CALLED, sinh)
 EACH_LANE(CALLED, cosh)
-EACH_LANE(CALLED, tanh)
 EACH_LANE(CALLED, asinh)
 EACH_LANE(CALLED, acosh)
 EACH_LANE(CALLED, atanh)
@@ -46,30 +45,42 @@ EACH_LANE(CALLED, expm1)
 EACH_LANE(CALLED, log1p)
 EACH_LANE(CALLED, erf)
 EACH_LANE_2(CALLED, pow)
-EACH_LANE_2(CALLED, atan2)
 EACH_LANE_2(CALLED, hypot)
 EACH_LANE_2(CALLED, fmod)
 #undef MATH
 #define MATH(name) name##_each
 
-/* Sines and cosines of glibc's vector library, within 4 units in the last place. */
-#if defined(RPS_PIN_MVEC)
+/* Functions of glibc's vector library, within 4 units in the last place. */
 #if LANES == 8
-REAL _ZGVeN8v_sin(REAL), _ZGVeN8v_cos(REAL);
-#define sin_each _ZGVeN8v_sin
-#define cos_each _ZGVeN8v_cos
+#define VECTOR_FUNCTION(name) _ZGVeN8v_##name
+#define VECTOR_FUNCTION_2(name) _ZGVeN8vv_##name
 #elif LANES == 4
-REAL _ZGVdN4v_sin(REAL), _ZGVdN4v_cos(REAL);
-#define sin_each _ZGVdN4v_sin
-#define cos_each _ZGVdN4v_cos
+#define VECTOR_FUNCTION(name) _ZGVdN4v_##name
+#define VECTOR_FUNCTION_2(name) _ZGVdN4vv_##name
 #else
-REAL _ZGVbN2v_sin(REAL), _ZGVbN2v_cos(REAL);
-#define sin_each _ZGVbN2v_sin
-#define cos_each _ZGVbN2v_cos
+#define VECTOR_FUNCTION(name) _ZGVbN2v_##name
+#define VECTOR_FUNCTION_2(name) _ZGVbN2vv_##name
 #endif
-#else
+#if defined(NO_MVEC)
 EACH_LANE(CALLED, sin)
 EACH_LANE(CALLED, cos)
+#else
+REAL VECTOR_FUNCTION(sin)(REAL), VECTOR_FUNCTION(cos)(REAL);
+#define sin_each VECTOR_FUNCTION(sin)
+#define cos_each VECTOR_FUNCTION(cos)
+#if defined(__GLIBC_PREREQ)
+#if __GLIBC_PREREQ(2, 35)
+#define NEWER_MVEC
+#endif
+#endif
+#endif
+#if defined(NEWER_MVEC)
+REAL VECTOR_FUNCTION(tanh)(REAL), VECTOR_FUNCTION_2(atan2)(REAL, REAL);
+#define tanh_each VECTOR_FUNCTION(tanh)
+#define atan2_each VECTOR_FUNCTION_2(atan2)
+#else
+EACH_LANE(CALLED, tanh)
+EACH_LANE_2(CALLED, atan2)
 #endif
 
 #define ALL_LANES(x) ((x) - (REAL){0}) /* keeps the sign of -0.0 */
