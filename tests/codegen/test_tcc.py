@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from rps_pin.arrays import Array
-from rps_pin.codegen.build import Library, Source, tcc
+from rps_pin.codegen.build import Library, Source, compilers, tcc
+from rps_pin.codegen.build.library import load
 from rps_pin.errors import CompileError
 
 #: Statements in C, which are Python too.
@@ -79,6 +80,19 @@ def test_fifty_thousand_statements(chunk: int) -> None:
     found = result(library, "f", X, len(lines))
     assert np.isfinite(found).all()
     np.testing.assert_array_equal(found, expected(lines, X))
+
+
+@pytest.mark.parametrize("name", ["gcc", "clang"])
+def test_compilers_give_the_same_bits(name: str, tmp_path: Path) -> None:
+    """No contraction, no reordering: flags of the system's compilers are so."""
+    compiler = next(compilers.find(name), None)
+    if compiler is None:
+        pytest.skip(f"{name} is not here")
+    lines = statements(600, seed=4)
+    source = Source("bits", ("f",), (text(lines, "f"),))
+    path = compilers.compile_library(source, compiler, tmp_path, 60.0, lambda *_: None)
+    found = result(load(path, source.functions, name), "f", X, len(lines))
+    np.testing.assert_array_equal(found, result(tcc.compile_library(source), "f", X, len(lines)))
 
 
 def test_many_functions_in_many_texts() -> None:
