@@ -388,7 +388,8 @@ def emit(function: Any, chunk: int = CHUNK) -> str:
     else:
         used = set().union(*(part.inputs for part in parts))
         unused = [x for i, x in enumerate(inputs) if i not in used]
-        body.insert(0, f"    REAL w[{max(1, length)}];")
+        if length:
+            body.insert(0, f"    REAL w[{length}];")
         for number, part in enumerate(parts):
             mine = [x for i, x in enumerate(inputs) if i in part.inputs]
             made = [y for i, y in enumerate(outputs) if i in part.outputs]

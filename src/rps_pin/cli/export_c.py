@@ -1,0 +1,111 @@
+"""``rps-pin export c``: a mechanism as C99 for another machine."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rps_pin.cli import console as common
+from rps_pin.cli import mechanism_options as options
+
+
+class Real(StrEnum):
+    """Type of all numbers."""
+
+    DOUBLE = "double"
+    FLOAT = "float"
+
+
+def export_c_command(
+    file: options.FileArgument,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder for the files; it is made.")
+    ],
+    name: Annotated[
+        str | None,
+        typer.Option(
+            help="What names of files and functions begin with; default: the mechanism's name, or "
+            "its file's.",
+            show_default=False,
+        ),
+    ] = None,
+    real: Annotated[Real, typer.Option(help="Type of all numbers.")] = Real.DOUBLE,
+    function: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="A function to export, such as **inverse_dynamics**; repeat it. Default: all but "
+            "the derivatives.",
+        ),
+    ] = None,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="GROUP",
+            help="Numbers that become an argument: **gravity**, **mass:JOINT**, **inertia:JOINT**, "
+            "**placement:JOINT**, **closure:NAME**, **payload:FRAME**; repeat it.",
+        ),
+    ] = None,
+    wrench: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FRAME", help="A frame at which an external wrench acts; repeat it."
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace files that were not exported, too.")
+    ] = False,
+    as_json: common.JsonOption = False,
+) -> None:
+    """Write a mechanism's kinematics and dynamics as C99 for a controller.
+
+    Output: **NAME.h** (all functions; shape, unit and order of every argument), **NAME.c** (no
+    allocation, no globals, C's mathematics only), **NAME_test.c** (self-test with the answers of
+    the Pinocchio engine), **CMakeLists.txt**, **README.md**.
+
+    Exit status: 0 done; 1 it cannot be exported, or a file is in the way; 2 wrong usage.
+
+    Examples:
+
+    - `rps-pin export c delta --output delta_c`
+
+    - `rps-pin export c mine.yaml -o mine_c --real float --parameter payload:tool`
+    """
+    from rps_pin.codegen.export.c_files import c_files, write_c_files
+    from rps_pin.codegen.export.mechanism import mechanism_package
+    from rps_pin.codegen.export.names import identifier
+
+    mechanism, path = options.load_mechanism(file)
+    package = mechanism_package(
+        mechanism,
+        name=identifier(name) if name is not None else identifier(mechanism.name, path.stem),
+        real=real.value,
+        functions=function or (),
+        parameters=parameter or (),
+        wrench_frames=wrench or (),
+    )
+    texts = c_files(package)
+    files = write_c_files(texts, output, overwrite=overwrite)
+    summary = {
+        "mechanism": mechanism.name,
+        "name": package.name,
+        "real": package.real,
+        "functions": [one.name for one in package.functions],
+        "constants": {one.key: one.value for one in package.constants},
+        "parameters": {label: value for label, value in package.parameters},
+    }
+    if as_json:
+        common.print_json(summary | {"files": files})
+        return
+    console = common.text_console(soft_wrap=True)
+    console.print(
+        f"{mechanism.name}: {len(package.functions)} functions in C99, {package.real} precision, "
+        f"each with {len(package.functions[0].cases)} states in its self-test",
+        markup=False,
+    )
+    common.print_files(console, files)
+    typer.echo(f"Test: cmake -S {output} -B {output}/build && cmake --build {output}/build && "
+               f"ctest --test-dir {output}/build")
