@@ -34,6 +34,18 @@ for _panel, _name, _line in (
 ):
     app.command(_name, rich_help_panel=_panel, short_help=_line)(LazyGroup.stub(_name))
 
+export = typer.Typer(cls=LazyGroup, no_args_is_help=True, **SETTINGS)
+export.command("c", short_help="C99 with header, CMake and a self-test.")(
+    LazyGroup.stub("export_c")
+)
+app.add_typer(
+    export,
+    name="export",
+    rich_help_panel=_ANY,
+    short_help="Code for a controller.",
+    help="Write a mechanism as code for other programs.\n\nExit status: 0; 2 wrong usage.",
+)
+
 
 @app.command("doctor", rich_help_panel=_MORE)
 def doctor_command(

@@ -33,7 +33,7 @@ def export_c_command(
         ),
     ] = None,
     real: Annotated[Real, typer.Option(help="Type of all numbers.")] = Real.DOUBLE,
-    function: Annotated[
+    functions: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME",
@@ -41,7 +41,13 @@ def export_c_command(
             "the derivatives.",
         ),
     ] = None,
-    parameter: Annotated[
+    frames: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FRAME", help="A frame whose placement and Jacobian are exported; repeat it."
+        ),
+    ] = None,
+    parameters: Annotated[
         list[str] | None,
         typer.Option(
             metavar="GROUP",
@@ -49,11 +55,9 @@ def export_c_command(
             "**placement:JOINT**, **closure:NAME**, **payload:FRAME**; repeat it.",
         ),
     ] = None,
-    wrench: Annotated[
+    wrench_frames: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="FRAME", help="A frame at which an external wrench acts; repeat it."
-        ),
+        typer.Option(metavar="FRAME", help="A frame at which an external wrench acts; repeat it."),
     ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace files that were not exported, too.")
@@ -72,7 +76,7 @@ def export_c_command(
 
     - `rps-pin export c delta --output delta_c`
 
-    - `rps-pin export c mine.yaml -o mine_c --real float --parameter payload:tool`
+    - `rps-pin export c mine.yaml -o mine_c --real float --parameters payload:tool`
     """
     from rps_pin.codegen.export.c_files import c_files, write_c_files
     from rps_pin.codegen.export.mechanism import mechanism_package
@@ -83,9 +87,10 @@ def export_c_command(
         mechanism,
         name=identifier(name) if name is not None else identifier(mechanism.name, path.stem),
         real=real.value,
-        functions=function or (),
-        parameters=parameter or (),
-        wrench_frames=wrench or (),
+        functions=functions or (),
+        frames=frames or (),
+        parameters=parameters or (),
+        wrench_frames=wrench_frames or (),
     )
     texts = c_files(package)
     files = write_c_files(texts, output, overwrite=overwrite)
@@ -95,7 +100,7 @@ def export_c_command(
         "real": package.real,
         "functions": [one.name for one in package.functions],
         "constants": {one.key: one.value for one in package.constants},
-        "parameters": {label: value for label, value in package.parameters},
+        "parameters": dict(package.parameters),
     }
     if as_json:
         common.print_json(summary | {"files": files})
@@ -107,5 +112,7 @@ def export_c_command(
         markup=False,
     )
     common.print_files(console, files)
-    typer.echo(f"Test: cmake -S {output} -B {output}/build && cmake --build {output}/build && "
-               f"ctest --test-dir {output}/build")
+    typer.echo(
+        f"Test: cmake -S {output} -B {output}/build && cmake --build {output}/build && "
+        f"ctest --test-dir {output}/build"
+    )

@@ -22,7 +22,10 @@ SETTINGS: dict[str, Any] = {
 
 
 class LazyGroup(TyperGroup):
-    """Commands that are known by name and one line: ``rps_pin.cli.NAME`` has ``NAME_command``."""
+    """Commands that are known by name and one line: ``rps_pin.cli.NAME`` has ``NAME_command``.
+
+    NAME is the command's, or, in a group of its own, the group's and the command's: ``export_c``.
+    """
 
     @staticmethod
     def stub(name: str) -> Callable[[], None]:
@@ -45,5 +48,5 @@ def _imported(name: str) -> Any:
     """Return the command of a module, with the settings of the whole command line."""
     module = importlib.import_module(f"rps_pin.cli.{name}")
     one = typer.Typer(add_completion=False, **SETTINGS)
-    one.command(name)(getattr(module, f"{name}_command"))
+    one.command(name.rpartition("_")[2])(getattr(module, f"{name}_command"))
     return typer.main.get_command(one)

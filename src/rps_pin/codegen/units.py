@@ -97,9 +97,10 @@ class Routine:
 
     The body is C99, and C++ too, for CUDA. Numbers are of type REAL: one sample's, or those of
     several samples; so it compares only by the macros LT, LE, EQ, NE, AND, OR, NOT, which give a
-    REAL, chooses by SELECT(condition, x, y), writes numbers as CONST(0.5), and repeats a loop while
-    ANY(condition), that of any of the samples. It calls a function as ``NAME(x0, ..., y0, ...)``
-    with pointers to inputs and outputs that do not overlap.
+    REAL, chooses by SELECT(condition, x, y), writes numbers as CONST(0.5), those that depend on
+    the rounding error as PRECISE(in_double, in_single), and repeats a loop while ANY(condition),
+    that of any of the samples. It calls a function as ``NAME(x0, ..., y0, ...)`` with pointers to
+    inputs and outputs that do not overlap.
 
     Parameters
     ----------

@@ -45,6 +45,12 @@ double copysign(double, double);
 #define PART(name) name##_part
 
 #define CONST(x) ((REAL)(x))
+/* A number that depends on the rounding error. */
+#if defined(SINGLE)
+#define PRECISE(in_double, in_single) CONST(in_single)
+#else
+#define PRECISE(in_double, in_single) CONST(in_double)
+#endif
 #define SQRT(x) MATH(sqrt)(x)
 #define SIN(x) MATH(sin)(x)
 #define COS(x) MATH(cos)(x)

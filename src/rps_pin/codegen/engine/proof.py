@@ -31,7 +31,7 @@ ACCEPTED = 1e-10
 _ZERO = 1e-6
 #: Of a proof's steps in time, those of a call together, s, and of Newton's guesses, rad or
 #: characteristic lengths.
-_STEP, _AWAY = 1e-5, 1e-3
+STEP, _AWAY = 1e-5, 1e-3
 #: Condition number of J_d that the walk towards a singularity does not pass.
 _SINGULAR = 1e3
 #: Condition number of J_d above which generated code may flag a state.
@@ -161,7 +161,7 @@ class Proof:
                         "",
                     )
                 continue
-            expected = self._expected(name, sample, found)
+            expected = self.expected(name, sample, found)
             for k, (one, of_batch, wanted) in enumerate(zip(found, batch, expected, strict=False)):
                 if wanted is not None:
                     for result in (one, of_batch[i]):
@@ -195,12 +195,13 @@ class Proof:
             values["q"] = sample.near
         sizes = {one.name: one.shape[0] for one in function.inputs}
         count = sizes.get("h", 0)
-        values["h"] = np.full(count, _STEP / max(count, 1))
+        values["h"] = np.full(count, STEP / max(count, 1))
         return [values[one.name] for one in function.inputs]
 
     # What the Pinocchio engine answers ------------------------------------------------------------
 
-    def _expected(self, name: str, s: Sample, found: Sequence[Array]) -> Sequence[Any]:
+    def expected(self, name: str, s: Sample, found: Sequence[Array]) -> Sequence[Any]:
+        """Return the answers of a function; None, or none at the end, where there is none."""
         m, acting = self._m, self._acting(s.wrenches)
         if name.startswith("frame_"):
             frame = m.model.frames[int(name.rpartition("_")[2])].name
@@ -281,7 +282,7 @@ class Proof:
         stepper = Stepper(self._m, s.q, s.v, wrenches=self._acting(s.wrenches))
         states = []
         for _ in range(count):
-            stepper.advance(s.tau, _STEP / count)
+            stepper.advance(s.tau, STEP / count)
             states.append((stepper.q, stepper.v))
         qs, vs = zip(*states, strict=True)
         return np.concatenate(qs), np.concatenate(vs)

@@ -36,7 +36,8 @@ class Evaluation:
         if name == "closed":
             return self._closed(given[0], given[1:])
         if name == "step":
-            return self._step(*given[:4], given[4:])
+            q, v, tau, h, *extra = given
+            return self._step(q, v, tau, float(h[0]), extra)
         found = self._functions[name].call(list(given))
         return [np.asarray(one.full()).ravel() for one in found]
 
@@ -49,10 +50,10 @@ class Evaluation:
         return [q, first]
 
     def _step(
-        self, q: Array, v: Array, tau: Array, h: Array, extra: Sequence[Array]
+        self, q: Array, v: Array, tau: Array, t: float, extra: Sequence[Array]
     ) -> list[Array]:
         """Return q, v and work after the Runge-Kutta-Munthe-Kaas step of order 4."""
-        t, alone = float(h[0]), extra[self._wrenches :]
+        alone = extra[self._wrenches :]
 
         def slope(q: Array, v: Array) -> tuple[Array, Array]:
             a, power, _ = self("stage", [q, v, tau, *extra])
@@ -72,5 +73,6 @@ class Evaluation:
         q3 = moved(q, t / 12 * (3 * v + 2 * v2 + 2 * v3 - v4))
         q4 = moved(q3, t / 12 * (2 * v2 - v + 2 * v3 + 3 * v4))
         closed, _ = self._closed(q4, alone)
-        (after,) = self("projected_velocity", [closed, v + t / 6 * (a1 + 2 * a2 + 2 * a3 + a4), *alone])
+        v4 = v + t / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        (after,) = self("projected_velocity", [closed, v4, *alone])
         return [closed, after, t / 6 * (p1 + 2 * p2 + 2 * p3 + p4)]

@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 
 from rps_pin import __version__
+from rps_pin.codegen.export.names import quoted
 from rps_pin.codegen.export.package import Function, Package
 from rps_pin.codegen.units import NOT_FINITE, OPEN, SINGULAR
 
@@ -74,8 +75,11 @@ def _declaration(package: Package, function: Function) -> list[str]:
         lines += textwrap.wrap(text, _WIDTH, initial_indent="   ", subsequent_indent=" " * 9)
     lines[-1] += " */"
     prototype = package.unit.prototype(function.name, package.real)
-    indent = " " * (prototype.index("(") + 1)
-    return [*lines, *textwrap.wrap(f"{prototype};", _WIDTH, subsequent_indent=indent)]
+    begin, _, rest = prototype.partition("(")
+    # Lines end after arguments only.
+    kept = f"{begin}({rest};".replace(" ", "\0").replace(",\0", ", ")
+    wrapped = textwrap.wrap(kept, _WIDTH, subsequent_indent=" " * (len(begin) + 1))
+    return [*lines, *(line.replace("\0", " ") for line in wrapped)]
 
 
 def _parameters(package: Package) -> list[str]:
@@ -86,7 +90,7 @@ def _parameters(package: Package) -> list[str]:
     lines.append("    { \\")
     end = len(package.parameters) - 1
     for i, (label, value) in enumerate(package.parameters):
-        lines.append(f"        {value!r}{',' if i < end else ''} /* {i} {label} */ \\")
+        lines.append(f"        {value!r}{',' if i < end else ''} /* {i} {quoted(label)} */ \\")
     return [*lines, "    }"]
 
 

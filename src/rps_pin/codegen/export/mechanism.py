@@ -2,41 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+import casadi as ca
 import numpy as np
 
-from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.equations import OPEN
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen.export import words
-from rps_pin.codegen.export.evaluation import Evaluation
+from rps_pin.codegen.export.cases import Cases
 from rps_pin.codegen.export.names import identifier, quoted
-from rps_pin.codegen.export.package import (
-    Case,
-    Constant,
-    Function,
-    Order,
-    Package,
-    Real,
-    conditions,
-)
+from rps_pin.codegen.export.package import Constant, Function, Order, Package, Real
 from rps_pin.codegen.export.vectors import Entry, vectors
-from rps_pin.codegen.expressions.mechanism import GROWTH
-from rps_pin.codegen.engine.generated import GeneratedCode
-from rps_pin.codegen.engine.proof import STEP, Proof, Sample
+from rps_pin.codegen.expressions.functions import MechanismFunctions
+from rps_pin.codegen.expressions.independent import choose, regular_samples
+from rps_pin.codegen.expressions.mechanism import GROWTH, MechanismExpressions
 from rps_pin.codegen.expressions.routines import routines
 from rps_pin.codegen.units import Kernel, Unit
 from rps_pin.errors import InputError, did_you_mean
-from rps_pin.validation import choice
+from rps_pin.validation import choice as one_of
 
 #: Largest growth of rounding errors, squared and over that of `GROWTH`: their limit, relative, is
 #: about 1e-11 in double and 1e-4 in single precision.
-_LIMITS: dict[str, float] = {"double": 1.0, "float": 1e-4}
-_EPSILONS = {"double": 2.2e-16, "float": 1.2e-7}
-#: States of the self-test keep this share of the limit.
-_REGULAR = 0.1
-
+_LIMITS: Mapping[str, float] = {"double": 1.0, "float": 1e-4}
+#: Opening rates that `acceleration` accepts, relative to the speed.
+_CONSISTENT: Mapping[str, float] = {"double": 1e-8, "float": 1e-4}
+_EPSILONS: Mapping[str, float] = {"double": 2.0**-52, "float": 2.0**-23}
 _UNCHECKED = ("gaps", "jacobian", "generalised_force", "energy")
 
 
@@ -46,6 +37,7 @@ def mechanism_package(
     name: str = "",
     real: Real = "double",
     functions: Sequence[str] = (),
+    frames: Sequence[str] = (),
     parameters: Sequence[str] = (),
     wrench_frames: Sequence[str] = (),
 ) -> Package:
@@ -62,6 +54,8 @@ def mechanism_package(
         Type of all numbers.
     functions
         Names of functions (`words.FUNCTIONS`); all but the derivatives if left out.
+    frames
+        Names of frames whose placement and Jacobian are functions too.
     parameters
         Groups of numbers that are arguments of the functions; see `Parameters`.
     wrench_frames
@@ -71,8 +65,10 @@ def mechanism_package(
     ------
     InputError
         If a name or a number does not fit, or no regular state was found for the self-test.
+    MechanismError
+        If a frame is unknown.
     """
-    choice(real, "real", tuple(_LIMITS))
+    one_of(real, "real", tuple(_LIMITS))
     chosen = tuple(dict.fromkeys(functions)) or words.USUAL
     for one in chosen:
         if one not in words.FUNCTIONS:
@@ -80,178 +76,146 @@ def mechanism_package(
             raise InputError(
                 f"no function {one!r}{did_you_mean(one, known)}; there are: {', '.join(known)}"
             )
-    called = identifier(name) if name else identifier(mechanism.name)
-    code = GeneratedCode(mechanism, parameters, wrench_frames)
-    unit = _unit(code, called, chosen, _LIMITS[real])
-    proof = Proof(mechanism, code.partition.independent, code.parameters, code.wrench_frames)
-    made = _Cases(code, unit, proof)
-    labels = zip(code.labels, code.nominal.tolist(), strict=True)
+    called = identifier(name or mechanism.name)
+    system = mechanism.system
+    partition = choose(system, regular_samples(system, mechanism.home).jacobians)
+    x = MechanismExpressions(
+        system, partition, parameters, wrench_frames, consistent=_CONSISTENT[real]
+    )
+    made = MechanismFunctions(x)
+    #: Names in the unit, and in `functions` and `routines`.
+    sources = {one: one for one in chosen} | _frames(mechanism, frames)
+    unit = _unit(made, called, sources, _LIMITS[real])
+    cases = Cases(mechanism, made, unit.limit)
+    entries = []
+    for one, source in sources.items():
+        inputs = [key for key, _ in unit.function(one).inputs]
+        results = [key for key, _ in unit.handed_out(one)]
+        sentence, own = words.of(source, mechanism)
+        entries.append(
+            Function(
+                one,
+                sentence,
+                {key: own.get(key) or words.ARGUMENTS[key] for key in (*inputs, *results)},
+                cases.of(source, inputs, len(results)),
+            )
+        )
     return Package(
         called,
         quoted(mechanism.name),
         real,
         unit,
-        [
-            Function(
-                one,
-                words.FUNCTIONS[one][0],
-                {key: words.meaning(one, key) for key in made.argument_names(one)},
-                made.of(one),
-            )
-            for one in chosen
-        ],
-        _constants(code),
-        _orders(code),
-        [(quoted(label), value) for label, value in labels],
-        _notes(code, real),
+        entries,
+        _constants(mechanism, x),
+        _orders(mechanism, x),
+        list(zip(x.parameters.labels, x.parameters.nominal.tolist(), strict=True)),
+        _notes(mechanism, x, real),
     )
 
 
-def _unit(code: GeneratedCode, name: str, chosen: Sequence[str], limit: float) -> Unit:
-    """Return the unit of the chosen functions and of what they call."""
-    with_loops = {one.name: one for one in routines(code.functions)}
-    needed = list(chosen)
-    for one in needed:
-        calls = with_loops[one].calls if one in with_loops else ()
-        needed += [call for call in calls if call not in needed]
-    kernels = [Kernel(code.functions[one]) for one in needed if one not in with_loops]
+def _frames(mechanism: ClosedLoopModel, frames: Sequence[str]) -> dict[str, str]:
+    """Return the functions of frames by their names in C."""
+    found: dict[str, str] = {}
+    for frame in dict.fromkeys(frames):
+        source = f"frame_jacobian_{mechanism.system.frame(frame)}"
+        called = f"frame_{identifier(f'frame {frame}').removeprefix('frame_')}"
+        if called in found:
+            raise InputError(f"frames {frame!r} and another would both be {called} in C")
+        found[called] = source
+    return found
+
+
+def _unit(
+    functions: MechanismFunctions, name: str, sources: Mapping[str, str], limit: float
+) -> Unit:
+    """Return the unit of functions and of what they call."""
+    with_loops = {one.name: one for one in routines(functions)}
+    needed = dict(sources)
+    for one in list(sources):
+        _add_calls(one, with_loops, needed)
+    kernels = []
+    for one, source in needed.items():
+        if source not in with_loops:
+            kernels.append(Kernel(_renamed(functions[source], one)))
     loops = [one for key, one in with_loops.items() if key in needed]
-    checked = frozenset(chosen) - set(_UNCHECKED)
-    return Unit(name, tuple(kernels), tuple(loops), tuple(chosen), checked, limit)
+    checked = frozenset(sources) - set(_UNCHECKED)
+    return Unit(name, tuple(kernels), tuple(loops), tuple(sources), checked, limit)
 
 
-# States -------------------------------------------------------------------------------------------
+def _add_calls(name: str, with_loops: Mapping[str, object], needed: dict[str, str]) -> None:
+    for call in getattr(with_loops.get(name), "calls", ()):
+        needed.setdefault(call, call)
+        _add_calls(call, with_loops, needed)
 
 
-class _Cases:
-    """Regular states of a mechanism, and the answers and condition numbers there."""
-
-    def __init__(self, code: GeneratedCode, unit: Unit, proof: Proof) -> None:
-        self._code, self._unit, self._proof = code, unit, proof
-        self._evaluation = Evaluation(code.functions)
-        self._samples = [one for one in proof.samples if self._is_regular(one)]
-        if not self._samples:
-            raise InputError(
-                f"{code.mechanism.name}: all {len(proof.samples)} states near home are nearly "
-                "singular; there is none for the self-test"
-            )
-
-    def argument_names(self, name: str) -> list[str]:
-        """Return the names of a function's arguments and results."""
-        inputs, outputs = self._unit.function(name).inputs, self._unit.handed_out(name)
-        return [key for key, _ in (*inputs, *outputs)]
-
-    def of(self, name: str) -> list[Case]:
-        """Return the cases of a function."""
-        return [self._case(name, sample) for sample in self._samples]
-
-    def _is_regular(self, sample: Sample) -> bool:
-        given = self._given("forward_dynamics", sample, self._inputs("forward_dynamics"))
-        opening, growth = self._evaluation("forward_dynamics", given)[-1]
-        return bool(opening <= 1.0 and growth <= _REGULAR * self._unit.limit)
-
-    def _inputs(self, name: str) -> list[str]:
-        function = self._code.functions[name]
-        return [function.name_in(i) for i in range(function.n_in())]
-
-    def _given(self, name: str, sample: Sample, inputs: Sequence[str]) -> list[Array]:
-        values = {**sample._asdict(), "h": np.array([STEP])}
-        if name in ("closed", "gaps"):
-            values["q"] = sample.near
-        return [np.asarray(values[key], dtype=np.float64) for key in inputs]
-
-    def _case(self, name: str, sample: Sample) -> Case:
-        inputs = [key for key, _ in self._unit.function(name).inputs]
-        count = len(self._unit.handed_out(name))
-        given = self._given(name, sample, inputs)
-
-        def evaluate(given: Sequence[Array]) -> list[Array]:
-            return self._evaluation(name, given)[:count]
-
-        found = evaluate(given)
-        answers = [*self._proof.expected(name, sample, found), *[None] * count][:count]
-        scales = [self._scale(key, one) for key, one in zip(inputs, given, strict=True)]
-        expected = [None if one is None else np.ravel(one) for one in answers]
-        return Case(tuple(given), tuple(expected), conditions(evaluate, given, scales))
-
-    def _scale(self, argument: str, value: Array) -> Array:
-        """Return the sizes of an argument's numbers: angles against the characteristic length."""
-        system = self._code.mechanism.system
-        unit = system.column_scale
-        if argument == "q":
-            lengths = [entry.unit == "m" for entry in vectors(self._code.mechanism).q]
-            least = np.where(lengths, system.equations.length, 1.0)
-            return np.maximum(np.abs(value), least)
-        independent = self._code.partition.independent
-        of = {"v": unit, "a": unit, "u": unit[independent], "w": unit[independent]}
-        if argument in of:
-            return np.asarray(of[argument] * np.abs(value / of[argument]).max(initial=0.0))
-        if argument == "tau":
-            force = 1.0 / unit[system.actuated]
-            return np.asarray(force * np.abs(value / force).max(initial=0.0))
-        return np.abs(value)
+def _renamed(function: ca.Function, name: str) -> ca.Function:
+    if function.name() == name:
+        return function
+    given = function.sx_in()
+    names = function.name_in(), function.name_out()
+    return ca.Function(name, given, function.call(given), *names)
 
 
 # Words --------------------------------------------------------------------------------------------
 
 
-def _constants(code: GeneratedCode) -> list[Constant]:
-    mechanism, system = code.mechanism, code.mechanism.system
+def _constants(mechanism: ClosedLoopModel, x: MechanismExpressions) -> list[Constant]:
     found = [
         Constant("NQ", mechanism.model.nq, "numbers of a configuration"),
         Constant("NV", mechanism.model.nv, "velocities"),
-        Constant("NA", system.actuated.size, "actuator forces"),
+        Constant("NA", x.system.actuated.size, "actuator forces"),
         Constant("NC", mechanism.constraint_size, "rows of the closures"),
-        Constant("NI", code.partition.independent.size, "independent joints"),
+        Constant("NI", x.independent.size, "independent velocities"),
     ]
-    if code.labels:
-        found.append(Constant("NP", len(code.labels), "parameters"))
+    if x.parameters.labels:
+        found.append(Constant("NP", len(x.parameters.labels), "parameters"))
     return found
 
 
-def _orders(code: GeneratedCode) -> list[Order]:
-    order = vectors(code.mechanism)
+def _orders(mechanism: ClosedLoopModel, x: MechanismExpressions) -> list[Order]:
+    order = vectors(mechanism)
 
     def lines(entries: Sequence[Entry], suffix: str = "") -> tuple[str, ...]:
         return tuple(f"{what}, {unit}{suffix}" for what, unit in entries)
 
-    independent = [order.v[i] for i in code.partition.independent]
+    independent = [order.v[i] for i in x.independent]
     found = [
         Order("Configurations q", lines(order.q)),
         Order("Velocities v (accelerations a: /s^2)", lines(order.v, "/s")),
-        Order("Independent joints, of u (w: /s^2)", lines(independent, "/s")),
+        Order(
+            "Independent velocities u (accelerations w: /s^2)",
+            lines(independent, "/s"),
+        ),
         Order("Actuator forces tau", lines(order.tau)),
-        Order("Rows of the closures, of gaps and of the Jacobian", lines(order.rows)),
+        Order("Rows of the closures: of gaps, of the Jacobian, of multipliers", lines(order.rows)),
     ]
-    if code.wrench_frames:
-        frames = [
+    if x.wrench_frames:
+        wrenches = [
             f"{part} {axis} at frame {quoted(frame)}, {unit}"
-            for frame in code.wrench_frames
+            for frame in x.wrench_frames
             for part, unit in (("force", "N"), ("moment", "N m"))
             for axis in "xyz"
         ]
-        found.append(Order("Wrenches", tuple(frames)))
-    if code.labels:
-        found.append(Order("Parameters", tuple(quoted(label) for label in code.labels)))
-    return found
+        found.append(Order("External wrenches", tuple(wrenches)))
+    if x.parameters.labels:
+        found.append(Order("Parameters", tuple(map(quoted, x.parameters.labels))))
+    return [one for one in found if one.lines]
 
 
-def _notes(code: GeneratedCode, real: str) -> list[str]:
-    mechanism = code.mechanism
+def _notes(mechanism: ClosedLoopModel, x: MechanismExpressions, real: str) -> list[str]:
     gravity = ", ".join(f"{number:g}" for number in mechanism.model.gravity.linear)
-    limit = OPEN * mechanism.characteristic_length
+    length = mechanism.characteristic_length
     error = float(np.sqrt(_LIMITS[real])) * GROWTH * _EPSILONS[real]
-    effects = mechanism.effects
     notes = [
         "Gravity is among the parameters."
-        if "gravity" in code.parameters
+        if "gravity" in x.parameters.groups
         else f"Gravity is ({gravity}) m/s^2 in world axes.",
-        "World axes are those of the mechanism's root. Forces of a closure act on the mechanism as "
-        "J' multipliers.",
-        f"The loops count as open beyond a gap of {limit:.3g} m ({OPEN:g} of the characteristic "
-        f"length, {mechanism.characteristic_length:.6g} m), and a configuration as nearly singular "
-        f"where rounding errors may grow to about {error:.0g}, relative.",
+        "World axes are those of the mechanism's root. The closures' forces act on the mechanism "
+        "as J' multipliers.",
+        f"The loops count as open beyond a gap of {OPEN * length:.3g} m ({OPEN:g} of the "
+        f"characteristic length, {length:.6g} m), and a configuration as nearly singular where "
+        f"rounding errors may grow to about {error:.0g}, relative.",
     ]
-    if effects is not None:
+    if mechanism.effects is not None:
         notes.append("Damping, friction and springs of the joints are part of the dynamics.")
     return notes

@@ -83,7 +83,6 @@ class Package:
         Of all entries of the unit.
     constants, orders : sequences
     parameters : sequence of (label, nominal number)
-        Labels are fit for comments.
     notes : sequence of str
         Sentences about all functions: gravity, frames, limits.
     """

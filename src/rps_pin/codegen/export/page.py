@@ -13,9 +13,7 @@ _SHOWN = ("inverse_dynamics", "gravity_forces", "forward_dynamics")
 
 def cmake(package: Package) -> str:
     """Return the text of CMakeLists.txt."""
-    return template("CMakeLists.txt.in").format(
-        name=package.name, mark=MARK, version=__version__
-    )
+    return template("CMakeLists.txt.in").format(name=package.name, mark=MARK, version=__version__)
 
 
 def page(package: Package) -> str:

@@ -79,7 +79,11 @@ def _test(package: Package, function: Function) -> str:
     call = f"{package.name}_{name}({', '.join([*given, *results])})"
     text += [f"static void test_{name}(void)", "{"]
     text += [f"    REAL {result}_found[{max(1, size)}];" for result, size in outputs]
-    text += ["    int k;", f'    begin("{name}", {count});', f"    for (k = 0; k < {count}; ++k) {{"]
+    text += [
+        "    int k;",
+        f'    begin("{name}", {count});',
+        f"    for (k = 0; k < {count}; ++k) {{",
+    ]
     text += ["        int status;", "        START;", f"        status = {call};", "        STOP;"]
     text += ["        status_is(k, status, 0);"]
     text += [

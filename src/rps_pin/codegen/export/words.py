@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.codegen.export.names import quoted
+
 #: What arguments and results are, by their names, unless a function says otherwise.
 ARGUMENTS: Mapping[str, str] = {
     "q": "configuration",
@@ -91,7 +94,15 @@ FUNCTIONS: Mapping[str, tuple[str, Mapping[str, str]]] = {
 USUAL = tuple(name for name in FUNCTIONS if not name.endswith("derivatives"))
 
 
-def meaning(function: str, argument: str) -> str:
-    """Return what an argument or a result of a function is."""
-    own = FUNCTIONS[function][1]
-    return own.get(argument) or ARGUMENTS[argument]
+_FRAME: Mapping[str, str] = {
+    "placement": "homogeneous matrix, m",
+    "jacobian": "takes u to linear and angular velocity at the frame's origin, in world axes",
+}
+
+
+def of(source: str, mechanism: ClosedLoopModel) -> tuple[str, Mapping[str, str]]:
+    """Return a function's sentence, and what some of its arguments are."""
+    if not source.startswith("frame_jacobian_"):
+        return FUNCTIONS[source]
+    frame = mechanism.model.frames[int(source.rpartition("_")[2])].name
+    return f"Placement of frame {quoted(frame)} in the world, and its Jacobian.", _FRAME

@@ -51,9 +51,6 @@ from rps_pin.codegen.expressions.derivatives import ForwardSlopes, InverseSlopes
 from rps_pin.codegen.expressions.elimination import LDL
 from rps_pin.codegen.expressions.mechanism import Expression, MechanismExpressions
 
-#: Opening rate that `acceleration` accepts, relative to the speed, as `kinematics` does.
-_CONSISTENT = 1e-8
-
 
 class MechanismFunctions:
     """The functions of one mechanism, each made when it is asked for.
@@ -145,7 +142,7 @@ def _acceleration(x: MechanismExpressions) -> Made:
     w = ca.SX.sym("w", x.independent.size)
     opening = x.jacobian @ x.v
     speed = 1 + ca.sumsqr(x.v / x.system.column_scale)
-    consistent = ca.sumsqr(opening) / speed / _CONSISTENT**2
+    consistent = ca.sumsqr(opening) / speed / x.consistent**2
     check = ca.vertcat(x.opening + consistent, x.growth)
     given = {"q": x.q, "v": x.v, "w": w}
     # One solution for both: A_d a_d = -(A_u w + s J' v).

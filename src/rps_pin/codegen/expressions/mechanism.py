@@ -70,6 +70,8 @@ class MechanismExpressions:
         Names of the parameters that stay symbols (see `Parameters`).
     wrench_frames
         Frames at which external wrenches act.
+    consistent
+        Opening rate that `acceleration` accepts, relative to the speed; left out, as `kinematics`.
 
     Attributes
     ----------
@@ -85,8 +87,10 @@ class MechanismExpressions:
         partition: Partition,
         parameters: Sequence[str] = (),
         wrench_frames: Sequence[str] = (),
+        consistent: float = 1e-8,
     ) -> None:
         self.system = system
+        self.consistent = consistent
         self.parameters = Parameters(system, parameters)
         self.tree = tree = Tree(self.parameters.model, self.parameters)
         self.rows: ClosureRows = closure_rows(tree, system.equations)

@@ -17,7 +17,7 @@ from rps_pin.codegen.units import Routine
 BLOCK = 64
 #: Squared gaps, in characteristic lengths: rounding error; and from where one more step of Newton's
 #: method leads to rounding error.
-_CLOSED, _LAST = 1e-28, 1e-16
+_CLOSED, _LAST = "PRECISE(1e-28, 1e-11)", "PRECISE(1e-16, 1e-7)"
 _NEWTON_STEPS = 20
 
 
@@ -60,7 +60,7 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
     model = functions.expressions.tree.model
     extra = _extra(functions, False)
     body = f"""
-    REAL dv[{model.nv}], moved[{model.nq}], gap[1], growth[1], before = CONST(1e300);
+    REAL dv[{model.nv}], moved[{model.nq}], gap[1], growth[1], before = CONST(INFINITY);
     int i, k;
     for (i = 0; i < {model.nq}; ++i) q_closed[i] = q[i];
     check[0] = check[1] = CONST(0);
@@ -69,15 +69,15 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
         check[1] = FMAX(check[1], growth[0]);
         if (k == 0) first[0] = gap[0];
         /* A gap that grows, before it is rounding error, is not this routine's matter. */
-        check[0] = SELECT(AND(LT(before, gap[0]), LT(CONST({_CLOSED}), gap[0])),
+        check[0] = SELECT(AND(LT(before, gap[0]), LT({_CLOSED}, gap[0])),
                           CONST(2), check[0]);
         before = gap[0];
-        if (!ANY(LT(CONST({_CLOSED}), gap[0]))) break;
+        if (!ANY(LT({_CLOSED}, gap[0]))) break;
         {_call("integrate", ["q_closed", "dv"], extra, "moved")}
         for (i = 0; i < {model.nq}; ++i) q_closed[i] = moved[i];
-        if (!ANY(LT(CONST({_LAST}), gap[0]))) break;
+        if (!ANY(LT({_LAST}, gap[0]))) break;
     }}
-    check[0] = SELECT(LT(CONST({_LAST}), before), CONST(2), check[0]);
+    check[0] = SELECT(LT({_LAST}, before), CONST(2), check[0]);
 """
     outputs = (("q_closed", model.nq), ("first", 1), ("check", 2))
     return Routine(name, (("q", model.nq), *extra), outputs, body, (kernel, "integrate"))

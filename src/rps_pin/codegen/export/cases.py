@@ -1,0 +1,103 @@
+"""States of a mechanism, with the Pinocchio engine's answers and condition numbers there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.codegen.engine.proof import STEP, Proof, Sample
+from rps_pin.codegen.export.evaluation import Evaluation
+from rps_pin.codegen.export.package import Case, conditions
+from rps_pin.codegen.export.vectors import vectors
+from rps_pin.codegen.expressions.functions import MechanismFunctions
+from rps_pin.errors import InputError
+
+#: States keep this share of the limit of growth.
+_REGULAR = 0.1
+
+
+class Cases:
+    """Regular states of a mechanism, those of `rps_pin.codegen.engine.proof`.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    functions
+        Its functions.
+    limit
+        Largest growth that is not nearly singular; states stay well below.
+
+    Raises
+    ------
+    InputError
+        If all states are nearly singular.
+    """
+
+    def __init__(
+        self, mechanism: ClosedLoopModel, functions: MechanismFunctions, limit: float
+    ) -> None:
+        x = functions.expressions
+        self._independent, self._system = x.independent, mechanism.system
+        self._lengths = [entry.unit == "m" for entry in vectors(mechanism).q]
+        self._evaluation = Evaluation(functions)
+        self._functions = functions
+        self._proof = Proof(mechanism, x.independent, x.parameters.groups, x.wrench_frames)
+        samples = self._proof.samples
+        self._samples = [one for one in samples if self._growth(one) <= _REGULAR * limit]
+        if not self._samples:
+            raise InputError(
+                f"{mechanism.name}: all {len(samples)} states near home are nearly singular, with "
+                f"a growth of {min(map(self._growth, samples)):.3g} and more of at most "
+                f"{_REGULAR * limit:.3g}; there is none for the self-test"
+            )
+
+    def of(self, name: str, inputs: Sequence[str], count: int) -> list[Case]:
+        """Return the cases of a function or routine, of its first `count` results."""
+        return [self._case(name, inputs, count, sample) for sample in self._samples]
+
+    def _growth(self, sample: Sample) -> float:
+        """Return growth at a state; infinity if its loops are open."""
+        function = self._functions["forward_dynamics"]
+        inputs = [function.name_in(i) for i in range(function.n_in())]
+        given = self._given("forward_dynamics", inputs, sample)
+        opening, growth = self._evaluation("forward_dynamics", given)[-1]
+        return float(growth) if opening <= 1.0 else np.inf
+
+    def _given(self, name: str, inputs: Sequence[str], sample: Sample) -> list[Array]:
+        values = {**sample._asdict(), "h": np.array([STEP])}
+        if name in ("closed", "gaps"):
+            values["q"] = sample.near
+        return [np.asarray(values[key], dtype=np.float64) for key in inputs]
+
+    def _case(self, name: str, inputs: Sequence[str], count: int, sample: Sample) -> Case:
+        given = self._given(name, inputs, sample)
+
+        def evaluate(given: Sequence[Array]) -> list[Array]:
+            return self._evaluation(name, given)[:count]
+
+        answers = [*self._proof.expected(name, sample, evaluate(given)), *[None] * count][:count]
+        expected = [None if one is None else np.ravel(one) for one in answers]
+        scales = [self._scale(key, one) for key, one in zip(inputs, given, strict=True)]
+        return Case(tuple(given), tuple(expected), conditions(evaluate, given, scales))
+
+    def _scale(self, argument: str, value: Array) -> Array:
+        """Return the sizes of an argument's numbers: angles against the characteristic length."""
+        unit = self._system.column_scale
+        if argument == "q":
+            least = np.where(self._lengths, self._system.equations.length, 1.0)
+            return np.maximum(np.abs(value), least)
+        units = {
+            "v": unit,
+            "a": unit,
+            "u": unit[self._independent],
+            "w": unit[self._independent],
+            "tau": 1.0 / unit[self._system.actuated],
+        }
+        if argument in units:
+            own = units[argument]
+            return np.asarray(own * np.abs(value / own).max(initial=0.0))
+        return np.abs(value)
