@@ -10,6 +10,7 @@ import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
+from rps_pin.errors import RPSPinError
 
 
 class Real(StrEnum):
@@ -78,14 +79,20 @@ def export_c_command(
 
     - `rps-pin export c mine.yaml -o mine_c --real float --parameters payload:tool`
     """
-    from rps_pin.codegen.export.c_files import c_files, write_c_files
-    from rps_pin.codegen.export.mechanism import mechanism_package
-    from rps_pin.codegen.export.names import identifier
+    try:
+        from rps_pin.codegen.export.c_files import c_files, write_c_files
+        from rps_pin.codegen.export.mechanism import mechanism_package
+        from rps_pin.codegen.export.names import identifier
+    except ModuleNotFoundError as error:
+        raise RPSPinError(
+            f"code is generated with {error.name}: pip install 'rps-pin[compile]'"
+        ) from None
 
     mechanism, path = options.load_mechanism(file)
+    called = identifier(mechanism.name, path.stem) if name is None else identifier(name)
     package = mechanism_package(
         mechanism,
-        name=identifier(name) if name is not None else identifier(mechanism.name, path.stem),
+        name=called,
         real=real.value,
         functions=functions or (),
         frames=frames or (),
