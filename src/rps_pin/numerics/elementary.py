@@ -13,8 +13,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from rps_pin.numerics.compiled import kernel, kernel_for_floats
-
 _NUMERIC = (np.ndarray, np.number, complex, int)
 #: A float, an array, a complex number or array, or a CasADi expression.
 Number: TypeAlias = Any
@@ -29,20 +27,12 @@ def _function(name: str) -> Callable[[Number], Number]:
             return on_float(x)
         return on_array(x) if isinstance(x, _NUMERIC) else getattr(x, name)()
 
-    def of_float(x: float) -> float:
-        return float(on_float(x))
-
-    return kernel_for_floats(of_float)(function)
+    return function
 
 
 sqrt, cos, sin, tanh = _function("sqrt"), _function("cos"), _function("sin"), _function("tanh")
 
 
-def _atan2(y: float, x: float) -> float:
-    return math.atan2(y, x)
-
-
-@kernel_for_floats(_atan2)
 def atan2(y: Number, x: Number) -> Number:
     """Return the angle of (x, y) from the x axis, -pi to pi; of complex numbers to first order."""
     if type(y) is float and type(x) is float:
@@ -55,7 +45,6 @@ def atan2(y: Number, x: Number) -> Number:
     return np.arctan2(b, a) + 1j * (a * np.imag(y) - b * np.imag(x)) / (a * a + b * b)
 
 
-@kernel_for_floats(lambda a, b: a < b)
 def less(a: Number, b: Number) -> Number:
     """Return whether a < b, of the real parts."""
     if type(a) is float and type(b) is float:
@@ -65,7 +54,6 @@ def less(a: Number, b: Number) -> Number:
     return a < b
 
 
-@kernel_for_floats(lambda condition, yes, no: yes if condition else no)
 def select(condition: Number, yes: Number, no: Number) -> Number:
     """Return one of two numbers; both are evaluated."""
     if condition is True or condition is False:  # of floats: the fast path
@@ -75,11 +63,15 @@ def select(condition: Number, yes: Number, no: Number) -> Number:
     return _casadi().if_else(condition, yes, no)
 
 
-def _greatest(a: float, b: float, c: float) -> float:
-    return max(a, b, c)
+def both(one: Number, other: Number) -> Number:
+    """Return whether two conditions hold."""
+    if one is True or one is False:
+        return other if one else False
+    if isinstance(one, (np.ndarray, np.bool_)):
+        return one & other
+    return _casadi().logic_and(one, other)
 
 
-@kernel_for_floats(_greatest)
 def greatest(a: Number, b: Number, c: Number) -> Number:
     """Return the greatest of three numbers."""
     if type(a) is float and type(b) is float and type(c) is float:
@@ -90,14 +82,12 @@ def greatest(a: Number, b: Number, c: Number) -> Number:
     return select(less(most, c), c, most)
 
 
-@kernel
 def clamp(x: Number, lower: Number, upper: Number) -> Number:
     """Return x, or the bound that it passes; the lower one of NaN."""
     bounded = select(less(lower, x), x, lower)
     return select(less(bounded, upper), bounded, upper)
 
 
-@kernel_for_floats(lambda condition, yes, no: yes if condition else no)
 def select_all(condition: Number, yes: tuple[Number, ...], no: tuple[Number, ...]) -> Any:
     """Return one of two tuples of numbers: `select` of each."""
     if condition is True or condition is False:
@@ -105,16 +95,18 @@ def select_all(condition: Number, yes: tuple[Number, ...], no: tuple[Number, ...
     return tuple(select(condition, one, other) for one, other in zip(yes, no, strict=True))
 
 
-@kernel_for_floats(lambda condition: condition)
 def always(condition: Number) -> bool:
-    """Return whether a condition holds, of arrays everywhere."""
-    return condition if condition is True or condition is False else bool(condition.all())
+    """Return whether a condition holds, of arrays everywhere; not known of expressions: False."""
+    if condition is True or condition is False:
+        return condition
+    return isinstance(condition, (np.ndarray, np.bool_)) and bool(condition.all())
 
 
-@kernel_for_floats(lambda condition: not condition)
 def never(condition: Number) -> bool:
-    """Return whether a condition does not hold, of arrays nowhere."""
-    return not (condition if condition is True or condition is False else condition.any())
+    """Return whether a condition holds nowhere; not known of expressions: False."""
+    if condition is True or condition is False:
+        return not condition
+    return isinstance(condition, (np.ndarray, np.bool_)) and not condition.any()
 
 
 def is_real_array(x: Number) -> bool:

@@ -21,7 +21,6 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.closures import joint_id
 from rps_pin.errors import InputError, MechanismError
-from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number, tanh
 from rps_pin.validation import positive_number, read_only, real_vector
 
@@ -29,7 +28,6 @@ from rps_pin.validation import positive_number, read_only, real_vector
 FRICTION_SPEED = 1e-2
 
 
-@kernel
 def friction_force(
     speed: Number, damping: Number, friction: Number, friction_speed: Number
 ) -> Number:
@@ -37,7 +35,6 @@ def friction_force(
     return damping * speed + friction * tanh(speed / friction_speed)
 
 
-@kernel
 def friction_slope(
     speed: Number, damping: Number, friction: Number, friction_speed: Number
 ) -> Number:

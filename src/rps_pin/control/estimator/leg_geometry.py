@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rps_pin.numerics.compiled import compiled, kernel
 from rps_pin.rps.kernels import leg_equations, legs
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions, tilt_functions
 from rps_pin.rps.kernels.tips import at_legs, tips
@@ -35,14 +34,12 @@ class LegGeometry(NamedTuple):
     """Coefficients of the rotation and their derivatives."""
 
 
-@kernel
 def in_range(pose: Triple, g: float, h: float) -> bool:
     """Return whether a pose's height is below `LARGEST_LENGTH` and its tilt below a whole turn."""
     z, x, y = pose
     return abs(z) < LARGEST_LENGTH * (g + h) and x * x + y * y < _LARGEST_TILT_SQUARED
 
 
-@compiled
 def leg_geometry(pose: Triple, g: float, h: float) -> LegGeometry | None:
     """Return the leg geometry; None if the pose is out of range, or a leg has no length."""
     if not in_range(pose, g, h):
@@ -61,7 +58,6 @@ def leg_geometry(pose: Triple, g: float, h: float) -> LegGeometry | None:
     return LegGeometry(pose, (d1, d2, d3), angle, (c1, c2, c3, s1, s2, s3), tilt)
 
 
-@compiled
 def closure_determinant(geometry: LegGeometry, g: float, h: float) -> float:
     """Return Eq. 8's determinant without unit, -1 to 1: `leg_equations.determinant`.
 

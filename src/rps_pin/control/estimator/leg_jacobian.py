@@ -14,7 +14,6 @@ import eigenpy
 import numpy as np
 
 from rps_pin.control.estimator.leg_geometry import LegGeometry
-from rps_pin.numerics.compiled import compiled
 from rps_pin.rps.kernels.forces import cofactors, column_products, row_products
 from rps_pin.rps.kernels.legs import along_leg
 from rps_pin.rps.kernels.tips import at_legs, speed_form, tip_slopes
@@ -42,7 +41,6 @@ class LegJacobian(NamedTuple):
     """Of M = K L^-T, -1 to 1: `SingularityMeasures.determinant`."""
 
 
-@compiled
 def leg_jacobian(geometry: LegGeometry, h: float) -> LegJacobian:
     """Return the Jacobian in a pose."""
     (_, x, y), (c1, c2, c3, s1, s2, s3) = geometry.pose, geometry.direction
@@ -62,27 +60,23 @@ def leg_jacobian(geometry: LegGeometry, h: float) -> LegJacobian:
     return LegJacobian(K, inverse, by_legs, L, by_legs / (_SQRT3 * L[0] * L[2]))
 
 
-@compiled
 def pose_rate(jacobian: LegJacobian, speed: Triple) -> Triple:
     """Return pose' of K pose' = d'. The determinant must not be zero."""
     a, b, c = column_products(jacobian.cofactors, speed)
     return a / jacobian.by_legs, b / jacobian.by_legs, c / jacobian.by_legs
 
 
-@compiled
 def force_of_wrench(jacobian: LegJacobian, wrench: Triple) -> Triple:
     """Return f of K' f = wrench on the pose. The determinant must not be zero."""
     a, b, c = row_products(jacobian.cofactors, wrench)
     return a / jacobian.by_legs, b / jacobian.by_legs, c / jacobian.by_legs
 
 
-@compiled
 def wrench_of_force(jacobian: LegJacobian, force: Triple) -> Triple:
     """Return K' f: N, N m, N m."""
     return column_products(jacobian.K, force)
 
 
-@compiled
 def leg_speed(jacobian: LegJacobian, rate: Triple) -> Triple:
     """Return K pose', m/s; or K pose'', m/s^2, the accelerations without those of the rate."""
     return row_products(jacobian.K, rate)

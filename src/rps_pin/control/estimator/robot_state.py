@@ -6,7 +6,6 @@ Compositions of `rps_pin.rps.kernels` on floats, compiled as a whole.
 from __future__ import annotations
 
 from rps_pin.control.estimator.leg_geometry import LegGeometry
-from rps_pin.numerics.compiled import compiled
 from rps_pin.rps.kernels import legs, platform
 from rps_pin.rps.kernels import tips as ring
 from rps_pin.rps.kinematics.tracking import Triple
@@ -18,7 +17,6 @@ RobotState = tuple[float, ...]
 _Rings = tuple[ring.Ring, ring.Ring]
 
 
-@compiled
 def robot_state(geometry: LegGeometry, rate: Triple, acceleration: Triple, h: float) -> RobotState:
     """Return the state, 37 numbers, of a pose and its first and second time derivatives."""
     (z, x, y), (d1, d2, d3), (phi1, phi2, phi3), _, tilt = geometry
@@ -46,7 +44,6 @@ def robot_state(geometry: LegGeometry, rate: Triple, acceleration: Triple, h: fl
     )
 
 
-@compiled
 def leg_motion(
     geometry: LegGeometry, rate: Triple, acceleration: Triple, h: float
 ) -> tuple[Triple, Triple]:
@@ -56,7 +53,6 @@ def leg_motion(
     return speeds, changes
 
 
-@compiled
 def _tip_motion(
     geometry: LegGeometry, rate: Triple, acceleration: Triple, h: float
 ) -> tuple[_Rings, _Rings]:
@@ -71,7 +67,6 @@ def _tip_motion(
     )
 
 
-@compiled
 def _leg_motions(
     geometry: LegGeometry, rates: _Rings, accelerations: _Rings
 ) -> tuple[Triple, Triple, Triple, Triple]:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from rps_pin.control.estimator.leg_geometry import LegGeometry
 from rps_pin.control.estimator.leg_jacobian import LegJacobian, leg_jacobian, pose_rate
-from rps_pin.numerics.compiled import compiled
 from rps_pin.rps.kernels.platform import angular_velocity
 from rps_pin.rps.kernels.tilt_functions import tilt_functions
 from rps_pin.rps.kernels.tips import tip_rates, tip_slopes
@@ -31,7 +30,6 @@ class StateEstimate(NamedTuple):
     jacobian: LegJacobian
 
 
-@compiled
 def platform_twist(geometry: LegGeometry, rate: Triple, h: float) -> Twist:
     """Return the platform's twist."""
     (_, x, y), (dz, dx, dy) = geometry.pose, rate
@@ -41,7 +39,6 @@ def platform_twist(geometry: LegGeometry, rate: Triple, h: float) -> Twist:
     return 0.5 * vx, 0.5 * vy, dz, w_x, w_y, -w_z
 
 
-@compiled
 def state_estimate(
     d: Triple, direction: LegDirections, speed: Triple, g: float, h: float
 ) -> tuple[StateEstimate, Twist] | None:

@@ -8,7 +8,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from rps_pin.control.estimator.leg_geometry import LegGeometry
-from rps_pin.numerics.compiled import compiled
 from rps_pin.rps.kernels.legs import cone_cosine, rest_axis
 from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE, within
 from rps_pin.rps.kinematics.legs import RADIAL, cone_angles, violations
@@ -70,7 +69,6 @@ class RobotLimits:
         ]
 
 
-@compiled
 def _within_limits(geometry: LegGeometry, bounds: _Bounds) -> bool:
     """Return whether every leg keeps its limits, to rounding."""
     shortest, longest, least, greatest, least_cosine, cos_r, sin_r = bounds

@@ -16,10 +16,10 @@ from __future__ import annotations
 
 import math
 
-from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import (
     Number,
     always,
+    both,
     clamp,
     less,
     never,
@@ -40,11 +40,11 @@ Progress = tuple[Number, Number, Number]
 TRUST = 0.25
 #: Half a Newton step, rad, after which another would only move rounding errors.
 _LAST_STEP = 1e-9
-_MOST_NEWTON = 12
+#: Newton steps after which one that has not converged is given up.
+MOST_NEWTON = 12
 _SINGULAR = 1e-300
 
 
-@kernel
 def newton_step(d: Three, direction: Direction, g: Number, h: Number) -> Step:
     """Return half a Newton step of Eq. 8 in each angle, rad, and the numbers that judge it."""
     c1, c2, c3, s1, s2, s3 = direction
@@ -68,7 +68,6 @@ def newton_step(d: Three, direction: Direction, g: Number, h: Number) -> Step:
     )
 
 
-@kernel
 def chord_step(
     d: Three, direction: Direction, g: Number, h: Number, adjugate: Matrix, half: Number
 ) -> Ring:
@@ -78,7 +77,6 @@ def chord_step(
     return eq.matrix_times(adjugate, eq.residuals(w, z, g, eq.constants(d, g, h)), half)
 
 
-@kernel
 def turned_legs(direction: Direction, t: Ring) -> Direction:
     """Return the legs' directions turned by 2 atan(t) each."""
     c1, c2, c3, s1, s2, s3 = direction
@@ -88,7 +86,6 @@ def turned_legs(direction: Direction, t: Ring) -> Direction:
     return c1, c2, c3, s1, s2, s3
 
 
-@kernel
 def unit_directions(direction: Direction) -> Direction:
     """Return the legs' directions at length one: the errors of millions of turns would add up."""
     c1, c2, c3, s1, s2, s3 = direction
@@ -98,33 +95,80 @@ def unit_directions(direction: Direction) -> Direction:
     return c1, c2, c3, s1, s2, s3
 
 
-@kernel
+def newton_and_chord(d: Three, direction: Direction, g: Number, h: Number, step: Step) -> Direction:
+    """Return the legs' directions after a Newton step and a chord step by the same inverse."""
+    t, _, _, _, adjugate, half = step
+    at = turned_legs(direction, t)
+    if always(less(eq.largest(t), _LAST_STEP)):
+        return at
+    return turned_legs(at, chord_step(d, at, g, h, adjugate, half))
+
+
+def refined(
+    d: Three, at: Direction, g: Number, h: Number, limit: Number, det: Number
+) -> tuple[Direction, Number, Number, Number]:
+    """Return directions after a Newton step, condition, whether it was the last, and was good.
+
+    `det` is the determinant at the line's step's beginning, whose sign must not change.
+    """
+    t, det_there, there, _, _, _ = newton_step(d, at, g, h)
+    # The remaining error is the step's square: below rounding.
+    last = less(eq.largest(t), _LAST_STEP)
+    good = both(there <= limit, less(0.0, det * det_there))
+    return turned_legs(at, t), there, last, good
+
+
 def solve_step(
     d: Three, direction: Direction, g: Number, h: Number, limit: Number
 ) -> tuple[Number, Direction, Number, Number]:
-    """Return whether lengths are solved, directions, condition, and the step's change of length."""
-    t, det, condition, kantorovich, adjugate, half = newton_step(d, direction, g, h)
-    trusted = (kantorovich <= TRUST) & (condition <= limit)
-    solved, there, at = trusted, condition, direction
-    if not never(trusted):
-        at = turned_legs(direction, t)
-        if not always(less(eq.largest(t), _LAST_STEP)):
-            at = turned_legs(at, chord_step(d, at, g, h, adjugate, half))
-        for _ in range(_MOST_NEWTON):
-            t, det_there, there, _, _, _ = newton_step(d, at, g, h)
-            at = turned_legs(at, t)
-            # The remaining error is the step's square: below rounding.
-            converged = less(eq.largest(t), _LAST_STEP)
-            solved = trusted & converged & (there <= limit) & less(0.0, det * det_there)
-            if always(select(trusted, converged, True)):
-                break
-        at = unit_directions(at)
+    """Return whether lengths are solved, directions, condition, and beta L eta at the beginning."""
+    step = newton_step(d, direction, g, h)
+    _, det, condition, kantorovich, _, _ = step
+    solved = trusted = to_be_trusted(condition, kantorovich, limit)
+    if never(trusted):
+        return trusted, direction, condition, kantorovich
+    at = newton_and_chord(d, direction, g, h, step)
+    for _ in range(MOST_NEWTON):
+        at, condition, last, good = refined(d, at, g, h, limit, det)
+        solved = both(trusted, both(last, good))
+        if always(select(trusted, last, True)):
+            break
+    return solved, at, condition, kantorovich
+
+
+def to_be_trusted(condition: Number, kantorovich: Number, limit: Number) -> Number:
+    """Return whether the theorem holds at a step's beginning, far enough from singularities."""
+    return both(kantorovich <= TRUST, condition <= limit)
+
+
+def step_end(
+    begin: Three, goal: Three, progress: Progress
+) -> tuple[Number, tuple[Number, Number, Number]]:
+    """Return the part of the line gone at the end of the next step, and the lengths there."""
+    (b1, b2, b3), (e1, e2, e3), (done, share, _) = begin, goal, progress
+    to = select(less(done + share, 1.0), done + share, 1.0)
+    back = 1.0 - to  # exactly the goal at its end
+    return to, (e1 + back * (b1 - e1), e2 + back * (b2 - e2), e3 + back * (b3 - e3))
+
+
+def after_step(
+    direction: Direction,
+    progress: Progress,
+    to: Number,
+    step: tuple[Number, Direction, Number, Number],
+) -> tuple[Direction, Progress]:
+    """Return directions and progress after a step, of `solve_step`, to a part of the line."""
+    solved, at, there, kantorovich = step
+    done, share, condition = progress
     ratio = 0.8 * TRUST / clamp(kantorovich, 1e-9, math.inf)
     factor = clamp(ratio, select(solved, 0.5, 0.02), select(solved, 4.0, 0.5))
-    return solved, select_all(solved, at, direction), there, factor
+    return select_all(solved, unit_directions(at), direction), (
+        select(solved, to, done),
+        share * factor,
+        select(solved, there, condition),
+    )
 
 
-@kernel
 def follow_legs(
     begin: Three,
     direction: Direction,
@@ -151,15 +195,11 @@ def follow_legs(
     most
         Largest number of steps, those that had to be shortened among them.
     """
-    (b1, b2, b3), (e1, e2, e3), (g, h) = begin, goal, radii
-    done, share, condition = progress
+    g, h = radii
     for _ in range(most):
-        to = select(less(done + share, 1.0), done + share, 1.0)
-        back = 1.0 - to  # exactly the goal at its end
-        d = (e1 + back * (b1 - e1), e2 + back * (b2 - e2), e3 + back * (b3 - e3))
-        solved, direction, there, factor = solve_step(d, direction, g, h, limit)
-        done, condition = select(solved, to, done), select(solved, there, condition)
-        share = share * factor
-        if always(done == 1.0):
+        to, d = step_end(begin, goal, progress)
+        step = solve_step(d, direction, g, h, limit)
+        direction, progress = after_step(direction, progress, to, step)
+        if always(progress[0] == 1.0):
             break
-    return direction, (done, share, condition)
+    return direction, progress

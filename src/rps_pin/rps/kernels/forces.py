@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
-from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kernels.platform import Vector
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions
@@ -20,7 +19,6 @@ __all__ = ["friction_force"]
 Rows = Sequence[Three]
 
 
-@kernel
 def rod_force(
     mass: Number, com: Number, d: Number, motion: tuple[Number, Number, Number], weight: Number
 ) -> Number:
@@ -33,7 +31,6 @@ def rod_force(
     return mass * (acceleration - (d - com) * (angle_rate * angle_rate) - weight)
 
 
-@kernel
 def cylinder_moment(
     moment: Number, inertia: Number, angle_acceleration: Number, fall: Number
 ) -> Number:
@@ -45,7 +42,6 @@ def cylinder_moment(
     return inertia * angle_acceleration - moment * fall
 
 
-@kernel
 def rod_moment(
     mass: Number, reach: Number, coriolis: Number, angle_acceleration: Number, fall: Number
 ) -> Number:
@@ -56,7 +52,6 @@ def rod_moment(
     return mass * reach * (reach * angle_acceleration + coriolis - fall)
 
 
-@kernel
 def virtual_work(
     slopes: Slopes, radial: Three, height: Three, force: Vector, couple: tuple[Number, Number]
 ) -> Three:
@@ -89,7 +84,6 @@ def virtual_work(
     )
 
 
-@kernel
 def tilt_couple(x: Number, y: Number, tilt: TiltFunctions, moment: Vector) -> tuple[Number, Number]:
     """Return the generalised moment by tilt_x and tilt_y of a moment in platform axes.
 
@@ -99,7 +93,6 @@ def tilt_couple(x: Number, y: Number, tilt: TiltFunctions, moment: Vector) -> tu
     return moment[0] + y * spin, moment[1] - x * spin
 
 
-@kernel
 def cofactors(rows: Rows) -> tuple[tuple[Vector, Vector, Vector], Number]:
     """Return the cofactors of a 3 x 3 matrix, row by row, and its determinant.
 
@@ -117,7 +110,6 @@ def cofactors(rows: Rows) -> tuple[tuple[Vector, Vector, Vector], Number]:
     )
 
 
-@kernel
 def row_products(rows: Rows, vector: Three) -> Vector:
     """Return M v: of K, the legs' speeds of a pose's rate."""
     first, second, third = rows
@@ -129,7 +121,6 @@ def row_products(rows: Rows, vector: Three) -> Vector:
     )
 
 
-@kernel
 def column_products(rows: Rows, vector: Three) -> Vector:
     """Return M' v: of K, the wrench on the pose of actuator forces."""
     first, second, third = rows
@@ -141,7 +132,6 @@ def column_products(rows: Rows, vector: Three) -> Vector:
     )
 
 
-@kernel
 def squared_norm(rows: Rows) -> Number:
     """Return the sum of the squares of a matrix's entries."""
     (a, b, c), (d, e, f), (g, h, i) = rows

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import math
 
-from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number, greatest, sqrt
 from rps_pin.rps.kernels.tips import Ring, Three
 
@@ -32,7 +31,6 @@ Matrix = tuple[Number, Number, Number, Number, Number, Number, Number, Number, N
 _ROOT_3 = math.sqrt(3.0)
 
 
-@kernel
 def constants(d: Three, g: Number, h: Number) -> Ring:
     """Return what of f_12, f_23 and f_31 does not change with the angles, m^2."""
     square_1, square_2, square_3 = d[0] * d[0], d[1] * d[1], d[2] * d[2]
@@ -40,7 +38,6 @@ def constants(d: Three, g: Number, h: Number) -> Ring:
     return square_1 + square_2 - rest, square_2 + square_3 - rest, square_3 + square_1 - rest
 
 
-@kernel
 def residuals(w: Three, z: Three, g: Number, constant: Three) -> Ring:
     """Return f_12, f_23 and f_31, m^2."""
     m1, m2, m3 = 3.0 * g - w[0], 3.0 * g - w[1], 3.0 * g - w[2]
@@ -51,7 +48,6 @@ def residuals(w: Three, z: Three, g: Number, constant: Three) -> Ring:
     )
 
 
-@kernel
 def slopes(w: Three, z: Three, g: Number) -> Slopes:
     """Return the derivatives by the angles, a1, a2, b2, b3, c3, c1, m^2."""
     m1, m2, m3 = 3.0 * g - w[0], 3.0 * g - w[1], 3.0 * g - w[2]
@@ -67,21 +63,18 @@ def slopes(w: Three, z: Three, g: Number) -> Slopes:
     )
 
 
-@kernel
 def determinant(by_angle: Slopes) -> Number:
     """Return the determinant of the Jacobian, m^6."""
     a1, a2, b2, b3, c3, c1 = by_angle
     return a1 * b2 * c3 + a2 * b3 * c1
 
 
-@kernel
 def determinant_scale(d: Three, h: Number) -> Number:
     """Return the unit in which the determinant is one of cosines, -1 to 1: m^6."""
     side = 2.0 * _ROOT_3 * h
     return side * side * side * d[0] * d[1] * d[2]
 
 
-@kernel
 def adjugate(by_angle: Slopes) -> Matrix:
     """Return the adjugate of the Jacobian, m^4: the inverse times the determinant."""
     a1, a2, b2, b3, c3, c1 = by_angle
@@ -92,7 +85,6 @@ def adjugate(by_angle: Slopes) -> Matrix:
     )
 
 
-@kernel
 def matrix_times(matrix: Matrix, f: Three, scale: Number) -> Ring:
     """Return a matrix times three residuals, times a number."""
     m11, m12, m13, m21, m22, m23, m31, m32, m33 = matrix
@@ -104,21 +96,18 @@ def matrix_times(matrix: Matrix, f: Three, scale: Number) -> Ring:
     )
 
 
-@kernel
 def turned(w: Number, z: Number, t: Number) -> tuple[Number, Number]:
     """Return the vector (w, z) turned by 2 atan(t): a Newton step of 2 t, to second order."""
     sine = 2.0 * t / (1.0 + t * t)  # 1 - cosine is t sine
     return w - sine * (z + t * w), z + sine * (w - t * z)
 
 
-@kernel
 def unit_length(w: Number, z: Number) -> tuple[Number, Number]:
     """Return a vector of length close to 1 with the length 1, to second order."""
     scale = 1.5 - 0.5 * (w * w + z * z)
     return scale * w, scale * z
 
 
-@kernel
 def distance_errors(w: Three, z: Three, g: Number, h: Number) -> Ring:
     """Return |B_i - B_j| - sqrt(3) h for each pair, m, without the cancellation of Eq. 8."""
     r1, r2, r3 = g - w[0], g - w[1], g - w[2]
@@ -131,14 +120,12 @@ def distance_errors(w: Three, z: Three, g: Number, h: Number) -> Ring:
     )
 
 
-@kernel
 def jacobian_norm(by_angle: Slopes) -> Number:
     """Return the norm of the Jacobian, m^2."""
     a1, a2, b2, b3, c3, c1 = by_angle
     return greatest(abs(a1) + abs(a2), abs(b2) + abs(b3), abs(c3) + abs(c1))
 
 
-@kernel
 def matrix_norm(matrix: Matrix) -> Number:
     """Return the norm of a full matrix."""
     m11, m12, m13, m21, m22, m23, m31, m32, m33 = matrix
@@ -149,13 +136,11 @@ def matrix_norm(matrix: Matrix) -> Number:
     )
 
 
-@kernel
 def largest(values: Three) -> Number:
     """Return the largest size of three numbers."""
     return greatest(abs(values[0]), abs(values[1]), abs(values[2]))
 
 
-@kernel
 def curvature_bound(d: Three, g: Number) -> Number:
     """Return L, a bound of |f''|, m^2: f_ij'' is at most 3 g (d_i + d_j) + 8 d_i d_j."""
     d1, d2, d3 = d

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number, sqrt
 from rps_pin.rps.kernels.platform import Vector
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions
@@ -23,7 +22,6 @@ from rps_pin.rps.kernels.tilt_functions import TiltFunctions
 Pair = Sequence[Number]
 
 
-@kernel
 def leg_geometry(radial: Number, height: Number, g: Number) -> Vector:
     """Return length d (m), cos(phi) and sin(phi) of a leg; d must not vanish."""
     inwards = g - radial
@@ -31,19 +29,16 @@ def leg_geometry(radial: Number, height: Number, g: Number) -> Vector:
     return d, inwards / d, height / d
 
 
-@kernel
 def along_leg(cosine: Number, sine: Number, radial: Number, height: Number) -> Number:
     """Return s . (radial, height): of the tip's slopes, K; of its velocity, d'."""
     return sine * height - cosine * radial
 
 
-@kernel
 def across_leg(cosine: Number, sine: Number, radial: Number, height: Number) -> Number:
     """Return t . (radial, height): of the tip's slopes, d N; of its velocity, d phi'."""
     return sine * radial + cosine * height
 
 
-@kernel
 def leg_acceleration(
     speed: Number, angle_rate: Number, d: Number, along: Number, across: Number
 ) -> tuple[Number, Number]:
@@ -54,7 +49,6 @@ def leg_acceleration(
     )
 
 
-@kernel
 def leg_motion(
     cosine: Number, sine: Number, d: Number, velocity: Pair, acceleration: Pair
 ) -> tuple[Number, Number, Number, Number]:
@@ -67,7 +61,6 @@ def leg_motion(
     return speed, angle_rate, push, turn
 
 
-@kernel
 def rest_axis(e: Number, t: Number, tilt: TiltFunctions, cos_r: Number, sin_r: Number) -> Vector:
     """Return the rest axis of a leg's spherical joint along e, across its plane, and up.
 
@@ -82,7 +75,6 @@ def rest_axis(e: Number, t: Number, tilt: TiltFunctions, cos_r: Number, sin_r: N
     )
 
 
-@kernel
 def rest_axis_rate(
     e: Number,
     t: Number,
@@ -102,13 +94,11 @@ def rest_axis_rate(
     )
 
 
-@kernel
 def cone_cosine(cosine: Number, sine: Number, axis_out: Number, axis_up: Number) -> Number:
     """Return the cosine of the angle between a leg and its joint's rest axis."""
     return sine * axis_up - cosine * axis_out
 
 
-@kernel
 def cone_sine(
     cosine: Number, sine: Number, axis_out: Number, axis_across: Number, axis_up: Number
 ) -> Number:

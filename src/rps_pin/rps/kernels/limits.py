@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number
 
 #: Limits are kept to rounding error, m or rad.
 LIMIT_TOLERANCE = 1e-12
 
 
-@kernel
 def within(value: Number, lower: Number, upper: Number) -> Number:
     """Return whether a value keeps its limits, to rounding."""
     return (value >= lower - LIMIT_TOLERANCE) & (value <= upper + LIMIT_TOLERANCE)

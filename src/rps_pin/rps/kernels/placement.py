@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 
-from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number, atan2, less, select, sqrt
 from rps_pin.rps.kernels.platform import Vector
 from rps_pin.rps.kernels.tips import Three
@@ -20,7 +19,6 @@ Direction = tuple[Number, Number, Number, Number, Number, Number]
 _ROOT_3 = math.sqrt(3.0)
 
 
-@kernel
 def platform_axes(rho: Three, z: Three, h: Number) -> tuple[Vector, Vector, Vector]:
     """Return the centre (m) and the platform's first two axes u and v, in base axes."""
     outwards, across = 0.5 * (rho[1] + rho[2]), 0.5 * (rho[1] - rho[2])
@@ -33,7 +31,6 @@ def platform_axes(rho: Three, z: Three, h: Number) -> tuple[Vector, Vector, Vect
     )
 
 
-@kernel
 def tilt_of_axes(
     u_x: Number, u_y: Number, u_z: Number, v_y: Number, v_z: Number
 ) -> tuple[Number, Number]:
@@ -65,7 +62,6 @@ def tilt_of_axes(
     return q_x * factor, q_y * factor
 
 
-@kernel
 def pose_of_legs(d: Three, direction: Direction, g: Number, h: Number) -> Vector:
     """Return (z, tilt_x, tilt_y) of legs that close the robot: their lengths and directions."""
     c1, c2, c3, s1, s2, s3 = direction

@@ -10,7 +10,6 @@ component. Vectors are triples of numbers; the moment of inertia is (xx, yy, zz,
 
 from __future__ import annotations
 
-from rps_pin.numerics.compiled import kernel
 from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions, stumpff
 
@@ -18,7 +17,6 @@ Vector = tuple[Number, Number, Number]
 Inertia = tuple[Number, Number, Number, Number, Number, Number]
 
 
-@kernel
 def rotation(x: Number, y: Number, tilt: TiltFunctions) -> tuple[Vector, Vector, Vector]:
     """Return the rows of the rotation from platform to base axes."""
     a, b, c = tilt[0], tilt[1], tilt[2]
@@ -30,14 +28,12 @@ def rotation(x: Number, y: Number, tilt: TiltFunctions) -> tuple[Vector, Vector,
     )
 
 
-@kernel
 def quaternion(x: Number, y: Number) -> Vector:
     """Return the components x, y and w of the unit quaternion; z is zero."""
     half = stumpff(0.25 * (x * x + y * y))
     return 0.5 * x * half[1], 0.5 * y * half[1], half[0]
 
 
-@kernel
 def to_base(x: Number, y: Number, tilt: TiltFunctions, vector: Vector) -> Vector:
     """Return R v: a vector in platform axes turned to base axes."""
     v_x, v_y, v_z = vector
@@ -50,13 +46,11 @@ def to_base(x: Number, y: Number, tilt: TiltFunctions, vector: Vector) -> Vector
     )
 
 
-@kernel
 def to_platform(x: Number, y: Number, tilt: TiltFunctions, vector: Vector) -> Vector:
     """Return R' v: a vector in base axes turned to platform axes."""
     return to_base(-x, -y, tilt, vector)
 
 
-@kernel
 def angular_velocity(x: Number, y: Number, dx: Number, dy: Number, tilt: TiltFunctions) -> Vector:
     """Return the angular velocity in platform axes."""
     m = x * dy - y * dx
@@ -64,7 +58,6 @@ def angular_velocity(x: Number, y: Number, dx: Number, dy: Number, tilt: TiltFun
     return dx + n * y, dy - n * x, -tilt[1] * m
 
 
-@kernel
 def angular_acceleration(
     x: Number,
     y: Number,
@@ -86,19 +79,16 @@ def angular_acceleration(
     )
 
 
-@kernel
 def cross(a: Vector, b: Vector) -> Vector:
     """Return a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@kernel
 def total(a: Vector, b: Vector) -> Vector:
     """Return a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@kernel
 def inertia_times(inertia: Inertia, vector: Vector) -> Vector:
     """Return the moment of inertia times a vector."""
     xx, yy, zz, xy, xz, yz = inertia
@@ -110,19 +100,16 @@ def inertia_times(inertia: Inertia, vector: Vector) -> Vector:
     )
 
 
-@kernel
 def principal_times(inertia: Inertia, vector: Vector) -> Vector:
     """Return the same for an inertia without products: xy = xz = yz = 0."""
     return inertia[0] * vector[0], inertia[1] * vector[1], inertia[2] * vector[2]
 
 
-@kernel
 def turning_moment(omega: Vector, spin: Vector, spin_rate: Vector) -> Vector:
     """Return I alpha + omega x I omega, with spin = I omega and spin_rate = I alpha (Euler)."""
     return total(spin_rate, cross(omega, spin))
 
 
-@kernel
 def offset_force(moment: Vector, omega: Vector, alpha: Vector) -> Vector:
     """Return alpha x S + omega x (omega x S), S the mass times the offset of its centre."""
     return total(cross(alpha, moment), cross(omega, cross(omega, moment)))

@@ -15,7 +15,6 @@ import math
 
 import numpy as np
 
-from rps_pin.numerics.compiled import kernel, kernel_for_floats
 from rps_pin.numerics.elementary import Number, cos, is_real_array, less, select, sin, sqrt
 
 #: A, B, C, D, dA/ds, dB/ds, dD/ds, d2A/ds2, d2B/ds2.
@@ -31,7 +30,6 @@ _TERMS = tuple(
 )
 
 
-@kernel
 def tilt_functions(s: Number) -> TiltFunctions:
     """Return A, B, C, D, dA/ds, dB/ds, dD/ds, d2A/ds2, d2B/ds2 of a squared tilt, rad^2."""
     c0, c1, c2, c3, c4, c5, c6 = stumpff(s)
@@ -42,7 +40,6 @@ def tilt_functions(s: Number) -> TiltFunctions:
     )
 
 
-@kernel
 def _from_series(s: Number) -> _Stumpff:
     """Return c_0 to c_6 from the series of c_5 and c_6: of small s."""
     c5, c6 = 0.0 * s, 0.0 * s
@@ -58,7 +55,6 @@ def _from_series(s: Number) -> _Stumpff:
     return 1.0 - s * c2, c1, c2, c3, c4, c5, c6
 
 
-@kernel
 def _by_recursion(s: Number) -> _Stumpff:
     """Return c_0 to c_6, upwards: of s that are not small."""
     beta = sqrt(s)
@@ -68,17 +64,10 @@ def _by_recursion(s: Number) -> _Stumpff:
     return c0, c1, c2, c3, c4, c5, (1.0 / 24.0 - c4) / s
 
 
-def _of_float(s: float) -> _Stumpff:
-    if s < _SERIES_BELOW:
-        return _from_series(s)
-    return _by_recursion(s)
-
-
-@kernel_for_floats(_of_float)
 def stumpff(s: Number) -> _Stumpff:
     """Return the Stumpff functions c_0 to c_6 of s >= 0."""
     if type(s) is float:
-        return _of_float(s)
+        return _from_series(s) if s < _SERIES_BELOW else _by_recursion(s)
     if is_real_array(s):
         if s.max(initial=0.0) < _SERIES_BELOW:
             return _from_series(s)

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rps_pin.numerics.compiled import kernel, kernel_for_floats
 from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions
 
@@ -32,19 +31,12 @@ Slopes = tuple[Ring, Ring, Ring, Ring]
 _HALF_ROOT_3 = math.sqrt(3.0) / 2.0
 
 
-def _of_floats(ring: Ring) -> Ring:
-    mean, x, y = ring
-    between, apart = mean - 0.5 * x, _HALF_ROOT_3 * y
-    return mean + x, between + apart, between - apart
-
-
-@kernel_for_floats(_of_floats)
 def at_legs(ring: Ring) -> Three:
     """Return the numbers of legs 1, 2, 3; arrays are the rows of one array."""
     mean, x, y = ring
-    if not isinstance(x, np.ndarray):
-        return _of_floats(ring)
     between, apart = mean - 0.5 * x, _HALF_ROOT_3 * y
+    if not isinstance(x, np.ndarray):
+        return mean + x, between + apart, between - apart
     legs: NDArray[Any] = np.empty((3, *between.shape), between.dtype)
     np.add(mean, x, out=legs[0])
     np.add(between, apart, out=legs[1])
@@ -52,14 +44,12 @@ def at_legs(ring: Ring) -> Three:
     return legs
 
 
-@kernel
 def resultant(legs: Three) -> Ring:
     """Return the sum of three numbers, and their sum along e_i: x and y."""
     both = legs[1] + legs[2]
     return legs[0] + both, legs[0] - 0.5 * both, _HALF_ROOT_3 * (legs[1] - legs[2])
 
 
-@kernel
 def tips(z: Number, x: Number, y: Number, tilt: TiltFunctions, h: Number) -> tuple[Ring, Ring]:
     """Return the rings of rho and z_i, m. The platform's centre is half of rho's vector."""
     a, b, c = tilt[0], tilt[1], tilt[2]
@@ -70,7 +60,6 @@ def tips(z: Number, x: Number, y: Number, tilt: TiltFunctions, h: Number) -> tup
     )
 
 
-@kernel
 def tip_slopes(x: Number, y: Number, tilt: TiltFunctions) -> Slopes:
     """Return the slopes of the rings by h tilt_x and h tilt_y; by z they are 0 and 1."""
     a, b, a_s, b_s = tilt[0], tilt[1], tilt[4], tilt[5]
@@ -84,7 +73,6 @@ def tip_slopes(x: Number, y: Number, tilt: TiltFunctions) -> Slopes:
     )
 
 
-@kernel
 def tip_rates(slopes: Slopes, dz: Number, hdx: Number, hdy: Number) -> tuple[Ring, Ring]:
     """Return the time derivatives of the rings from those of z, h tilt_x and h tilt_y, m/s."""
     (rx_m, rx_x, rx_y), (ry_m, ry_x, ry_y), (_, zx_x, zx_y), (_, zy_x, zy_y) = slopes
@@ -94,7 +82,6 @@ def tip_rates(slopes: Slopes, dz: Number, hdx: Number, hdy: Number) -> tuple[Rin
     )
 
 
-@kernel
 def tip_accelerations(
     tilt_motion: tuple[Number, Number, Number, Number, Number, Number],
     ddz: Number,
@@ -124,7 +111,6 @@ def tip_accelerations(
     )
 
 
-@kernel
 def tip_slope_rates(x: Number, y: Number, dx: Number, dy: Number, tilt: TiltFunctions) -> Slopes:
     """Return the time derivatives of the slopes, 1/s."""
     a, b, a_s, b_s, a_ss, b_ss = tilt[0], tilt[1], tilt[4], tilt[5], tilt[7], tilt[8]
@@ -150,7 +136,6 @@ def tip_slope_rates(x: Number, y: Number, dx: Number, dy: Number, tilt: TiltFunc
     )
 
 
-@kernel
 def speed_form(slopes: Slopes) -> Ring:
     """Return the tips' squared speeds summed, as a quadratic form of the tilt's rate.
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rps_pin.numerics.compiled import compiled
 from rps_pin.rps.kernels.continuation import follow_legs, newton_step
 from rps_pin.rps.kernels.placement import pose_of_legs
 
@@ -30,14 +29,12 @@ class Followed(NamedTuple):
     """Part of the line that was followed, 1 where its end was reached."""
 
 
-@compiled
 def condition_of(d: Lengths, directions: LegDirections, g: float, h: float) -> float:
     """Return the condition number of Eq. 8's Jacobian by leg angles, in greatest row sums."""
     condition: float = newton_step(d, directions, g, h)[2]
     return condition
 
 
-@compiled
 def follow(
     begin: Lengths,
     directions: LegDirections,
@@ -53,7 +50,6 @@ def follow(
     return Followed(there, progress[2], progress[0])
 
 
-@compiled
 def pose_of(d: Lengths, directions: LegDirections, g: float, h: float) -> Triple:
     """Return the pose (z, tilt_x, tilt_y) of lengths and directions that close the robot."""
     return pose_of_legs(d, directions, g, h)
