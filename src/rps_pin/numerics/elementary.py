@@ -109,6 +109,11 @@ def never(condition: Number) -> bool:
     return isinstance(condition, (np.ndarray, np.bool_)) and not condition.any()
 
 
+def is_zero(x: Number) -> bool:
+    """Return whether this is the number zero; an expression is not."""
+    return isinstance(x, (float, int)) and x == 0
+
+
 def is_real_array(x: Number) -> bool:
     """Return whether this is a NumPy array of real numbers."""
     return isinstance(x, np.ndarray) and x.dtype.kind == "f"

@@ -14,6 +14,7 @@ import eigenpy
 import numpy as np
 
 from rps_pin.control.estimator.leg_geometry import LegGeometry
+from rps_pin.numerics.elementary import Number, sqrt
 from rps_pin.rps.kernels.forces import cofactors, column_products, row_products
 from rps_pin.rps.kernels.legs import along_leg
 from rps_pin.rps.kernels.tips import at_legs, speed_form, tip_slopes
@@ -41,7 +42,7 @@ class LegJacobian(NamedTuple):
     """Of M = K L^-T, -1 to 1: `SingularityMeasures.determinant`."""
 
 
-def leg_jacobian(geometry: LegGeometry, h: float) -> LegJacobian:
+def leg_jacobian(geometry: LegGeometry, h: Number) -> LegJacobian:
     """Return the Jacobian in a pose."""
     (_, x, y), (c1, c2, c3, s1, s2, s3) = geometry.pose, geometry.direction
     slopes = tip_slopes(x, y, geometry.tilt)  # by h tilt
@@ -53,9 +54,9 @@ def leg_jacobian(geometry: LegGeometry, h: float) -> LegJacobian:
         (s3, h * along_leg(c3, s3, rx3, zx3), h * along_leg(c3, s3, ry3, zy3)),
     )
     xx, xy, yy = speed_form(slopes)
-    l_xx = math.sqrt(xx)
+    l_xx = sqrt(xx)
     l_yx = xy / l_xx
-    L = (h * l_xx, h * l_yx, h * math.sqrt(yy - l_yx * l_yx))
+    L = (h * l_xx, h * l_yx, h * sqrt(yy - l_yx * l_yx))
     inverse, by_legs = cofactors(K)
     return LegJacobian(K, inverse, by_legs, L, by_legs / (_SQRT3 * L[0] * L[2]))
 

@@ -6,6 +6,7 @@ Compositions of `rps_pin.rps.kernels` on floats, compiled as a whole.
 from __future__ import annotations
 
 from rps_pin.control.estimator.leg_geometry import LegGeometry
+from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kernels import legs, platform
 from rps_pin.rps.kernels import tips as ring
 from rps_pin.rps.kinematics.tracking import Triple
@@ -17,7 +18,7 @@ RobotState = tuple[float, ...]
 _Rings = tuple[ring.Ring, ring.Ring]
 
 
-def robot_state(geometry: LegGeometry, rate: Triple, acceleration: Triple, h: float) -> RobotState:
+def robot_state(geometry: LegGeometry, rate: Triple, acceleration: Triple, h: Number) -> RobotState:
     """Return the state, 37 numbers, of a pose and its first and second time derivatives."""
     (z, x, y), (d1, d2, d3), (phi1, phi2, phi3), _, tilt = geometry
     _, dx, dy = rate
@@ -45,7 +46,7 @@ def robot_state(geometry: LegGeometry, rate: Triple, acceleration: Triple, h: fl
 
 
 def leg_motion(
-    geometry: LegGeometry, rate: Triple, acceleration: Triple, h: float
+    geometry: LegGeometry, rate: Triple, acceleration: Triple, h: Number
 ) -> tuple[Triple, Triple]:
     """Return the legs' speeds and accelerations: those of `robot_state`, in less time."""
     rates, accelerations = _tip_motion(geometry, rate, acceleration, h)
@@ -54,7 +55,7 @@ def leg_motion(
 
 
 def _tip_motion(
-    geometry: LegGeometry, rate: Triple, acceleration: Triple, h: float
+    geometry: LegGeometry, rate: Triple, acceleration: Triple, h: Number
 ) -> tuple[_Rings, _Rings]:
     """Return the rates and accelerations of the tips, radial and up."""
     _, x, y = geometry.pose

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from rps_pin.control.estimator.leg_geometry import LegGeometry
+from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kernels.legs import cone_cosine, rest_axis
 from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE, within
 from rps_pin.rps.kinematics.legs import RADIAL, cone_angles, violations
@@ -18,7 +19,7 @@ from rps_pin.rps.parameters import RPSParameters
 _E = tuple((x, y) for x, y, _ in RADIAL.tolist())
 #: Least and greatest length, least and greatest angle, cosine of the cone's limit, cosine and sine
 #: of the rest angle.
-_Bounds = tuple[float, float, float, float, float, float, float]
+Bounds = tuple[float, float, float, float, float, float, float]
 
 
 class RobotLimits:
@@ -37,11 +38,11 @@ class RobotLimits:
         cone, rest = p.spherical_cone_limit, p.spherical_rest_angle
         least_cosine = math.cos(cone + LIMIT_TOLERANCE) if cone < math.pi else -2.0
         lengths, angles = p.leg_length_limits, p.leg_angle_limits
-        self._bounds = (*lengths, *angles, least_cosine, math.cos(rest), math.sin(rest))
+        self.bounds: Bounds = (*lengths, *angles, least_cosine, math.cos(rest), math.sin(rest))
 
     def violated(self, geometry: LegGeometry) -> bool:
         """Return whether a leg's length, angle or ball joint is beyond its limits."""
-        return not _within_limits(geometry, self._bounds)
+        return not within_limits(geometry, self.bounds)
 
     def too_fast(self, speed: Triple) -> bool:
         """Return whether an actuator is beyond its speed limit."""
@@ -69,18 +70,14 @@ class RobotLimits:
         ]
 
 
-def _within_limits(geometry: LegGeometry, bounds: _Bounds) -> bool:
+def within_limits(geometry: LegGeometry, bounds: Bounds) -> Number:
     """Return whether every leg keeps its limits, to rounding."""
     shortest, longest, least, greatest, least_cosine, cos_r, sin_r = bounds
-    _, x, y = geometry.pose
-    for leg in range(3):
-        if not within(geometry.length[leg], shortest, longest):
-            return False
-        if not within(geometry.angle[leg], least, greatest):
-            return False
-        e_x, e_y = _E[leg]
-        axis = rest_axis(x * e_x + y * e_y, y * e_x - x * e_y, geometry.tilt, cos_r, sin_r)
-        cosine, sine = geometry.direction[leg], geometry.direction[leg + 3]
-        if cone_cosine(cosine, sine, axis[0], axis[2]) < least_cosine:
-            return False
-    return True
+    (_, x, y), length, angle, direction, tilt = geometry
+    inside: Number = 1.0
+    for leg, (e_x, e_y) in enumerate(_E):
+        axis = rest_axis(x * e_x + y * e_y, y * e_x - x * e_y, tilt, cos_r, sin_r)
+        cosine = cone_cosine(direction[leg], direction[leg + 3], axis[0], axis[2])
+        kept = within(length[leg], shortest, longest) * within(angle[leg], least, greatest)
+        inside = inside * kept * (cosine >= least_cosine)  # a product: whether all hold
+    return inside

@@ -133,7 +133,7 @@ class Setpoints:
 
     def _determinant(self, geometry: LegGeometry) -> float:
         """Return Eq. 8's determinant, positive on the side of the start."""
-        return self._side * closure_determinant(geometry, self._g, self._h)
+        return float(self._side * closure_determinant(geometry, self._g, self._h))
 
     def messages(self) -> list[str]:
         """Return why the setpoint is not the last target."""

@@ -17,7 +17,13 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, SingularityError, UnreachableError
-from rps_pin.rps.dynamics.force_equations import ForceTerms, LegBlock, block_forces, leg_block
+from rps_pin.rps.dynamics.force_equations import (
+    ForceTerms,
+    LegBlock,
+    forces_of_motion,
+    leg_block,
+    may_be_singular,
+)
 from rps_pin.rps.dynamics.loads import checked_wrench
 from rps_pin.rps.kernels import legs, tips
 from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE
@@ -105,14 +111,14 @@ def forces_of(
         for begin in range(0, len(flat_suspect), BLOCK):
             part = slice(begin, begin + BLOCK)
             of_poses = known.part(part) if known else legs_of_pose(_components(pose, part).T, g, h)
-            block = leg_block(h, of_poses)
-            flat_suspect[part] = block.close
+            block = leg_block(of_poses)
+            flat_suspect[part] = may_be_singular(block, h)
             if limits is not None:
                 flat_suspect[part] |= _beyond_limits(limits, block)
             for share, force in zip(shares, found, strict=True):
                 rate, acceleration = (_components(a, part) for a in share[1:3])
                 load = None if share.wrench is None else _components(share.wrench, part)
-                solved = block_forces(share.terms, block, rate, acceleration, load)
+                solved = forces_of_motion(share.terms, block, rate, acceleration, load).axial
                 force.reshape(-1, 3)[part] = solved.T
     return found, suspect
 

@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array, Bools
+from rps_pin.numerics.elementary import is_zero
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.kernels import forces, legs, platform, tips
 from rps_pin.rps.kernels.platform import Inertia, Vector
@@ -117,31 +118,67 @@ class LegBlock(NamedTuple):
     """Of K, d(length)/d(z, h tilt_x, h tilt_y)."""
     over_determinant: Array
     """One over its determinant, shape (n,)."""
-    close: Bools
-    """Whether a pose may be singular, or a leg has no length, shape (n,)."""
 
 
-def leg_block(platform_radius: float, of_poses: PoseLegs) -> LegBlock:
+def leg_block(of_poses: PoseLegs) -> LegBlock:
     """Return the legs of poses (n, 3) as a block, with what solves for their forces."""
     (x, y, tilt), slopes, geometry = of_poses
-    d, cosine, sine = geometry.length.T, geometry.cosine.T, geometry.sine.T
+    return legs_of_tilt(
+        *(x, y, tilt, slopes),
+        *(geometry.length.T, geometry.cosine.T, geometry.sine.T),
+    )
+
+
+def legs_of_tilt(
+    x: Array,
+    y: Array,
+    tilt: TiltFunctions,
+    slopes: tips.Slopes,
+    d: Array,
+    cosine: Array,
+    sine: Array,
+) -> LegBlock:
+    """Return the same from the tilt, the tips' slopes, and the legs, shape (3, n) each.
+
+    The arrays may be of CasADi expressions, with the dtype object and n = 1; so may those of
+    `forces_of_motion`.
+    """
     rho_x, rho_y, z_x, z_y = (tips.at_legs(ring) for ring in slopes)
     by_x = legs.along_leg(cosine, sine, rho_x, z_x)
     by_y = legs.along_leg(cosine, sine, rho_y, z_y)
     cofactors, det = forces.cofactors([*zip(sine, by_x, by_y, strict=True)])
-    over = 1.0 / det
-    gain = forces.squared_norm(cofactors) * over * over
+    return LegBlock(x, y, tilt, slopes, d, cosine, sine, cofactors, 1.0 / det)
+
+
+def may_be_singular(block: LegBlock, platform_radius: float) -> Bools:
+    """Return which poses may be singular, or have a leg without length, shape (n,)."""
+    gain = forces.squared_norm(block.cofactors) * block.over_determinant**2
     # The legs' planes hold the platform with forces that grow like 1 / cos(|w| / 2), whose square
     # is (1 + C) / 2, and a leg turns as fast as its tip moves over its length.
-    lever = np.minimum(1.0, d.min(axis=0) / platform_radius)
-    close = ~(gain < CLOSE**2 * (lever * lever) * (0.5 + 0.5 * tilt[2]))
-    return LegBlock(x, y, tilt, slopes, d, cosine, sine, cofactors, over, close)
+    lever = np.minimum(1.0, block.length.min(axis=0) / platform_radius)
+    close: Bools = ~(gain < CLOSE**2 * (lever * lever) * (0.5 + 0.5 * block.tilt[2]))
+    return close
 
 
-def block_forces(
+class MotionForces(NamedTuple):
+    """Forces of a motion; n samples."""
+
+    axial: Array
+    """Of the actuators, shape (3 legs, n), N; meaningless at a singularity."""
+    push: Array
+    """Of each leg on the platform along the leg, shape (3 legs, n), N."""
+    across: Array
+    """Of the platform on each leg across it in its plane, shape (3 legs, n), N."""
+    force: Vector
+    """Of the legs on the platform, base axes, N."""
+    moment: Vector
+    """Of the legs on the platform about its centre, platform axes, N m."""
+
+
+def forces_of_motion(
     terms: ForceTerms, block: LegBlock, rate: Array, acceleration: Array, wrench: Array | None
-) -> Array:
-    """Return the actuator forces of a block, shape (3 legs, n), N; meaningless at a singularity.
+) -> MotionForces:
+    """Return the forces of a block's motion.
 
     Parameters
     ----------
@@ -155,7 +192,7 @@ def block_forces(
         On the platform, components of shape (6, n), or none.
     """
     h = terms.platform_radius
-    x, y, tilt, slopes, _, cosine, sine, cofactors, over, _ = block
+    x, y, tilt, slopes, _, cosine, sine, cofactors, over = block
     (dz, dx, dy), (ddz, ddx, ddy) = rate, acceleration
     rates = tips.tip_rates(slopes, dz, h * dx, h * dy)
     changes = tips.tip_accelerations((x, y, dx, dy, ddx, ddy), ddz, tilt, h)
@@ -173,10 +210,9 @@ def block_forces(
         force,
         (by_tilt[0] / h, by_tilt[1] / h),
     )
-    axial: Array = np.array(forces.row_products(cofactors, needed))
-    axial *= over
-    axial += along
-    return axial
+    push: Array = np.array(forces.row_products(cofactors, needed))
+    push *= over
+    return MotionForces(push + along, push, across, force, moment)
 
 
 def _leg_forces(
@@ -194,7 +230,7 @@ def _leg_forces(
     fall = legs.across_leg(cosine, sine, outwards, downwards)
     moment = forces.cylinder_moment(terms.leg_moment, terms.leg_inertia, angle_acceleration, fall)
     force = np.zeros_like(d)
-    if terms.rod_mass:
+    if not is_zero(terms.rod_mass):
         weight = legs.along_leg(cosine, sine, outwards, downwards)
         turning = angle_rate, angle_acceleration, acceleration
         force = forces.rod_force(terms.rod_mass, terms.rod_com, d, turning, weight)
@@ -202,11 +238,11 @@ def _leg_forces(
         moment += forces.rod_moment(
             terms.rod_mass, d - terms.rod_com, coriolis, angle_acceleration, fall
         )
-    if terms.prismatic_damping or terms.prismatic_friction:
+    if not (is_zero(terms.prismatic_damping) and is_zero(terms.prismatic_friction)):
         force += forces.friction_force(
             speed, terms.prismatic_damping, terms.prismatic_friction, terms.friction_speed
         )
-    if terms.revolute_damping or terms.revolute_friction:
+    if not (is_zero(terms.revolute_damping) and is_zero(terms.revolute_friction)):
         moment += forces.friction_force(
             angle_rate, terms.revolute_damping, terms.revolute_friction, terms.friction_speed
         )
@@ -239,11 +275,12 @@ def platform_wrench(
     (a_x, a_y, a_z), omega, alpha = motion
     g_x, g_y, g_z = terms.gravity
     mass, inertia = terms.platform_mass, terms.platform_inertia
-    times = platform.inertia_times if any(inertia[3:]) else platform.principal_times
+    principal = all(is_zero(product) for product in inertia[3:])
+    times = platform.principal_times if principal else platform.inertia_times
     gamma = (a_x - g_x, a_y - g_y, a_z - g_z)
     force = (mass * gamma[0], mass * gamma[1], mass * gamma[2])
     moment = platform.turning_moment(omega, times(inertia, omega), times(inertia, alpha))
-    if any(terms.platform_moment):
+    if not all(is_zero(moment) for moment in terms.platform_moment):
         offset = terms.platform_moment
         local = platform.offset_force(offset, omega, alpha)
         force = platform.total(force, platform.to_base(*tilt, local))

@@ -9,5 +9,5 @@ LIMIT_TOLERANCE = 1e-12
 
 
 def within(value: Number, lower: Number, upper: Number) -> Number:
-    """Return whether a value keeps its limits, to rounding."""
-    return (value >= lower - LIMIT_TOLERANCE) & (value <= upper + LIMIT_TOLERANCE)
+    """Return whether a value keeps its limits, to rounding: a product of two conditions."""
+    return (value >= lower - LIMIT_TOLERANCE) * (value <= upper + LIMIT_TOLERANCE)
