@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -18,7 +19,8 @@ from rps_pin.control.estimator.leg_jacobian import LeastSingularValue
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, three_floats
 from rps_pin.control.estimator.output_arrays import Answers
 from rps_pin.control.estimator.robot_state import robot_state
-from rps_pin.control.estimator.state_estimate import state_estimate
+from rps_pin.control.estimator.state_estimate import StateEstimate, departure, state_estimate
+from rps_pin.control.generated.engine import NOT_REGULAR, Compiled, GeneratedTick, generated_tick
 from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
@@ -61,9 +63,16 @@ class RealTimeRobot:
         m for each tick since. Default: any length that can be followed is accepted.
     most_steps
         Most steps that one reading may be divided into, which bounds the time of a tick.
+    compiled
+        ``"auto"``: regular ticks are computed by generated code, if it is there or can be built
+        (`rps_pin.control.generated`); True: `CompileError` if not; False: interpreted.
 
     Attributes
     ----------
+    compiled : bool
+        Whether generated code runs.
+    engine : str
+        What runs: its compiler, or why there is none.
     answers : Answers
         The last good results.
     status, force_status : Status
@@ -87,6 +96,8 @@ class RealTimeRobot:
         If a leg has no length in the pose.
     SingularityError
         If the pose is singular.
+    CompileError
+        If there is no generated code, with ``compiled=True``.
     """
 
     def __init__(
@@ -100,6 +111,7 @@ class RealTimeRobot:
         near_singular: float = 0.05,
         largest_jump: float = math.inf,
         most_steps: int = 20,
+        compiled: Compiled = "auto",
     ) -> None:
         p = robot.parameters
         self._g, self._h = float(p.base_radius), float(p.platform_radius)
@@ -112,18 +124,31 @@ class RealTimeRobot:
         self._jump = positive_number(largest_jump, "largest_jump", "m", infinite=True)
         self._most = int(positive_number(most_steps, "most_steps"))
         self.answers = Answers.new() if answers is None else answers.checked()
+        #: Of this object, or of the controller that has it.
+        self.generated: GeneratedTick | None = None
+        self._fast: GeneratedTick | None = None
         self.reset(near)
-        # Functions are compiled in their first calls, here and not in the loop.
-        self.estimate(self.state.geometry.length, _ZERO)
-        self.inverse_dynamics(self.state.geometry.pose, _ZERO, _ZERO)
-        self.reset(near)
+        self._fast, self.engine = generated_tick(
+            *(compiled, "estimate", self.answers[:5], self._period),
+            *(self._filter.share, self.take),
+        )
+        if self._fast is not None:
+            self.generated = self._fast
+            self._fast.set_numbers(self.numbers())
+            self._fast.set_memory(self.memory())
+
+    @property
+    def compiled(self) -> bool:
+        """Whether generated code runs."""
+        return self.generated is not None
 
     def reset(self, near: ArrayLike) -> None:
         """Start again from a pose, at rest and without forces. Raises as the constructor does."""
         _, d, directions, _ = start_of(near, self._g, self._h, CONDITION_LIMIT)
+        self._begin()
         self.age, self.elapsed, self._fraction = 0, 0.0, 1.0
         self._type_ii: float | None = None
-        self.determinant = 0.0
+        self._determinant = 0.0
         self._length: Triple | None = d
         self._geometry_flags = 0
         self.status = self._accept(d, directions, _ZERO)
@@ -131,6 +156,65 @@ class RealTimeRobot:
         self.force_status, self.force_age, self.force_determinant = Status.OK, 0, 0.0
         self._pose: Triple | None = None
         self.answers.forces[:] = self.answers.reactions[:] = 0.0
+        if self._fast is not None:
+            self._fast.set_memory(self.memory())
+
+    # Generated code -------------------------------------------------------------------------------
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what generated code takes of this object: `ESTIMATE_NUMBERS`."""
+        return {
+            "radii": (self._g, self._h),
+            "bounds": self._limits.bounds,
+            "speed_limit": self._limits.greatest_speed,
+            "largest": self._largest,
+            "near": self._near,
+            "jump": self._jump,
+            "condition_limit": CONDITION_LIMIT,
+            "most_steps": float(self._most),
+        }
+
+    def memory(self) -> dict[str, Any]:
+        """Return what the next tick starts from: `ESTIMATE_MEMORY`."""
+        geometry, _, speed, _ = self._state
+        return {
+            "length": geometry.length,
+            "direction": geometry.direction,
+            "speed": speed,
+            "started": 0.0 if self._filter.last is None else 1.0,
+            "determinant": self._determinant,
+        }
+
+    def take(self, memory: dict[str, Any]) -> None:
+        """Set the state from generated code's memory."""
+        d, speed = memory["length"], memory["speed"]
+        found = state_estimate(d, memory["direction"], speed, self._g, self._h)
+        assert found is not None  # a regular tick is far from singularities
+        self._state, self._type_ii = found[0], None
+        self._determinant = memory["determinant"]
+        violated = self._limits.violated(self._state.geometry)
+        self._geometry_flags = flags.BEYOND_LIMIT if violated else 0
+        self._filter.update(d, speed)
+
+    def _begin(self) -> None:
+        """Take the memory of generated code, whose next tick starts from another."""
+        if self.generated is not None:
+            self.generated.pull()
+            self.generated.ready = False
+
+    @property
+    def state(self) -> StateEstimate:
+        """The motion by the last good reading."""
+        if self.generated is not None:
+            self.generated.pull()
+        return self._state
+
+    @property
+    def determinant(self) -> float:
+        """See the class."""
+        if self.generated is not None and self.generated.ahead:
+            return self.generated.remembered("determinant")
+        return self._determinant
 
     # Each tick ------------------------------------------------------------------------------------
 
@@ -150,6 +234,22 @@ class RealTimeRobot:
         dt
             Time since the last call, s; default: the period.
         """
+        fast = self._fast
+        if fast is None:
+            return self._estimate(length, speed, dt)
+        if fast.ready:
+            number = fast.estimate(length, speed, dt)
+            if number != NOT_REGULAR:
+                self.status = status = STATUSES[number]
+                return status
+        status = self._estimate(length, speed, dt)
+        if self.age == 0:
+            fast.set_memory(self.memory())
+        return status
+
+    def _estimate(self, length: Numbers, speed: Numbers | None, dt: float | None) -> Status:
+        """Do the same in Python."""
+        self._begin()
         elapsed = self.elapsed + (self._period if dt is None else elapsed_time(dt))
         if not self.elapsed < elapsed < math.inf:
             return self._keep(flags.BAD_INPUT)
@@ -157,19 +257,14 @@ class RealTimeRobot:
         self._length = d = three_floats(length)
         if d is None or not (min(d) > 0.0 and max(d) < self._largest):
             return self._keep(flags.BAD_INPUT)
-        last, (v1, v2, v3) = self.state.geometry.length, self.state.speed
-        jump = max(
-            abs(d[0] - last[0] - v1 * elapsed),
-            abs(d[1] - last[1] - v2 * elapsed),
-            abs(d[2] - last[2] - v3 * elapsed),
-        )
-        if jump > self._jump * (self.age + 1):
+        last = self._state.geometry.length
+        if departure(d, last, self._state.speed, elapsed) > self._jump * (self.age + 1):
             return self._keep(flags.JUMP)
         speeds = self._filter.after(d, elapsed) if speed is None else three_floats(speed)
         if speeds is None:
             return self._keep(flags.BAD_INPUT)
         directions, _, self._fraction = follow(
-            last, self.state.geometry.direction, d, self._g, self._h, CONDITION_LIMIT, self._most
+            last, self._state.geometry.direction, d, self._g, self._h, CONDITION_LIMIT, self._most
         )
         if self._fraction < 1.0:
             return self._keep(flags.NOT_CONVERGED)
@@ -221,8 +316,9 @@ class RealTimeRobot:
     @property
     def type_ii(self) -> float:
         """`SingularityMeasures.type_ii` of the estimated pose, 0 to 1."""
+        state = self.state
         if self._type_ii is None:
-            self._type_ii = self._singular_value.of(self.state.jacobian)
+            self._type_ii = self._singular_value.of(state.jacobian)
         return self._type_ii
 
     @property
@@ -301,9 +397,9 @@ class RealTimeRobot:
         state, twist = found
         if not math.isfinite(sum(twist)):  # the rate is in it
             return self._keep(flags.BAD_INPUT)
-        self.state = state
+        self._state = state
         geometry, rate, _, jacobian = state
-        self._type_ii, self.determinant = None, jacobian.determinant
+        self._type_ii, self._determinant = None, jacobian.determinant
         number = self._geometry_flags = flags.BEYOND_LIMIT if self._limits.violated(geometry) else 0
         if self._limits.too_fast(speed):
             number = flags.BEYOND_LIMIT
@@ -334,7 +430,7 @@ class RealTimeRobot:
         solved = self.dynamics.solve(robot_state(geometry, rate, acceleration, self._h))
         if solved is None:  # rates so large that forces overflow
             return self._keep_forces(flags.BAD_INPUT)
-        forces = solved[9:]
+        forces = (solved[9], solved[10], solved[11])
         if self._limits.too_strong(forces):
             number |= flags.BEYOND_LIMIT
         out = self.answers.forces

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from rps_pin.control.estimator.leg_geometry import LegGeometry
 from rps_pin.control.estimator.leg_jacobian import LegJacobian, leg_jacobian, pose_rate
-from rps_pin.numerics.elementary import Number, atan2
+from rps_pin.numerics.elementary import Number, atan2, greatest
 from rps_pin.rps.kernels.placement import pose_of_legs
 from rps_pin.rps.kernels.platform import angular_velocity
 from rps_pin.rps.kernels.tilt_functions import tilt_functions
@@ -64,3 +64,12 @@ def moving(
     """Return the state with leg speeds, and the platform's twist."""
     rate = pose_rate(jacobian, speed)
     return StateEstimate(geometry, rate, speed, jacobian), platform_twist(geometry, rate, h)
+
+
+def departure(d: Triple, last: Triple, speed: Triple, elapsed: Number) -> Number:
+    """Return the largest difference of lengths from the last ones, moved at their speed, m."""
+    return greatest(
+        abs(d[0] - last[0] - speed[0] * elapsed),
+        abs(d[1] - last[1] - speed[1] * elapsed),
+        abs(d[2] - last[2] - speed[2] * elapsed),
+    )

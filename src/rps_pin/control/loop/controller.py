@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from dataclasses import fields
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -34,10 +35,13 @@ from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time
 from rps_pin.control.estimator.real_time_robot import RealTimeRobot
 from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.estimator.state_estimate import StateEstimate
+from rps_pin.control.generated.engine import NOT_REGULAR, Compiled, GeneratedTick, generated_tick
 from rps_pin.control.loop import status as flags
+from rps_pin.control.loop.feedback import pid
 from rps_pin.control.loop.filters import SetpointRateFilter
 from rps_pin.control.loop.force_limits import ForceLimits
 from rps_pin.control.loop.gains import Gains
+from rps_pin.control.loop.pace import LEAST_PACE, recovered_pace
 from rps_pin.control.loop.setpoints import Setpoint, Setpoints
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.errors import InputError, SingularityError
@@ -49,8 +53,6 @@ Space = Literal["actuator", "task"]
 
 _NO_RESULT = flags.BAD_INPUT | flags.JUMP | flags.NOT_CONVERGED
 _ZERO = (0.0, 0.0, 0.0)
-#: Least pace, and the time constant of its return to 1, s.
-_LEAST_PACE, _RECOVERY = 0.05, 0.2
 
 
 class Controller(ABC):
@@ -84,9 +86,16 @@ class Controller(ABC):
         after `Status.JUMP`.
     most_lost
         Number of missing or refused readings in a row before the controller stops.
+    compiled
+        ``"auto"``: regular ticks are computed by generated code, if it is there or can be built
+        (`rps_pin.control.generated`); True: `CompileError` if not; False: interpreted.
 
     Attributes
     ----------
+    compiled : bool
+        Whether generated code runs.
+    engine : str
+        What runs: its compiler, or why there is none.
     forces : (3,) array
         Command to the actuators, N, of the last tick. Before the first, the forces that hold the
         robot at rest.
@@ -110,6 +119,8 @@ class Controller(ABC):
         If a leg has no length in the pose.
     SingularityError
         If the pose is nearer to a singularity than `near_singular`.
+    CompileError
+        If there is no generated code, with ``compiled=True``.
     """
 
     _default_space: Space = "actuator"
@@ -128,6 +139,7 @@ class Controller(ABC):
         stop_singular: float = 0.01,
         largest_jump: float | None = None,
         most_lost: int = 3,
+        compiled: Compiled = "auto",
     ) -> None:
         p = robot.parameters
         if not isinstance(gains, Gains):
@@ -149,9 +161,11 @@ class Controller(ABC):
             cut_off=cut_off,
             near_singular=near_singular,
             largest_jump=jump,
+            compiled=False,
         )
         self.period, self.gains = period, gains
-        self._kp, self._kd, self._ki = gains.rows
+        self._gains = gains.rows
+        self._elapsed = period
         self._tracking_rate = tuple(1.0 / time for time in gains.tracking_time)
         self._g, self._h = float(p.base_radius), float(p.platform_radius)
         self._setpoints = Setpoints(p, near_singular)
@@ -160,12 +174,21 @@ class Controller(ABC):
         self._rate_filter = SetpointRateFilter(cut_off)
         self._near, self._stop = near_singular, stop_singular
         self.forces: Array = np.zeros(3)
+        self._generated: GeneratedTick | None = None
+        self._speed_measured = False
         self.reset(near)
-        # Functions are compiled in their first calls, here and not in the loop.
-        state = self._extrapolated(self.estimate.state, 0.0) or self.estimate.state
-        self._law(state, self._setpoints.current, period)
-        self._command_error(state, _ZERO, _ZERO)
-        self.reset(near)
+        self._generated, self.engine = generated_tick(
+            *(compiled, self._generated_law, (*self.estimate.answers[:5], self.forces), period),
+            *(self._rate_filter.share, self._take),
+        )
+        if self._generated is not None:
+            self.estimate.generated, self.estimate.engine = self._generated, self.engine
+            self._to_generated_code()
+
+    @property
+    def compiled(self) -> bool:
+        """Whether generated code runs."""
+        return self._generated is not None
 
     def reset(self, near: ArrayLike) -> None:
         """Start again at rest in a pose. Raises as the constructor does."""
@@ -182,13 +205,13 @@ class Controller(ABC):
         self._setpoints.reset(geometry)
         self._integral: Triple = _ZERO
         self._rate_filter.reset()
-        self._speed_measured = False
         self._stop_reason = ""
         self._rest: Setpoint | None = None
-        self.pace = 1.0
+        self._pace = 1.0
         self.status = Status.OK
         self._wanted: Triple = _ZERO
         self._send(self._limits.clipped(self._weight()))
+        self._to_generated_code()
 
     # Each tick ------------------------------------------------------------------------------------
 
@@ -219,6 +242,19 @@ class Controller(ABC):
         Status
             Its text is in `status_text`.
         """
+        generated = self._generated
+        if generated is not None and generated.ready:
+            number = generated.control(length, target, speed, dt)
+            if number != NOT_REGULAR:
+                self.status = self.estimate.status = status = STATUSES[number]
+                return status
+        status = self._tick(length, target, speed, dt)
+        if generated is not None and self.estimate.age == 0 and not self._stop_reason:
+            self._hand_over()
+        return status
+
+    def _tick(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
+        """Do the same in Python."""
         estimate = self.estimate
         number = int(estimate.estimate(length, speed, dt=dt))
         time = self.period if dt is None else elapsed_time(dt)
@@ -238,22 +274,28 @@ class Controller(ABC):
         if state is None or self._near_singular(state):
             reason = f"near a type II singularity: type_ii less than {self._stop:.3g}"
             return self._stopped(number | flags.NEAR_SINGULAR, elapsed, reason)
-        force = self._law(state, self._setpoints.current, elapsed)
+        self._elapsed = elapsed
+        force = self._law(state, self._setpoints.current)
         if force is None or not math.isfinite(force[0] + force[1] + force[2]):
             reason = "the law gave no finite forces"
             return self._stopped(number | flags.NOT_CONVERGED, elapsed, reason)
         if not self._limits.within(force):
             number |= flags.SATURATED
             force = self._limited(force, state, elapsed)
-        elif self.pace < 1.0:
-            self.pace += (1.0 - self.pace) * min(1.0, elapsed / _RECOVERY)
+        elif self._pace < 1.0:
+            self._pace = recovered_pace(self._pace, elapsed)
         self._send(force)
         self.status = status = STATUSES[number]
         return status
 
+    @property
+    def _generated_law(self) -> str:
+        """Name of the law in `rps_pin.control.generated.tick.LAWS`; none of other laws."""
+        return ""
+
     @abstractmethod
-    def _law(self, state: StateEstimate, setpoint: Setpoint, elapsed: float) -> Triple | None:
-        """Return the law's forces, N, or None; `elapsed` (s) is the step of the integral."""
+    def _law(self, state: StateEstimate, setpoint: Setpoint) -> Triple | None:
+        """Return the law's forces, N, or None; it calls `_pid` once, and `_solve`."""
 
     @abstractmethod
     def _command_error(self, state: StateEstimate, force: Triple, acceleration: Triple) -> Triple:
@@ -276,21 +318,73 @@ class Controller(ABC):
             messages.append(f"stopped: {self._stop_reason}; reset to continue")
         return "; ".join(messages) or "ok"
 
+    @property
+    def pace(self) -> float:
+        """See the class."""
+        generated = self._generated
+        if generated is not None and generated.ahead:
+            return generated.remembered("pace")
+        return self._pace
+
+    # Generated code -------------------------------------------------------------------------------
+
+    def _to_generated_code(self) -> None:
+        if self._generated is not None:
+            self._generated.set_numbers(self._numbers())
+            self._hand_over()
+
+    def _numbers(self) -> dict[str, Any]:
+        """Return what generated code takes of this object: `CONTROL_NUMBERS`."""
+        (kp, kd, ki), terms = self._gains, self.robot.force_terms
+        return {
+            **self.estimate.numbers(),
+            **{one.name: getattr(terms, one.name) for one in fields(terms)},
+            **{"kp": kp, "kd": kd, "ki": ki, "stop": self._stop},
+            **{"side": self._setpoints.side, "force_limit": self._limits.limit},
+        }
+
+    def _hand_over(self) -> None:
+        """Let generated code compute the next tick, from where this one ended."""
+        generated, current = self._generated, self._setpoints.current
+        if generated is None or not self._setpoints.followed:
+            return
+        generated.set_memory(
+            {
+                **self.estimate.memory(),
+                "target_pose": current.geometry.pose,
+                "target_rate": current.rate,
+                "target_acceleration": current.acceleration,
+                "integral": self._integral,
+                "last_rate": self._rate_filter.last or _ZERO,
+                "filtered_rate": self._rate_filter.speed,
+                "pace": self._pace,
+            }
+        )
+
+    def _take(self, memory: dict[str, Any]) -> None:
+        """Set the state from generated code's memory."""
+        assert self._generated is not None
+        self.estimate.take(memory)
+        geometry = leg_geometry(memory["target_pose"], self._g, self._h)
+        assert geometry is not None  # of a regular tick
+        target = Setpoint(geometry, memory["target_rate"], memory["target_acceleration"])
+        self._setpoints.follow(target)
+        self._integral, self._pace = memory["integral"], memory["pace"]
+        self._rate_filter.last = memory["last_rate"]
+        self._rate_filter.speed = memory["filtered_rate"]
+        self._speed_measured = self._generated.measured
+
     # Inner workings -------------------------------------------------------------------------------
 
-    def _pid(self, e: Triple, wanted: Triple, rate: Triple, elapsed: float) -> Triple:
-        """Return Kd e' + Kp e + I after the step I += Ki e elapsed; e' = wanted - rate."""
+    def _pid(self, e: Triple, wanted: Triple, rate: Triple) -> Triple:
+        """Return `pid` with e' = wanted - rate; the wanted rate passes the speeds' filter."""
+        elapsed = self._elapsed
         if not self._speed_measured and elapsed > 0.0:
             wanted = self._rate_filter.after(wanted, elapsed)
-        (p1, p2, p3), (d1, d2, d3), (i1, i2, i3) = self._kp, self._kd, self._integral
-        (e1, e2, e3), (w1, w2, w3), (v1, v2, v3), (k1, k2, k3) = e, wanted, rate, self._ki
-        i1, i2, i3 = i1 + elapsed * k1 * e1, i2 + elapsed * k2 * e2, i3 + elapsed * k3 * e3
-        self._integral = (i1, i2, i3)
-        return (
-            p1 * e1 + d1 * (w1 - v1) + i1,
-            p2 * e2 + d2 * (w2 - v2) + i2,
-            p3 * e3 + d3 * (w3 - v3) + i3,
-        )
+        (w1, w2, w3), (v1, v2, v3) = wanted, rate
+        e_rate = (w1 - v1, w2 - v2, w3 - v3)
+        command, self._integral = pid(e, e_rate, self._integral, self._gains, elapsed)
+        return command
 
     def _solve(self, geometry: LegGeometry, rate: Triple, acceleration: Triple) -> Triple | None:
         """Return the actuator forces of a motion, None if they are not determined."""
@@ -303,8 +397,8 @@ class Controller(ABC):
         mass = self._inertia.of(state.geometry)
         limited = self._limits.nearest(force, mass, state.jacobian, self._setpoints.current.rate)
         (f1, f2, f3), (g1, g2, g3) = limited.force, force
-        self.pace *= 1.0 + elapsed * limited.pace_rate
-        self.pace = max(_LEAST_PACE, min(1.0, self.pace))
+        pace = self._pace * (1.0 + elapsed * limited.pace_rate)
+        self._pace = max(LEAST_PACE, min(1.0, pace))
         (i1, i2, i3), (w1, w2, w3) = self._integral, self._tracking_rate
         short = (f1 - g1, f2 - g2, f3 - g3)
         m1, m2, m3 = self._command_error(state, short, limited.acceleration_error)
@@ -344,7 +438,8 @@ class Controller(ABC):
             self._rest = None
         else:
             self._rest = self._rest or Setpoint(state.geometry, _ZERO, _ZERO)
-            force = self._law(state, self._rest, elapsed)
+            self._elapsed = elapsed
+            force = self._law(state, self._rest)
         if force is None or not math.isfinite(force[0] + force[1] + force[2]):
             self._rest, force = None, self._weight()
         if not self._limits.within(force):

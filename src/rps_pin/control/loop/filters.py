@@ -18,9 +18,28 @@ from __future__ import annotations
 
 import math
 
+from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kinematics.tracking import Triple
 
 _ZERO = (0.0, 0.0, 0.0)
+
+
+def low_pass(u: Triple, s: Triple, share: Number) -> Triple:
+    """Return s + share (u - s), the filter's next output; share is 1 - exp(-2 pi f T)."""
+    (u1, u2, u3), (s1, s2, s3) = u, s
+    return s1 + share * (u1 - s1), s2 + share * (u2 - s2), s3 + share * (u3 - s3)
+
+
+def backward_difference(length: Triple, last: Triple, elapsed: Number) -> Triple:
+    """Return the mean speed between two readings, a time (s) apart."""
+    (d1, d2, d3), (e1, e2, e3) = length, last
+    return (d1 - e1) / elapsed, (d2 - e2) / elapsed, (d3 - e3) / elapsed
+
+
+def mean(one: Triple, other: Triple) -> Triple:
+    """Return the mean of two rates."""
+    (x1, x2, x3), (y1, y2, y3) = one, other
+    return (x1 + y1) / 2.0, (x2 + y2) / 2.0, (x3 + y3) / 2.0
 
 
 class _LowPass:
@@ -38,14 +57,12 @@ class _LowPass:
 
     def reset(self) -> None:
         """Start again at rest."""
-        self._last: Triple | None = None
+        self.last: Triple | None = None
         self.speed: Triple = _ZERO
 
-    def _filtered(self, u: Triple, elapsed: float) -> Triple:
-        """Return s + (1 - exp(-2 pi f T)) (u - s)."""
-        share = -math.expm1(-self._rate * elapsed)
-        (u1, u2, u3), (s1, s2, s3) = u, self.speed
-        return s1 + share * (u1 - s1), s2 + share * (u2 - s2), s3 + share * (u3 - s3)
+    def share(self, elapsed: float) -> float:
+        """Return 1 - exp(-2 pi f T)."""
+        return -math.expm1(-self._rate * elapsed)
 
 
 class SpeedFilter(_LowPass):
@@ -53,15 +70,14 @@ class SpeedFilter(_LowPass):
 
     def after(self, length: Triple, elapsed: float) -> Triple:
         """Return the speeds (m/s) at lengths (m), a time (s) after the last; changes nothing."""
-        if self._last is None:
+        if self.last is None:
             return self.speed
-        (d1, d2, d3), (e1, e2, e3) = length, self._last
-        change = ((d1 - e1) / elapsed, (d2 - e2) / elapsed, (d3 - e3) / elapsed)
-        return self._filtered(change, elapsed)
+        change = backward_difference(length, self.last, elapsed)
+        return low_pass(change, self.speed, self.share(elapsed))
 
     def update(self, length: Triple, speed: Triple) -> None:
         """Set the last reading and its speeds, measured or from `after`."""
-        self._last, self.speed = length, speed
+        self.last, self.speed = length, speed
 
 
 class SetpointRateFilter(_LowPass):
@@ -69,8 +85,7 @@ class SetpointRateFilter(_LowPass):
 
     def after(self, rate: Triple, elapsed: float) -> Triple:
         """Return the filtered rates, a time (s) after the last call."""
-        (x1, x2, x3), (y1, y2, y3) = rate, self._last or _ZERO
-        self._last = rate
-        mean = ((x1 + y1) / 2.0, (x2 + y2) / 2.0, (x3 + y3) / 2.0)
-        self.speed = filtered = self._filtered(mean, elapsed)
+        u = mean(rate, self.last or _ZERO)
+        self.last = rate
+        self.speed = filtered = low_pass(u, self.speed, self.share(elapsed))
         return filtered

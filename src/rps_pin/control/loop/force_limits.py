@@ -28,6 +28,7 @@ import proxsuite
 
 from rps_pin.arrays import Array
 from rps_pin.control.estimator.leg_jacobian import LegJacobian
+from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kinematics.tracking import Triple
 
 #: Of ProxQP, with variables scaled by the limits.
@@ -48,6 +49,12 @@ class LimitedForces(NamedTuple):
     """Relative rate of change of the pace, 1/s; negative: slower."""
     solved: bool
     """Whether the program was solved; otherwise each force was limited by itself."""
+
+
+def within_limits(force: Triple, limit: Triple) -> Number:
+    """Return whether no force is beyond its limit."""
+    (f1, f2, f3), (l1, l2, l3) = force, limit
+    return (abs(f1) <= l1) * (abs(f2) <= l2) * (abs(f3) <= l3)
 
 
 class ForceLimits:
@@ -79,8 +86,7 @@ class ForceLimits:
 
     def within(self, force: Triple) -> bool:
         """Return whether forces keep the limits."""
-        (f1, f2, f3), (l1, l2, l3) = force, self.limit
-        return -l1 <= f1 <= l1 and -l2 <= f2 <= l2 and -l3 <= f3 <= l3
+        return bool(within_limits(force, self.limit))
 
     def clipped(self, force: Triple) -> Triple:
         """Return forces limited one by one."""

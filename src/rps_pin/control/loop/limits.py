@@ -33,7 +33,7 @@ class RobotLimits:
 
     def __init__(self, parameters: RPSParameters) -> None:
         self._parameters = p = parameters
-        self._greatest_speed = p.actuator_speed_limit
+        self.greatest_speed = p.actuator_speed_limit
         self._greatest_force = p.actuator_force_limit
         cone, rest = p.spherical_cone_limit, p.spherical_rest_angle
         least_cosine = math.cos(cone + LIMIT_TOLERANCE) if cone < math.pi else -2.0
@@ -46,11 +46,11 @@ class RobotLimits:
 
     def too_fast(self, speed: Triple) -> bool:
         """Return whether an actuator is beyond its speed limit."""
-        return max(speed) > self._greatest_speed or min(speed) < -self._greatest_speed
+        return not none_beyond(speed, self.greatest_speed)
 
-    def too_strong(self, force: list[float]) -> bool:
+    def too_strong(self, force: Triple) -> bool:
         """Return whether an actuator is beyond its force limit."""
-        return max(force) > self._greatest_force or min(force) < -self._greatest_force
+        return not none_beyond(force, self._greatest_force)
 
     def messages(self, geometry: LegGeometry) -> list[str]:
         """Return a sentence for each violated limit of length, angle or ball joint."""
@@ -61,13 +61,19 @@ class RobotLimits:
 
     def actuator_messages(self, quantity: str, values: Iterable[float]) -> list[str]:
         """Return a sentence for each actuator beyond its limit of ``speed`` or ``force``."""
-        speed, force = (self._greatest_speed, "m/s"), (self._greatest_force, "N")
+        speed, force = (self.greatest_speed, "m/s"), (self._greatest_force, "N")
         limit, unit = speed if quantity == "speed" else force
         return [
             f"leg {leg}: {quantity} is {value:.6g} {unit}; its limit is {limit:.6g} {unit}"
             for leg, value in enumerate(values, start=1)
             if abs(value) > limit
         ]
+
+
+def none_beyond(values: Triple, limit: Number) -> Number:
+    """Return whether no number's size is beyond a limit."""
+    a, b, c = values
+    return (abs(a) <= limit) * (abs(b) <= limit) * (abs(c) <= limit)
 
 
 def within_limits(geometry: LegGeometry, bounds: Bounds) -> Number:

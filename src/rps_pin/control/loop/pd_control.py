@@ -28,8 +28,10 @@ from rps_pin.control.estimator.leg_jacobian import force_of_wrench, wrench_of_fo
 from rps_pin.control.estimator.robot_state import leg_motion
 from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.loop.controller import Controller
+from rps_pin.control.loop.feedback import Dynamics, Feedback
 from rps_pin.control.loop.gains import Gains
 from rps_pin.control.loop.setpoints import Setpoint, difference
+from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import choice
@@ -37,6 +39,32 @@ from rps_pin.validation import choice
 Compensation = Literal["gravity", "feed_forward", "none"]
 
 _ZERO = (0.0, 0.0, 0.0)
+
+
+def pd_control(
+    in_task_space: bool,
+    compensation: Compensation,
+    state: StateEstimate,
+    setpoint: Setpoint,
+    h: Number,
+    feedback: Feedback,
+    dynamics: Dynamics,
+) -> Triple | None:
+    """Return the law's forces; see the module's text."""
+    geometry, rate, speed, jacobian = state
+    if in_task_space:
+        e = difference(setpoint.geometry.pose, geometry.pose)
+        c = force_of_wrench(jacobian, feedback(e, setpoint.rate, rate))
+    else:
+        speed_wanted, _ = leg_motion(*setpoint, h)
+        e = difference(setpoint.geometry.length, geometry.length)
+        c = feedback(e, speed_wanted, speed)
+    base: Triple | None = _ZERO
+    if compensation == "gravity":
+        base = dynamics(geometry, _ZERO, _ZERO)
+    elif compensation == "feed_forward":
+        base = dynamics(*setpoint)
+    return None if base is None else (base[0] + c[0], base[1] + c[1], base[2] + c[2])
 
 
 class PDControl(Controller):
@@ -66,24 +94,18 @@ class PDControl(Controller):
         compensation: Compensation = "gravity",
         **settings: Any,
     ) -> None:
-        self.compensation = choice(compensation, "compensation", get_args(Compensation))
+        self.compensation: Compensation = choice(
+            compensation, "compensation", get_args(Compensation)
+        )
         super().__init__(robot, near, gains, **settings)
 
-    def _law(self, state: StateEstimate, setpoint: Setpoint, elapsed: float) -> Triple | None:
-        geometry, rate, speed, jacobian = state
-        if self._in_task_space:
-            e = difference(setpoint.geometry.pose, geometry.pose)
-            c = force_of_wrench(jacobian, self._pid(e, setpoint.rate, rate, elapsed))
-        else:
-            speed_wanted, _ = leg_motion(*setpoint, self._h)
-            e = difference(setpoint.geometry.length, geometry.length)
-            c = self._pid(e, speed_wanted, speed, elapsed)
-        base: Triple | None = _ZERO
-        if self.compensation == "gravity":
-            base = self._solve(geometry, _ZERO, _ZERO)
-        elif self.compensation == "feed_forward":
-            base = self._solve(*setpoint)
-        return None if base is None else (base[0] + c[0], base[1] + c[1], base[2] + c[2])
+    @property
+    def _generated_law(self) -> str:
+        return f"pd_control_{self.space}_{self.compensation}"
+
+    def _law(self, state: StateEstimate, setpoint: Setpoint) -> Triple | None:
+        laws = self._in_task_space, self.compensation
+        return pd_control(*laws, state, setpoint, self._h, self._pid, self._solve)
 
     def _command_error(self, state: StateEstimate, force: Triple, acceleration: Triple) -> Triple:
         return wrench_of_force(state.jacobian, force) if self._in_task_space else force

@@ -10,6 +10,7 @@ From there the setpoint returns to the next valid target smoothly
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from rps_pin.control.estimator.leg_geometry import (
@@ -22,6 +23,7 @@ from rps_pin.control.estimator.leg_geometry import (
 from rps_pin.control.estimator.loop_arguments import three_floats
 from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.rejoining import Rejoining, rejoining_time
+from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.parameters import RPSParameters
 
@@ -51,16 +53,26 @@ class Setpoints:
         self._limits, self._near = RobotLimits(parameters), near_singular
         self._g, self._h = float(parameters.base_radius), float(parameters.platform_radius)
         self._speed_limit = parameters.actuator_speed_limit
+        self._held = False
+        self._refused: Triple | None = None
+        self._rejoining: Rejoining | None = None
         # Entry of rate and acceleration, in SI units.
         self._largest = LARGEST_LENGTH * (self._g + self._h)
 
     def reset(self, geometry: LegGeometry) -> None:
         """Start at rest in a pose, the setpoint until there is a target."""
-        self.current = self._target = Setpoint(geometry, _ZERO, _ZERO)
-        self._side = math.copysign(1.0, closure_determinant(geometry, self._g, self._h))
-        self._held = False
-        self._refused: Triple | None = None
-        self._rejoining: Rejoining | None = None
+        self.follow(Setpoint(geometry, _ZERO, _ZERO))
+        self.side = math.copysign(1.0, closure_determinant(geometry, self._g, self._h))
+
+    @property
+    def followed(self) -> bool:
+        """Whether the setpoint is the last target: there is no hold, and no return."""
+        return not self._held and self._rejoining is None
+
+    def follow(self, setpoint: Setpoint) -> None:
+        """Set a valid target as the setpoint."""
+        self.current = self._target = setpoint
+        self._held, self._refused, self._rejoining = False, None, None
 
     def update(self, target: Any, elapsed: float) -> bool:
         """Set `current`, and return whether it is the target; it is not during hold and return.
@@ -93,8 +105,7 @@ class Setpoints:
             return None
         self._refused = x
         geometry = self._allowed(x)
-        largest = self._largest
-        if geometry is None or not -largest < min(*dx, *ddx) <= max(*dx, *ddx) < largest:
+        if geometry is None or not all_below((*dx, *ddx), self._largest):
             return None
         return Setpoint(geometry, dx, ddx)
 
@@ -133,7 +144,7 @@ class Setpoints:
 
     def _determinant(self, geometry: LegGeometry) -> float:
         """Return Eq. 8's determinant, positive on the side of the start."""
-        return float(self._side * closure_determinant(geometry, self._g, self._h))
+        return float(self.side * closure_determinant(geometry, self._g, self._h))
 
     def messages(self) -> list[str]:
         """Return why the setpoint is not the last target."""
@@ -162,6 +173,14 @@ class Setpoints:
     def _hold(self) -> None:
         self._held, self._rejoining = True, None
         self.current = Setpoint(self.current.geometry, _ZERO, _ZERO)
+
+
+def all_below(values: Sequence[Number], limit: Number) -> Number:
+    """Return whether the size of every number is below a limit."""
+    found: Number = True
+    for value in values:
+        found = found * (abs(value) < limit)
+    return found
 
 
 def _sum(a: Triple, b: Triple) -> Triple:

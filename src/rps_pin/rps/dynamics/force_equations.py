@@ -29,7 +29,7 @@ from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.kernels import forces, legs, platform, tips
 from rps_pin.rps.kernels.platform import Inertia, Vector
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions
-from rps_pin.rps.kinematics.legs import RADIAL, PoseLegs
+from rps_pin.rps.kinematics.legs import PoseLegs
 from rps_pin.rps.parameters import RPSParameters
 
 #: A pose is looked at closely from this size of the legs' forces for a unit force on the platform.
@@ -226,7 +226,8 @@ def _leg_forces(
     velocity, change = ([tips.at_legs(ring) for ring in pair] for pair in (rates, changes))
     motion = legs.leg_motion(cosine, sine, d, velocity, change)
     speed, angle_rate, acceleration, angle_acceleration = motion
-    outwards, downwards = (RADIAL @ terms.gravity)[:, None], terms.gravity[2]
+    g_x, g_y, downwards = terms.gravity
+    outwards = np.reshape(tips.at_legs((0.0, g_x, g_y)), (3, -1))
     fall = legs.across_leg(cosine, sine, outwards, downwards)
     moment = forces.cylinder_moment(terms.leg_moment, terms.leg_inertia, angle_acceleration, fall)
     force = np.zeros_like(d)

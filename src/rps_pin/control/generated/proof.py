@@ -1,0 +1,173 @@
+"""What is compared before generated ticks are used: two loops, of which one is interpreted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.codegen.build import Library
+from rps_pin.control.generated.tick import CONTROL_ANSWERS, ESTIMATE
+from rps_pin.errors import CompileError
+from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.robot import RPSRobot
+
+#: Largest difference relative to the size of what is compared.
+TOLERANCE = 1e-10
+_TICKS, _PERIOD = 300, 1e-3
+
+
+class Case(NamedTuple):
+    """Arguments of a loop's ticks."""
+
+    robot: RPSRobot
+    start: Array
+    settings: dict[str, Any]
+    ticks: list[tuple[Any, Any, Any, float | None]]
+    """Length, target, speed, dt."""
+
+
+def prove(name: str, library: Library) -> dict[str, Any]:
+    """Compare a generated tick with the interpreted one over motions and faults.
+
+    Returns
+    -------
+    dict
+        Ticks, how many of them were generated, and the largest relative difference.
+
+    Raises
+    ------
+    CompileError
+        If anything differs by more than `TOLERANCE`, or less than half of the ticks is generated.
+    """
+    worst, generated, ticks = 0.0, 0, 0
+    for number, case in enumerate(cases()):
+        ours, theirs = (_loop(name, case, compiled) for compiled in (library, False))
+        for k, arguments in enumerate(case.ticks):
+            one, other = _ticked(ours, *arguments), _ticked(theirs, *arguments)
+            if one[0] != other[0]:
+                raise CompileError(
+                    f"proof of {name}, motion {number}, tick {k}: the status is {one[0]!r}; it "
+                    f"must be {other[0]!r}",
+                    library.compiler,
+                )
+            generated += _is_ahead(ours)
+            for what, found, expected in zip(_ANSWERS, one[1:], other[1:], strict=True):
+                difference = _difference(found, expected)
+                worst = max(worst, difference)
+                if not difference <= TOLERANCE:
+                    raise CompileError(
+                        f"proof of {name}, motion {number}, tick {k}: {what} is {found.tolist()}; "
+                        f"it must be {expected.tolist()} to {TOLERANCE}",
+                        library.compiler,
+                    )
+        ticks += len(case.ticks)
+    if generated < ticks / 2:
+        raise CompileError(
+            f"proof of {name}: {generated} of {ticks} ticks are generated; at least half must be",
+            library.compiler,
+        )
+    return {"ticks": ticks, "generated": generated, "worst": worst}
+
+
+_ANSWERS = tuple(CONTROL_ANSWERS)
+
+
+def _ticked(loop: Any, length: Any, target: Any, speed: Any, dt: float | None) -> tuple[Any, ...]:
+    """Return the status of a tick, and its answers."""
+    if hasattr(loop, "tick"):
+        status, estimate, forces = (
+            loop.tick(length, target, speed, dt=dt),
+            loop.estimate,
+            loop.forces,
+        )
+    else:
+        status, estimate, forces = loop.estimate(length, speed, dt=dt), loop, np.zeros(3)
+    return (int(status), *estimate.answers[:5], forces)
+
+
+def _is_ahead(loop: Any) -> bool:
+    generated = (loop.estimate if hasattr(loop, "tick") else loop).generated
+    return bool(generated is not None and generated.ahead)
+
+
+def _difference(found: Array, expected: Array) -> float:
+    """Return the largest difference, relative to the largest entry or to 1e-3."""
+    return float(np.abs(found - expected).max() / max(1e-3, np.abs(expected).max()))
+
+
+def _loop(name: str, case: Case, compiled: Any) -> Any:
+    from rps_pin.control.estimator.real_time_robot import RealTimeRobot  # noqa: PLC0415
+    from rps_pin.control.loop.computed_torque import ComputedTorque  # noqa: PLC0415
+    from rps_pin.control.loop.gains import Gains  # noqa: PLC0415
+    from rps_pin.control.loop.pd_control import PDControl  # noqa: PLC0415
+
+    near, gains = (case.robot, case.start), Gains.placed(15.0, integral=0.2)
+    settings = {"compiled": compiled, **case.settings}
+    if name == ESTIMATE:
+        return RealTimeRobot(*near, compiled=compiled)
+    if name.startswith("computed_torque_"):
+        space: Any = name.removeprefix("computed_torque_")
+        return ComputedTorque(*near, gains, space=space, **settings)
+    compensation: Any
+    space, _, compensation = name.removeprefix("pd_control_").partition("_")
+    of_forces = gains.times([3.0, 0.1, 0.1] if space == "task" else 1.0)
+    return PDControl(*near, of_forces, space=space, compensation=compensation, **settings)
+
+
+def cases() -> Iterator[Case]:
+    """Yield motions of several robots, always the same: with friction, payload, faults, limits."""
+    rng = np.random.default_rng(16)
+    for preset in ("micro", "sokolov"):
+        bare = RPSRobot.from_preset(preset)
+        rough = bare.parameters.replace(
+            prismatic_friction=0.5,
+            prismatic_damping=5.0,
+            revolute_friction=0.01,
+            revolute_damping=0.01,
+        )
+        radius = bare.parameters.platform_radius
+        payload = Payload(0.3, (0.1 * radius, 0.2 * radius, 0.1), 1e-3 * np.eye(3))
+        for robot, weak in ((bare, False), (RPSRobot(rough, payload=payload), True)):
+            yield _case(robot, weak, rng)
+
+
+def _case(robot: RPSRobot, weak: bool, rng: np.random.Generator) -> Case:
+    """Return a swing about the middle of the lengths, followed with noise, and with faults."""
+    p = robot.parameters
+    low, high = p.leg_length_limits
+    middle = np.array([(low + high) / 2 if high < np.inf else p.base_radius, 0.0, 0.0])
+    t = _PERIOD * np.arange(_TICKS)[:, None]
+    w = 2 * np.pi * np.array([2.0, 3.0, 5.0])
+    size = np.array([0.01 * middle[0], 0.05, 0.04])
+    rows = [
+        middle + size * np.sin(w * t),
+        size * w * np.cos(w * t),
+        -size * w**2 * np.sin(w * t),
+    ]
+    noise = 1e-7 * middle[0] * rng.normal(size=(_TICKS, 3))
+    free = RPSRobot(p.without_limits())
+    lengths = free.inverse_kinematics(rows[0]).length + noise
+    ticks: list[tuple[Any, Any, Any, float | None]] = []
+    for k in range(_TICKS):
+        target: Any = tuple(row[k] for row in rows)
+        length, speed, dt = lengths[k], None, None
+        if k % 7 == 3:
+            target = None
+        if k % 11 == 5:
+            length, target = length.tolist(), target and tuple(one.tolist() for one in target)
+        if 100 <= k < 150:
+            speed = (lengths[k] - lengths[k - 1]) / _PERIOD
+        if k % 13 == 6:
+            dt = _PERIOD * float(rng.uniform(0.9, 1.1))
+        if k == 180:
+            length = length * np.nan
+        if k == 200:
+            length = length * 1.5
+        if k == 220:
+            target = tuple(row[k] * np.nan for row in rows)
+        ticks.append((length, target, speed, dt))
+    weight = 9.81 * (p.platform_mass + 3 * (p.leg_mass + p.rod_mass)) / 3
+    return Case(robot, rows[0][0], {"force_limit": 3 * weight} if weak else {}, ticks)

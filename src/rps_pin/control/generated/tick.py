@@ -1,0 +1,358 @@
+"""A regular tick as expressions, and as C: estimate, setpoint, law, dynamics, limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+from rps_pin.codegen.units import Kernel, Routine, Unit
+from rps_pin.control.estimator.leg_geometry import (
+    LegGeometry,
+    closure_determinant,
+    in_range,
+    legs_have_length,
+    legs_to,
+    platform_tips,
+)
+from rps_pin.control.estimator.leg_jacobian import leg_jacobian
+from rps_pin.control.estimator.state_estimate import (
+    StateEstimate,
+    departure,
+    geometry_of_legs,
+    moving,
+)
+from rps_pin.control.loop import status as flags
+from rps_pin.control.loop.computed_torque import computed_torque
+from rps_pin.control.loop.feedback import Dynamics, Feedback, pid
+from rps_pin.control.loop.filters import backward_difference, low_pass, mean
+from rps_pin.control.loop.force_limits import within_limits as forces_within
+from rps_pin.control.loop.limits import none_beyond, within_limits
+from rps_pin.control.loop.pace import recovered_pace
+from rps_pin.control.loop.pd_control import pd_control
+from rps_pin.control.loop.setpoints import Setpoint, all_below
+from rps_pin.numerics.elementary import Number, select_all
+from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, kernel, symbols
+from rps_pin.rps.generated.forces import TERMS, actuator_forces, terms_of
+from rps_pin.rps.generated.layout import Layout
+from rps_pin.rps.kinematics.tracking import Triple
+
+#: Numbers that a loop does not change: of the robot and of `RealTimeRobot`.
+ESTIMATE_NUMBERS = Layout(
+    {
+        "radii": 2,
+        "bounds": 7,
+        "speed_limit": 1,
+        "largest": 1,
+        "near": 1,
+        "jump": 1,
+        "condition_limit": 1,
+        "most_steps": 1,
+    }
+)
+#: Those of a controller besides: side is the sign of Eq. 8's determinant at the start.
+CONTROL_NUMBERS = Layout(
+    ESTIMATE_NUMBERS.sizes
+    | TERMS.sizes
+    | {"kp": 3, "kd": 3, "ki": 3, "stop": 1, "side": 1, "force_limit": 3}
+)
+#: Numbers that a tick hands to the next: `started` is 1 after the first reading.
+ESTIMATE_MEMORY = Layout({"length": 3, "direction": 6, "speed": 3, "started": 1, "determinant": 1})
+CONTROL_MEMORY = Layout(
+    ESTIMATE_MEMORY.sizes
+    | {
+        "target_pose": 3,
+        "target_rate": 3,
+        "target_acceleration": 3,
+        "integral": 3,
+        "last_rate": 3,
+        "filtered_rate": 3,
+        "pace": 1,
+    }
+)
+#: Arguments of a tick: `measured` and `given` say whether there are a speed and a target; share is
+#: the filters'.
+ESTIMATE_READING = Layout(
+    {"reading": 3, "reading_speed": 3, "measured": 1, "elapsed": 1, "share": 1}
+)
+CONTROL_READING = Layout(
+    ESTIMATE_READING.sizes | {"pose": 3, "rate": 3, "acceleration": 3, "given": 1}
+)
+#: What a tick writes for the caller, in the order of `Answers`; a controller also its forces.
+ESTIMATE_ANSWERS = {"pose": 3, "rate": 3, "twist": 6, "angle": 3, "speed": 3}
+CONTROL_ANSWERS = ESTIMATE_ANSWERS | {"forces": 3}
+
+_Law = Callable[..., Any]
+#: Laws by name: functions of state, setpoint, h, feedback and dynamics.
+LAWS: Mapping[str, _Law] = {
+    "computed_torque_task": partial(computed_torque, True),
+    "computed_torque_actuator": partial(computed_torque, False),
+    **{
+        f"pd_control_{space}_{compensation}": partial(pd_control, space == "task", compensation)
+        for space in ("task", "actuator")
+        for compensation in ("gravity", "feed_forward", "none")
+    },
+}
+#: The tick of `RealTimeRobot` beside those of the laws.
+ESTIMATE = "estimate"
+#: One C function holds a tick: its parts share most of their values.
+_CHUNK = 4000
+
+
+class Form(NamedTuple):
+    """Layouts of a tick's arrays."""
+
+    numbers: Layout
+    memory: Layout
+    reading: Layout
+    answers: Mapping[str, int]
+
+
+def form_of(name: str) -> Form:
+    """Return the layouts of a tick: `ESTIMATE`, or the name of a law."""
+    if name == ESTIMATE:
+        return Form(ESTIMATE_NUMBERS, ESTIMATE_MEMORY, ESTIMATE_READING, ESTIMATE_ANSWERS)
+    return Form(CONTROL_NUMBERS, CONTROL_MEMORY, CONTROL_READING, CONTROL_ANSWERS)
+
+
+class Estimated(NamedTuple):
+    """An estimate as expressions."""
+
+    state: StateEstimate
+    regular: Number
+    """Whether it is a regular one."""
+    status: Number
+    """`Status`, of a regular one."""
+    memory: dict[str, Any]
+    answers: dict[str, Any]
+
+
+def tick_kernel(name: str) -> Kernel:
+    """Return what follows `FOLLOW` in a tick, as a kernel.
+
+    Its outputs are the verdict (1 for a regular tick, its `Status`), the memory and the answers.
+    """
+    form = form_of(name)
+    given = {
+        "numbers": symbols("n", form.numbers.size),
+        "memory": symbols("m", form.memory.size),
+        "reading": symbols("r", form.reading.size),
+        "direction": symbols("direction", 6),
+        "progress": symbols("progress", 3),
+    }
+    numbers = form.numbers.split(given["numbers"])
+    memory = form.memory.split(given["memory"])
+    reading = form.reading.split(given["reading"])
+    found = _estimate(numbers, memory, reading, given["direction"], given["progress"][0])
+    if name != ESTIMATE:
+        found = _control(LAWS[name], numbers, memory, reading, found)
+    outputs = {
+        "verdict": (found.regular, found.status),
+        "memory": form.memory.join(found.memory),
+        **{one: found.answers[one] for one in form.answers},
+    }
+    made = kernel(f"{name}_kernel", given, outputs)
+    return Kernel(made.function, _CHUNK)
+
+
+def _estimate(
+    numbers: dict[str, Any],
+    memory: dict[str, Any],
+    reading: dict[str, Any],
+    direction: tuple[Number, ...],
+    done: Number,
+) -> Estimated:
+    """Return the estimate of `RealTimeRobot.estimate`."""
+    g, h = numbers["radii"]
+    d, elapsed, last = reading["reading"], reading["elapsed"], memory["length"]
+    change = backward_difference(d, last, elapsed)
+    filtered = select_all(
+        memory["started"], low_pass(change, memory["speed"], reading["share"]), memory["speed"]
+    )
+    speed = select_all(reading["measured"], reading["reading_speed"], filtered)
+    geometry = geometry_of_legs(d, direction, g, h)
+    jacobian = leg_jacobian(geometry, h)
+    state, twist = moving(geometry, jacobian, speed, h)
+    largest = numbers["largest"]
+    regular = (
+        (elapsed > 0.0)
+        * (elapsed < math.inf)
+        * _product(one > 0.0 for one in d)
+        * _product(one < largest for one in d)
+        * (departure(d, last, memory["speed"], elapsed) <= numbers["jump"])
+        * (done >= 1.0)
+        * (abs(jacobian.determinant) >= numbers["near"])
+        * (abs(sum(twist)) < math.inf)
+    )
+    kept = within_limits(geometry, numbers["bounds"]) * none_beyond(speed, numbers["speed_limit"])
+    return Estimated(
+        state,
+        regular,
+        flags.BEYOND_LIMIT * (1.0 - kept),
+        {
+            "length": d,
+            "direction": direction,
+            "speed": speed,
+            "started": 1.0,
+            "determinant": jacobian.determinant,
+        },
+        {
+            "pose": geometry.pose,
+            "rate": state.rate,
+            "twist": twist,
+            "angle": geometry.angle,
+            "speed": speed,
+        },
+    )
+
+
+def _control(
+    law: _Law,
+    numbers: dict[str, Any],
+    memory: dict[str, Any],
+    reading: dict[str, Any],
+    found: Estimated,
+) -> Estimated:
+    """Return the tick of a controller, after its estimate."""
+    g, h = numbers["radii"]
+    given, elapsed, state = reading["given"], reading["elapsed"], found.state
+    pose, rate, acceleration = (
+        select_all(given, reading[name], memory[f"target_{name}"])
+        for name in ("pose", "rate", "acceleration")
+    )
+    platform = platform_tips(pose, h)
+    setpoint = Setpoint(legs_to(platform, g), rate, acceleration)
+    side = numbers["side"] * closure_determinant(setpoint.geometry, g, h)
+    regular = (
+        found.regular
+        * in_range(pose, g, h)
+        * legs_have_length(platform, g)
+        * within_limits(setpoint.geometry, numbers["bounds"])
+        * (side >= numbers["near"])
+        * all_below((*rate, *acceleration), numbers["largest"])
+        * (abs(state.jacobian.determinant) > numbers["stop"])
+        * (abs(closure_determinant(state.geometry, g, h)) > numbers["stop"])
+    )
+    after: dict[str, Any] = {}
+    force = law(state, setpoint, h, _feedback(numbers, memory, reading, after), _dynamics(numbers))
+    regular = regular * (abs(sum(force)) < math.inf) * forces_within(force, numbers["force_limit"])
+    return Estimated(
+        state,
+        regular,
+        found.status,
+        {
+            **found.memory,
+            **after,
+            "target_pose": pose,
+            "target_rate": rate,
+            "target_acceleration": acceleration,
+            "pace": recovered_pace(memory["pace"], elapsed),
+        },
+        {**found.answers, "forces": force},
+    )
+
+
+def _feedback(
+    numbers: dict[str, Any], memory: dict[str, Any], reading: dict[str, Any], after: dict[str, Any]
+) -> Feedback:
+    """Return `Controller._pid`; it puts its memory into `after`."""
+
+    def feedback(error: Triple, wanted: Triple, rate: Triple) -> Triple:
+        measured = reading["measured"]
+        u = mean(wanted, memory["last_rate"])
+        filtered = low_pass(u, memory["filtered_rate"], reading["share"])
+        after["last_rate"] = select_all(measured, memory["last_rate"], wanted)
+        after["filtered_rate"] = select_all(measured, memory["filtered_rate"], filtered)
+        (w1, w2, w3), (v1, v2, v3) = select_all(measured, wanted, filtered), rate
+        command, after["integral"] = pid(
+            error,
+            (w1 - v1, w2 - v2, w3 - v3),
+            memory["integral"],
+            (numbers["kp"], numbers["kd"], numbers["ki"]),
+            reading["elapsed"],
+        )
+        return command
+
+    return feedback
+
+
+def _dynamics(numbers: dict[str, Any]) -> Dynamics:
+    """Return the actuator forces of a motion."""
+    terms = terms_of(numbers)
+
+    def dynamics(geometry: LegGeometry, rate: Triple, acceleration: Triple) -> Triple:
+        (_, x, y), length, _, direction, tilt = geometry
+        return actuator_forces(terms, (x, y, tilt), length, direction, rate, acceleration)
+
+    return dynamics
+
+
+def _product(conditions: Any) -> Number:
+    result: Number = 1.0
+    for one in conditions:
+        result = result * one
+    return result
+
+
+# C ------------------------------------------------------------------------------------------------
+
+
+def tick_texts(name: str) -> tuple[str, ...]:
+    """Return the C text of a tick, with ``int NAME_tick(double *x, double *const *answers)``.
+
+    x holds numbers, memory and reading, one after the other. Of a regular tick it returns the
+    `Status`, and writes the memory and the answers; of any other it returns -1 and writes nothing.
+    """
+    form = form_of(name)
+    numbers, memory, reading = (layout.slices for layout in form[:3])
+    arguments = [
+        f"memory + {memory['length'].start}",
+        f"memory + {memory['direction'].start}",
+        f"reading + {reading['reading'].start}",
+        f"numbers + {numbers['radii'].start}",
+        f"numbers + {numbers['condition_limit'].start}",
+        f"numbers + {numbers['most_steps'].start}",
+        *("direction", "progress"),
+    ]
+    written = ["verdict", "memory_out", *form.answers]
+    routine = Routine(
+        name,
+        (
+            ("numbers", form.numbers.size),
+            ("memory", form.memory.size),
+            ("reading", form.reading.size),
+        ),
+        (("verdict", 2), ("memory_out", form.memory.size), *form.answers.items()),
+        f"""
+    REAL direction[6], progress[3];
+    {FOLLOW.name}({", ".join(arguments)});
+    {name}_kernel(numbers, memory, reading, direction, progress, {", ".join(written)});
+""",
+        (FOLLOW.name, f"{name}_kernel"),
+    )
+    unit = Unit(f"{name}_unit", (*follow_kernels(), tick_kernel(name)), (FOLLOW, routine), (name,))
+    return (unit.c99() + _entry(unit.name, name, form),)
+
+
+def _entry(unit: str, name: str, form: Form) -> str:
+    """Return the C function that writes only after a regular tick."""
+    begin, size = form.numbers.size, form.memory.size
+    places = ["x", f"x + {begin}", f"x + {begin + size}", "y", "y + 2"]
+    at = 2 + size
+    for count in form.answers.values():
+        places.append(f"y + {at}")
+        at += count
+    lines = [
+        f"int {name}_tick(double *x, double *const *answers)",
+        "{",
+        f"    double y[{2 + size + sum(form.answers.values())}];",
+        f"    {unit}_{name}({', '.join(places)}); /* its status: limits may be infinite */",
+        "    if (y[0] != 1.0) return -1;",
+        f"    for (int i = 0; i < {size}; ++i) x[{begin} + i] = y[2 + i];",
+    ]
+    at = 2 + size
+    for k, count in enumerate(form.answers.values()):
+        lines.append(f"    for (int i = 0; i < {count}; ++i) answers[{k}][i] = y[{at} + i];")
+        at += count
+    return "\n".join([*lines, "    return (int)y[1];", "}", ""])
