@@ -68,7 +68,8 @@ def a_tick() -> Callable[[], object]:
     robot = RPSRobot.from_preset("micro")
     path = circle(height=0.223, tilt=0.05, duration=1.0)
     start = path.sample(0.0).pose
-    controller = ComputedTorque(robot, start, Gains.placed(15.0, integral=0.2))
+    gains = Gains.placed(15.0, integral=0.2)
+    controller = ComputedTorque(robot, start, gains, compiled=False)
     lengths = robot.inverse_kinematics(start).length
     return lambda: controller.tick(lengths, path.sample(1e-3))
 

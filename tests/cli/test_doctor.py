@@ -114,16 +114,27 @@ def test_it_looks_for_the_browsers_that_are_used() -> None:
 
 
 def test_what_is_optional_is_no_trouble() -> None:
-    run = doctor("doctor", hidden="numba")
+    run = doctor("doctor", hidden="casadi")
     assert run.returncode == 0, run.stdout
     lines = run.stdout.splitlines()
-    row = next(line for line in lines if " numba " in line)
+    row = next(line for line in lines if " casadi " in line)
     assert row.startswith("-")
-    assert "pip install 'rps-pin[fast]'" in run.stdout
+    assert "pip install 'rps-pin[compile]'" in run.stdout
     # It fits a screen; paths may be long.
     assert all(len(line) <= 80 for line in lines if "/" not in line), lines
     names = {line[8:25].strip() for line in lines if line[:8].strip()}
     assert {"rps-pin", "Chromium", "ffmpeg", "mujoco", "backend", "pin's options"} <= names
+
+
+def test_it_says_why_a_control_loop_is_interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RPS_PIN_COMPILE", "0")
+    run = doctor("doctor")
+    assert run.returncode == 0, run.stdout
+    lines = run.stdout.splitlines()
+    row = next(i for i, line in enumerate(lines) if " control loop " in f" {line[8:]}")
+    assert lines[row].startswith("-")
+    assert "interpreted" in lines[row]
+    assert "switched off by RPS_PIN_COMPILE=0" in lines[row + 1]
 
 
 def test_it_asks_for_what_the_package_needs() -> None:

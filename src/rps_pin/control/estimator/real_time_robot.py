@@ -7,6 +7,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.control.estimator.constrained_forces import ConstrainedForces
 from rps_pin.control.estimator.leg_geometry import (
     LARGEST_LENGTH,
@@ -130,7 +131,7 @@ class RealTimeRobot:
         self.reset(near)
         self._fast, self.engine = generated_tick(
             *(compiled, "estimate", self.answers[:5], self._period),
-            *(self._filter.share, self.take),
+            *(self._filter.share, self.take, _proof_loop),
         )
         if self._fast is not None:
             self.generated = self._fast
@@ -453,6 +454,11 @@ class RealTimeRobot:
         self.force_age += 1
         self.force_status = status = STATUSES[number]
         return status
+
+
+def _proof_loop(robot: RPSRobot, start: Array, compiled: Compiled, **_: Any) -> RealTimeRobot:
+    """Return an object to prove generated code with."""
+    return RealTimeRobot(robot, start, compiled=compiled)
 
 
 def _text(values: Triple | None) -> str:

@@ -29,6 +29,7 @@ Compiled: TypeAlias = "Literal['auto', True, False] | Library"
 _TICK = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
 #: Of a tick that is not regular.
 NOT_REGULAR = -1
+HOW_TO_GET = "pip install 'rps-pin[compile]'"
 #: What generated code is made from, beside the compiler.
 _SOURCES = (
     *("numerics", "codegen", "rps/kernels", "rps/generated"),
@@ -204,8 +205,11 @@ def generated_tick(
     period: float,
     share: Callable[[float], float],
     take: Callable[[dict[str, Any]], None],
+    make: Callable[..., Any],
 ) -> tuple[GeneratedTick | None, str]:
     """Return the tick of a loop in machine code, if there is one, and what runs.
+
+    `make` makes loops to prove it with: see `proof.prove`.
 
     Raises
     ------
@@ -219,7 +223,7 @@ def generated_tick(
     if compiled is False:
         return None, "interpreted, as asked for"
     try:
-        library = built(name) if compiled is True or compiled == "auto" else compiled
+        library = built(name, make) if compiled is True or compiled == "auto" else compiled
         found = GeneratedTick(name, library, answers, period, share, take)
     except CompileError as error:
         if compiled is True:
@@ -237,53 +241,54 @@ def _doubles(values: Sequence[float]) -> memoryview:
     return memoryview(array("d", values))
 
 
-def built(name: str) -> Library:
-    """Return the proven machine code of a tick.
+#: What was built in this process, or why it could not be.
+_BUILT: dict[str, Library | CompileError] = {}
+
+
+def built(name: str, make: Callable[..., Any]) -> Library:
+    """Return the proven machine code of a tick; it is looked for once.
 
     Raises
     ------
     CompileError
         If there is none and it cannot be built.
     """
-    found = _built_once(name)
+    if name not in _BUILT:
+        try:
+            library = _built(name, make)
+            _BUILT[name] = library
+            # Of a loop the best code, from its start: not another, built and proven beside it.
+            if library.better is not None:
+                _BUILT[name] = library.better.result()
+        except CompileError as error:
+            _BUILT.setdefault(name, error)
+    found = _BUILT[name]
     if isinstance(found, CompileError):
         raise found
     return found
 
 
-@cache
-def _built_once(name: str) -> Library | CompileError:
-    """Return the same, or why there is none; looked for once."""
-    try:
-        library = _built(name)
-    except CompileError as error:
-        return error
-    try:  # of a loop, the best code from its start: not another one, built and proven beside it
-        return library.better.result() if library.better is not None else library
-    except CompileError:
-        return library
-
-
-def _built(name: str) -> Library:
+def _built(name: str, make: Callable[..., Any]) -> Library:
     if not name:
         raise CompileError("this law has no generated code", "")
     if os.environ.get("RPS_PIN_COMPILE", "1") == "0":
         raise CompileError("generated code is switched off by RPS_PIN_COMPILE=0", "")
     try:
         version = metadata.version("casadi")
-    except metadata.PackageNotFoundError:
-        raise CompileError("casadi is not installed: pip install 'rps-pin[compile]'", "") from None
-    from rps_pin.codegen.build import Source, build  # noqa: PLC0415
-    from rps_pin.control.generated.proof import prove  # noqa: PLC0415
-    from rps_pin.control.generated.tick import tick_texts  # noqa: PLC0415
+        from rps_pin.codegen.build import Source, build  # noqa: PLC0415
+        from rps_pin.control.generated.proof import prove  # noqa: PLC0415
+        from rps_pin.control.generated.tick import tick_texts  # noqa: PLC0415
 
-    source = Source(
-        f"3-RPS control loop, {name}",
-        (f"{name}_tick",),
-        lambda: tick_texts(name),
-        determined_by=f"{version} {_digest()}",
-    )
-    return build(source, lambda library: prove(name, library))
+        source = Source(
+            f"3-RPS control loop, {name}",
+            (f"{name}_tick",),
+            lambda: tick_texts(name),
+            determined_by=f"{version} {_digest()}",
+        )
+        return build(source, lambda library: prove(name, library, make))
+    except ImportError as error:  # of CasADi only where nothing is kept
+        missing = error.name or error
+        raise CompileError(f"{missing} is not installed: {HOW_TO_GET}", "") from None
 
 
 @cache

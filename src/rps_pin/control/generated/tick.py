@@ -23,14 +23,12 @@ from rps_pin.control.estimator.state_estimate import (
     geometry_of_legs,
     moving,
 )
+from rps_pin.control.laws import Dynamics, Feedback, computed_torque, pd_control, pid
 from rps_pin.control.loop import status as flags
-from rps_pin.control.loop.computed_torque import computed_torque
-from rps_pin.control.loop.feedback import Dynamics, Feedback, pid
 from rps_pin.control.loop.filters import backward_difference, low_pass, mean
+from rps_pin.control.loop.force_limits import recovered_pace
 from rps_pin.control.loop.force_limits import within_limits as forces_within
 from rps_pin.control.loop.limits import none_beyond, within_limits
-from rps_pin.control.loop.pace import recovered_pace
-from rps_pin.control.loop.pd_control import pd_control
 from rps_pin.control.loop.setpoints import Setpoint, all_below
 from rps_pin.numerics.elementary import Number, select_all
 from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, kernel, symbols

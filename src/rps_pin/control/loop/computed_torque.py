@@ -20,39 +20,12 @@ delay limit it), damping 1, and as much integral action as the uncertainty of th
 
 from __future__ import annotations
 
-from rps_pin.control.estimator.leg_jacobian import leg_speed, pose_rate
-from rps_pin.control.estimator.robot_state import leg_motion
+from rps_pin.control.estimator.leg_jacobian import leg_speed
 from rps_pin.control.estimator.state_estimate import StateEstimate
+from rps_pin.control.laws import computed_torque
 from rps_pin.control.loop.controller import Controller
-from rps_pin.control.loop.feedback import Dynamics, Feedback
-from rps_pin.control.loop.setpoints import Setpoint, difference
-from rps_pin.numerics.elementary import Number
+from rps_pin.control.loop.setpoints import Setpoint
 from rps_pin.rps.kinematics.tracking import Triple
-
-_ZERO = (0.0, 0.0, 0.0)
-
-
-def computed_torque(
-    in_task_space: bool,
-    state: StateEstimate,
-    setpoint: Setpoint,
-    h: Number,
-    feedback: Feedback,
-    dynamics: Dynamics,
-) -> Triple | None:
-    """Return the law's forces; see the module's text."""
-    geometry, rate, speed, jacobian = state
-    if in_task_space:
-        e = difference(setpoint.geometry.pose, geometry.pose)
-        c1, c2, c3 = feedback(e, setpoint.rate, rate)
-        a1, a2, a3 = setpoint.acceleration
-        return dynamics(geometry, rate, (a1 + c1, a2 + c2, a3 + c3))
-    speed_wanted, (a1, a2, a3) = leg_motion(*setpoint, h)
-    e = difference(setpoint.geometry.length, geometry.length)
-    c1, c2, c3 = feedback(e, speed_wanted, speed)
-    _, (b1, b2, b3) = leg_motion(geometry, rate, _ZERO, h)
-    u = (a1 + c1 - b1, a2 + c2 - b2, a3 + c3 - b3)
-    return dynamics(geometry, rate, pose_rate(jacobian, u))
 
 
 class ComputedTorque(Controller):

@@ -36,12 +36,11 @@ from rps_pin.control.estimator.real_time_robot import RealTimeRobot
 from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.generated.engine import NOT_REGULAR, Compiled, GeneratedTick, generated_tick
+from rps_pin.control.laws import pid
 from rps_pin.control.loop import status as flags
-from rps_pin.control.loop.feedback import pid
 from rps_pin.control.loop.filters import SetpointRateFilter
-from rps_pin.control.loop.force_limits import ForceLimits
+from rps_pin.control.loop.force_limits import LEAST_PACE, ForceLimits, recovered_pace
 from rps_pin.control.loop.gains import Gains
-from rps_pin.control.loop.pace import LEAST_PACE, recovered_pace
 from rps_pin.control.loop.setpoints import Setpoint, Setpoints
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.errors import InputError, SingularityError
@@ -179,7 +178,7 @@ class Controller(ABC):
         self.reset(near)
         self._generated, self.engine = generated_tick(
             *(compiled, self._generated_law, (*self.estimate.answers[:5], self.forces), period),
-            *(self._rate_filter.share, self._take),
+            *(self._rate_filter.share, self._take, self._proof_loop),
         )
         if self._generated is not None:
             self.estimate.generated, self.estimate.engine = self._generated, self.engine
@@ -287,6 +286,14 @@ class Controller(ABC):
         self._send(force)
         self.status = status = STATUSES[number]
         return status
+
+    def _proof_loop(
+        self, robot: RPSRobot, start: Array, compiled: Compiled, **settings: Any
+    ) -> Controller:
+        """Return a controller with this law, to prove its generated code."""
+        gains = Gains.placed(15.0, integral=0.2)
+        settings |= {"space": self.space, "compiled": compiled}
+        return type(self)(robot, start, gains, **settings)
 
     @property
     def _generated_law(self) -> str:

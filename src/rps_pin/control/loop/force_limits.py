@@ -28,9 +28,13 @@ import proxsuite
 
 from rps_pin.arrays import Array
 from rps_pin.control.estimator.leg_jacobian import LegJacobian
-from rps_pin.numerics.elementary import Number
+from rps_pin.numerics.elementary import Number, less, select
 from rps_pin.rps.kinematics.tracking import Triple
 
+#: Least pace of a target.
+LEAST_PACE = 0.05
+#: Time constant of its return to 1, s.
+_RECOVERY = 0.2
 #: Of ProxQP, with variables scaled by the limits.
 _TOLERANCE = 1e-9
 _MOST_ITERATIONS = 100
@@ -49,6 +53,12 @@ class LimitedForces(NamedTuple):
     """Relative rate of change of the pace, 1/s; negative: slower."""
     solved: bool
     """Whether the program was solved; otherwise each force was limited by itself."""
+
+
+def recovered_pace(pace: Number, elapsed: Number) -> Number:
+    """Return the pace after a time (s) within the limits: it returns to 1."""
+    share = elapsed / _RECOVERY
+    return pace + (1.0 - pace) * select(less(share, 1.0), share, 1.0)
 
 
 def within_limits(force: Triple, limit: Triple) -> Number:

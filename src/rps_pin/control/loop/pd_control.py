@@ -20,51 +20,22 @@ of computed torque in that pose, without the coupling between the errors.
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import Any, cast, get_args
 
 from numpy.typing import ArrayLike
 
-from rps_pin.control.estimator.leg_jacobian import force_of_wrench, wrench_of_force
-from rps_pin.control.estimator.robot_state import leg_motion
+from rps_pin.arrays import Array
+from rps_pin.control.estimator.effective_inertia import effective_inertia
+from rps_pin.control.estimator.leg_jacobian import wrench_of_force
 from rps_pin.control.estimator.state_estimate import StateEstimate
+from rps_pin.control.generated.engine import Compiled
+from rps_pin.control.laws import Compensation, pd_control
 from rps_pin.control.loop.controller import Controller
-from rps_pin.control.loop.feedback import Dynamics, Feedback
 from rps_pin.control.loop.gains import Gains
-from rps_pin.control.loop.setpoints import Setpoint, difference
-from rps_pin.numerics.elementary import Number
+from rps_pin.control.loop.setpoints import Setpoint
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import choice
-
-Compensation = Literal["gravity", "feed_forward", "none"]
-
-_ZERO = (0.0, 0.0, 0.0)
-
-
-def pd_control(
-    in_task_space: bool,
-    compensation: Compensation,
-    state: StateEstimate,
-    setpoint: Setpoint,
-    h: Number,
-    feedback: Feedback,
-    dynamics: Dynamics,
-) -> Triple | None:
-    """Return the law's forces; see the module's text."""
-    geometry, rate, speed, jacobian = state
-    if in_task_space:
-        e = difference(setpoint.geometry.pose, geometry.pose)
-        c = force_of_wrench(jacobian, feedback(e, setpoint.rate, rate))
-    else:
-        speed_wanted, _ = leg_motion(*setpoint, h)
-        e = difference(setpoint.geometry.length, geometry.length)
-        c = feedback(e, speed_wanted, speed)
-    base: Triple | None = _ZERO
-    if compensation == "gravity":
-        base = dynamics(geometry, _ZERO, _ZERO)
-    elif compensation == "feed_forward":
-        base = dynamics(*setpoint)
-    return None if base is None else (base[0] + c[0], base[1] + c[1], base[2] + c[2])
 
 
 class PDControl(Controller):
@@ -94,10 +65,17 @@ class PDControl(Controller):
         compensation: Compensation = "gravity",
         **settings: Any,
     ) -> None:
-        self.compensation: Compensation = choice(
-            compensation, "compensation", get_args(Compensation)
-        )
+        checked = choice(compensation, "compensation", get_args(Compensation))
+        self.compensation = cast("Compensation", checked)
         super().__init__(robot, near, gains, **settings)
+
+    def _proof_loop(
+        self, robot: RPSRobot, start: Array, compiled: Compiled, **settings: Any
+    ) -> Controller:
+        inertia = effective_inertia(robot, start, space=self.space)
+        gains = Gains.placed(15.0, integral=0.2).times(inertia)
+        settings |= {"compensation": self.compensation, "space": self.space, "compiled": compiled}
+        return PDControl(robot, start, gains, **settings)
 
     @property
     def _generated_law(self) -> str:
