@@ -4,9 +4,10 @@
 
 One thread, tick after tick without waiting. Python's garbage collector is frozen and off during the
 loop, as with `LoopClock`. Each stage's time includes reading the clock.
+Stages that generated code computes are measured interpreted too.
 
-The machine's own delays (interrupts, other programs, the host) are measured by a sum that is always
-the same and takes about as long as a tick. Compare the other tails with that one, and with p99.9 of
+The machine's own delays (interrupts, other programs, the host) are measured by sums that are always
+the same and take about as long as a tick. Compare the other tails with that one, and with p99.9 of
 the quietest tenth of the run.
 
 Peers run a tenth of the ticks, in the same run: the same law written with Pinocchio and NumPy, with
@@ -50,8 +51,11 @@ PERIOD = 1e-3
 GAINS = Gains(400.0, 40.0)
 STATES = 1000
 """The motion is repeated after so many ticks."""
-SAME_WORK = range(3000)
-"""To add these takes about as long as a whole tick."""
+SAME_WORK, MORE_WORK = range(300), range(5000)
+"""To add these takes about as long as a whole tick, generated or interpreted."""
+GENERATED = "whole tick, computed torque"
+"""The stage that is compared with `SAME_SUM`."""
+SAME_SUM = "the same sum each tick: the machine's tail"
 
 
 def motion() -> tuple[Array, Array, Array]:
@@ -71,28 +75,36 @@ def stages(robot: RPSRobot) -> dict[str, Callable[[int], object]]:
     legs = leg_jacobians(p, pose)
     speed = np.einsum("nij,nj->ni", legs.length_jacobian, rate)
     length, targets = legs.length, list(zip(*rows, strict=True))
-    loop = RealTimeRobot(robot, pose[0], period=PERIOD)
+    loop, slow = (RealTimeRobot(robot, pose[0], period=PERIOD, compiled=c) for c in (True, False))
     states = [robot.state(*row) for row in targets]
     triples = [tuple(tuple(one.tolist()) for one in row) for row in targets]
     poses = [leg_geometry(row[0], p.base_radius, p.platform_radius) for row in triples]
     solve, peer = ConstrainedForces(robot).solve_state, plain(robot)
 
-    def controller(force_limit: float | None = None, **settings: str) -> ComputedTorque:
-        return ComputedTorque(robot, pose[0], GAINS, force_limit=force_limit, **settings)
+    def controller(compiled: bool, force_limit: float | None = None, **settings: str):
+        settings |= {"force_limit": force_limit, "compiled": compiled}
+        return ComputedTorque(robot, pose[0], GAINS, **settings)
 
-    by_pose, by_legs = controller(), controller(space="actuator")
-    weak = controller(force_limit=4.0)  # the weight alone takes more
+    def tick(one: ComputedTorque) -> Callable[[int], object]:
+        return lambda i: one.tick(length[i], targets[i])
+
+    # Of the weak one the weight alone takes more.
+    by_pose, by_legs, weak = {"space": "task"}, {"space": "actuator"}, {"force_limit": 4.0}
     return {
         "clock alone": lambda i: None,
-        "the same sum each tick: the machine's tail": lambda i: sum(SAME_WORK),
+        SAME_SUM: lambda i: sum(SAME_WORK),
+        "a longer sum": lambda i: sum(MORE_WORK),
         "direct kinematics: estimate": lambda i: loop.estimate(length[i]),
+        "direct kinematics: estimate, interpreted": lambda i: slow.estimate(length[i]),
         "state completion": lambda i: robot_state(poses[i], *triples[i][1:], p.platform_radius),
         "inverse dynamics, state given": lambda i: solve(*states[i]),
         "inverse dynamics, from a pose": lambda i: loop.inverse_dynamics(*targets[i]),
         "QP: force limits": limited(robot, poses),
-        "whole tick, computed torque": lambda i: by_pose.tick(length[i], targets[i]),
-        "the same in actuator space": lambda i: by_legs.tick(length[i], targets[i]),
-        "the same, always saturated": lambda i: weak.tick(length[i], targets[i]),
+        GENERATED: tick(controller(True, **by_pose)),
+        f"{GENERATED}, interpreted": tick(controller(False, **by_pose)),
+        "the same in actuator space": tick(controller(True, **by_legs)),
+        "the same in actuator space, interpreted": tick(controller(False, **by_legs)),
+        "the same, always saturated: interpreted": tick(controller(True, **weak)),
         "peer, dynamics: plain Pinocchio": lambda i: peer(*states[i]),
         "peer, dynamics: bare Pinocchio calls": bare_calls(robot, states),
         **whole_peers(robot, length, speed, states, targets),
@@ -208,10 +220,15 @@ def measure_all(ticks: int, console: Console) -> dict[str, dict[str, float]]:
     return found
 
 
+def engine() -> str:
+    """Return what computes generated ticks."""
+    return RealTimeRobot(RPSRobot.from_preset("micro"), [0.225, 0.0, 0.0]).engine
+
+
 def machine() -> str:
     """Return where this was measured."""
     return (
-        f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; "
+        f"{engine()}; {platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}; "
         f"Python {platform.python_version()}, Pinocchio {pin.__version__}, NumPy {np.__version__}"
     )
 

@@ -1,10 +1,11 @@
-"""Times of the parts of a computed-torque tick, each measured on its own.
+"""Times of the parts of an interpreted computed-torque tick, each measured on its own.
 
     OPENBLAS_NUM_THREADS=1 .venv/bin/python -m benchmarks.tick_profile [--json FILE]
 
 A profiler would more than double the time of code as short as this, unevenly. So each part is
 called alone in a loop, with the arguments of a tick, and the smallest of many medians is reported.
-The rest of a whole tick is the calls between the parts.
+The rest of a whole tick is the calls between the parts. A generated tick has four parts: arguments,
+the call, direct kinematics in it, and the rest.
 """
 
 from __future__ import annotations
@@ -13,9 +14,6 @@ import argparse
 import gc
 import itertools
 import json
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -41,7 +39,7 @@ def parts() -> dict[str, Callable[[], object]]:
     robot = RPSRobot.from_preset("micro")
     p, rows = robot.parameters, motion()
     g, h = p.base_radius, p.platform_radius
-    controller = ComputedTorque(robot, rows[0][0], GAINS, period=PERIOD)
+    controller = ComputedTorque(robot, rows[0][0], GAINS, period=PERIOD, compiled=False)
     lengths = robot.inverse_kinematics(rows[0]).length
     targets = list(zip(*rows, strict=True))
     for i in range(_HALF_WAY):
@@ -78,7 +76,7 @@ def parts() -> dict[str, Callable[[], object]]:
         "target: legs, limits, singularity": lambda: controller._setpoints._allowed(
             goal.geometry.pose
         ),
-        "the law": lambda: controller._pid(errors, rate, rate, PERIOD),
+        "the law": lambda: controller._pid(errors, rate, rate),
         "state completion": lambda: robot_state(geometry, rate, wanted, h),
         "inverse dynamics (Pinocchio, LU)": lambda: loop.dynamics.solve(state),
         "force limits, forces written": lambda: (
@@ -120,39 +118,48 @@ def profile() -> dict[str, float]:
     }
 
 
-def in_a_process(compile_it: bool) -> dict[str, float]:
-    """Return the same from a new process, with or without Numba."""
-    told = subprocess.run(
-        [sys.executable, "-m", "benchmarks.tick_profile", "--one"],
-        env={**os.environ, "RPS_PIN_COMPILE": str(int(compile_it))},
-        stdout=subprocess.PIPE,
-        check=True,
+def generated() -> dict[str, float]:
+    """Return the time of a generated tick's parts, and of the whole, us."""
+    robot, rows = RPSRobot.from_preset("micro"), motion()
+    controller = ComputedTorque(robot, rows[0][0], GAINS, period=PERIOD, compiled=True)
+    lengths = robot.inverse_kinematics(rows[0]).length
+    motions = itertools.cycle(list(zip(lengths, zip(*rows, strict=True), strict=True)))
+    for _ in range(_HALF_WAY):
+        controller.tick(*next(motions))
+    tick = controller._generated
+    assert tick is not None
+    gc.disable()
+    found = measured(
+        {
+            "nothing": lambda: None,
+            "call of the machine code, the same tick": lambda: tick._tick(tick._x, tick._out),
+            "whole tick": lambda: controller.tick(*next(motions)),
+        }
     )
-    found: dict[str, float] = json.loads(told.stdout)
-    return found
+    empty = found.pop("nothing")
+    code, whole = (value - empty for value in found.values())
+    return {
+        "call of the machine code, the same tick": code,
+        "arguments, status, colder caches": whole - code,
+        "whole tick": whole,
+    }
 
 
 def main() -> None:
-    """Measure all parts, compiled and interpreted, and print the table."""
+    """Measure all parts, generated and interpreted, and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path, help="write the figures into this file too")
-    parser.add_argument("--one", action="store_true", help="print JSON of this process alone")
     asked = parser.parse_args()
-    if asked.one:
-        print(json.dumps(profile()))
-        return
-    compiled, interpreted = in_a_process(True), in_a_process(False)
-    table = Table("part of a tick, us")
-    for column in ("compiled", "share", "interpreted"):
-        table.add_column(column, justify="right")
-    for name, value in compiled.items():
-        share = value / compiled["whole tick"]
-        table.add_row(name, f"{value:.1f}", f"{share:.0%}", f"{interpreted[name]:.1f}")
+    found: dict[str, object] = {"machine": machine()}
     console = Console()
-    console.print(table)
+    for name, times in (("generated", generated()), ("interpreted", profile())):
+        table = Table(f"part of a tick, {name}", "us", "share")
+        for part, value in times.items():
+            table.add_row(part, f"{value:.2f}", f"{value / times['whole tick']:.0%}")
+        console.print(table)
+        found[name] = times
     console.print(machine(), highlight=False)
     if asked.json:
-        found = {"machine": machine(), "compiled": compiled, "interpreted": interpreted}
         asked.json.write_text(json.dumps(found, indent=2) + "\n")
 
 

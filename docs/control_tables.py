@@ -277,13 +277,16 @@ def latency() -> str:
 def profile() -> str:
     """Return the table of the measured parts of a tick."""
     measured = json.loads(PROFILE.read_text("utf-8"))
-    compiled, interpreted = measured["compiled"], measured["interpreted"]
-    lines = ["| part of a tick | compiled, us | share | interpreted, us |", "|---|---:|---:|---:|"]
-    lines += [
-        f"| {name} | {value:.1f} | {value / compiled['whole tick']:.0%} | {interpreted[name]:.1f} |"
-        for name, value in compiled.items()
-    ]
-    return "\n".join([*lines, "", f"{measured['machine']}."])
+    lines = []
+    for name in ("generated", "interpreted"):
+        times = measured[name]
+        lines += [f"| part of a tick, {name} | us | share |", "|---|---:|---:|"]
+        lines += [
+            f"| {part} | {value:.2f} | {value / times['whole tick']:.0%} |"
+            for part, value in times.items()
+        ]
+        lines.append("")
+    return "\n".join([*lines, f"{measured['machine']}."])
 
 
 def save_figure_named(run: LoopRun, name: str) -> None:
