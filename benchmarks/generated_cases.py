@@ -50,14 +50,14 @@ MECHANISMS: dict[str, Callable[[], ClosedLoopModel]] = {
 class Case:
     """A mechanism, closed states around its home, and one that it is simulated from."""
 
-    def __init__(self, name: str, make: Callable[[], ClosedLoopModel], start: Array | None = None):
+    def __init__(self, name: str, make: Callable[[], ClosedLoopModel]) -> None:
         self.name, self.mechanism = name, make()
         mechanism = self.mechanism
         self.floating = mechanism.model.existJointName("base")
         base = ["base"] if self.floating else []
         self.independent = [*base, *mechanism.actuated]
         self.size = mechanism.system.independent(self.independent).size
-        self.home = mechanism.home if start is None else start
+        self.home = mechanism.home
         self.q, self.v, self.a, self.tau = self.states(1, 0.02, np.random.default_rng(1))[0]
 
     def states(
@@ -101,7 +101,9 @@ def case(name: str) -> Case:
 
 def chain_case(loops: int, kind: str = "spherical") -> Case:
     """Return a chain of four-bars, its cranks 1 rad below the horizontal."""
-    mechanism = chain(loops, kind)
+    bare = chain(loops, kind)
     angles = {"crank": -1.0, "rocker": -1.0, "coupler": 1.0}
-    start = np.array([angles[name.split("_")[0]] for name in list(mechanism.model.names)[1:]])
-    return Case(f"{loops} four-bars", lambda: mechanism, start)
+    home = [angles[name.split("_")[0]] for name in list(bare.model.names)[1:]]
+    name = f"{loops} four-bar" + "s" * (loops > 1)
+    made = ClosedLoopModel(bare.model, bare.closures, bare.actuated, home=home, name=name)
+    return Case(name, lambda: made)
