@@ -189,6 +189,8 @@ class GeneratedCode:
             better.result()
 
     def _names(self, group: str) -> tuple[str, ...]:
+        if group == "derivatives" and not self.partition.is_actuated:
+            return ("forward_dynamics_derivatives",)  # the forces follow from no actuated motion
         if group in GROUPS:
             return GROUPS[group]
         if group.startswith("frame_"):

@@ -27,8 +27,9 @@ from rps_pin.numerics.linear_algebra import Decomposition, condition_number, nul
 
 #: Largest difference from the Pinocchio engine, relative to the largest number of a result.
 ACCEPTED = 1e-10
-#: Numbers below this count as rounding errors of zero, in SI units.
-_ZERO = 1e-6
+#: Numbers below this count as rounding errors of zero, in SI units; also this much of a function's
+#: largest number: a result that is smaller is left of sums that cancel.
+_ZERO, _CANCELLED = 1e-6, 1e-3
 #: Of a proof's steps in time, those of a call together, s, and of Newton's guesses, rad or
 #: characteristic lengths.
 STEP, _AWAY = 1e-5, 1e-3
@@ -162,22 +163,25 @@ class Proof:
                     )
                 continue
             expected = self.expected(name, sample, found)
+            sizes = [np.abs(one).max(initial=0.0) for one in expected if one is not None]
+            least = max(_ZERO, _CANCELLED * float(np.max(sizes, initial=0.0)))
             for k, (one, of_batch, wanted) in enumerate(zip(found, batch, expected, strict=False)):
                 if wanted is not None:
                     for result in (one, of_batch[i]):
-                        worst = self._refused(name, function, k, result, wanted, worst)
+                        relative = self._difference(name, function, k, result, wanted, least)
+                        worst = max(worst, relative)
             compared += 1
         if not compared:
             raise CompileError(f"generated code of {name} flags all {len(given)} states", "")
         return worst
 
-    def _refused(
-        self, name: str, function: CompiledFunction, k: int, found: Array, wanted: Any, worst: float
+    def _difference(
+        self, name: str, function: CompiledFunction, k: int, found: Array, wanted: Any, least: float
     ) -> float:
-        """Return the worse of two differences; raise if it is above what is accepted."""
+        """Return the relative difference of a result; raise if it is above what is accepted."""
         wanted = np.reshape(wanted, found.shape)
         error = np.abs(found - wanted)
-        size = max(float(np.abs(wanted).max(initial=0.0)), _ZERO)
+        size = max(float(np.abs(wanted).max(initial=0.0)), least)
         relative = float(error.max(initial=0.0)) / size
         if not relative <= ACCEPTED:
             at = np.unravel_index(int(np.argmax(error)), error.shape)
@@ -187,7 +191,7 @@ class Proof:
                 f"{wanted[at]!r}: {relative:.3g} relative, at most {ACCEPTED:g} is accepted",
                 "",
             )
-        return max(worst, relative)
+        return relative
 
     def _arguments(self, function: CompiledFunction, sample: Sample) -> list[Array]:
         values = sample._asdict()
