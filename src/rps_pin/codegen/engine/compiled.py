@@ -66,7 +66,7 @@ class CompiledMechanism:
         self._codes: dict[tuple[str, ...], GeneratedCode] = {code.wrench_frames: code}
         self._lock, self._local = threading.Lock(), threading.local()
         self._plain = not (code.parameters or code.wrench_frames)
-        self._forward = code["forward_dynamics"]
+        self._forward = code["forward_dynamics"].call
 
     # Structure ------------------------------------------------------------------------------------
 

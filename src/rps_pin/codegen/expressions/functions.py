@@ -35,7 +35,9 @@ closing_step             q               dv of the dependent velocities (nv), sq
 stage                    q, v, tau       a (nv), power of actuators, wrenches, damping and friction
                                          (1), growth (1)
 least_norm_step          q               dv of least norm (nv), squared gap (1), growth (1)
-projected_velocity       q, v            v (nv)
+projection               q, v            dv of least norm (nv), v less its opening part of least
+                                         norm (nv), squared gap (1), growth (1)
+projected_velocity       q, v            v (nv), its dependent entries changed
 =======================  ==============  ==========================================================
 """
 
@@ -273,14 +275,29 @@ def _closing_step(x: MechanismExpressions) -> Made:
 
 @_function()
 def _least_norm_step(x: MechanismExpressions) -> Made:
-    """Return a step less its part in the allowed motions: y - T (T' D^-2 T)^-1 T' D^-2 y."""
-    step = -x.dependent(x.in_units(x.rows.gap))
-    if x.independent.size:
-        per_unit = ca.DM(1 / x.system.column_scale)
-        scaled = ca.diag(per_unit) @ x.basis  # D^-1 T
-        along = LDL(ca.sparsify(scaled.T @ scaled)).solve(scaled.T @ (per_unit * step))
-        step = step - x.basis @ along
+    step = _of_least_norm(x, -x.rows.gap)
     return {"q": x.q}, {"step": step, "squared_gap": _squared_gap(x), "growth": x.growth}
+
+
+@_function()
+def _projection(x: MechanismExpressions) -> Made:
+    both = _of_least_norm(x, -ca.horzcat(x.rows.gap, x.rows.jacobian @ x.v))
+    results = {"step": both[:, 0], "projected": x.v + both[:, 1]}
+    return {"q": x.q, "v": x.v}, results | {"squared_gap": _squared_gap(x), "growth": x.growth}
+
+
+def _of_least_norm(x: MechanismExpressions, right: Expression) -> Expression:
+    """Return y of least norm in one unit, (nv, k), with J y = right.
+
+    That is some solution less its part in the allowed motions, y - T (T' D^-2 T)^-1 T' D^-2 y.
+    """
+    some = x.dependent(x.in_units(right))
+    if not x.independent.size:
+        return some
+    per_unit = ca.diag(ca.DM(1 / x.system.column_scale))
+    scaled = ca.sparsify(per_unit @ x.basis)  # D^-1 T
+    along = LDL(ca.sparsify(scaled.T @ scaled)).solve(ca.sparsify(scaled.T @ (per_unit @ some)))
+    return some - x.basis @ along
 
 
 @_function(wrenches=True)

@@ -1,8 +1,8 @@
 """Routines of C with loops: Newton's method on the closures, and steps in time.
 
 A step is that of `rps_pin.closed_loop.simulation.integrators.rk4_step`, and ends on the manifold of
-closed configurations: the dependent coordinates are closed by Newton's steps, the dependent
-velocities follow the independent ones.
+closed configurations: by a correction of least norm, and what that leaves, its square, by the
+dependent joints.
 """
 
 from __future__ import annotations
@@ -127,15 +127,23 @@ def _step(functions: MechanismFunctions) -> Routine:
     for (i = 0; i < {nv}; ++i)
         v2[i] = v[i] + sixth * (a1[i] + CONST(2) * a2[i] + CONST(2) * a3[i] + a4[i]);
     work[0] = sixth * (p1[0] + CONST(2) * p2[0] + CONST(2) * p3[0] + p4[0]);
-    {_call("closed", ["q3"], alone, "q_next", "first", "c")}
+    {_call("projection", ["q3", "v2"], alone, "d", "v3", "first", "c")}
+    {move("q3", "q2")}
+    check[1] = FMAX(check[1], c[0]);
     /* From an open configuration, or far off the manifold: too long a step. */
-    check[0] = FMAX(first[0] / CONST({OPEN**2!r}), c[0]);
-    check[1] = FMAX(check[1], c[1]);
-    {_call("projected_velocity", ["q_next", "v2"], alone, "v_next")}
+    check[0] = first[0] / CONST({OPEN**2!r});
+    if (ANY(LT(CONST({_LAST}), first[0]))) {{
+        {_call("closed", ["q2"], alone, "q_next", "first", "c")}
+        check[0] = FMAX(check[0], c[0]);
+        check[1] = FMAX(check[1], c[1]);
+    }} else {{
+        for (i = 0; i < {nq}; ++i) q_next[i] = q2[i];
+    }}
+    {_call("projected_velocity", ["q_next", "v3"], alone, "v_next")}
 """
     given = (("q", nq), ("v", nv), ("tau", x.system.actuated.size), ("h", 1), *extra)
     outputs = (("q_next", nq), ("v_next", nv), ("work", 1), ("check", 2))
-    calls = ("stage", "integrate", "closed", "projected_velocity")
+    calls = ("stage", "integrate", "projection", "closed", "projected_velocity")
     return Routine("step", given, outputs, body, calls)
 
 
