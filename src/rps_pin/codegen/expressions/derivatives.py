@@ -4,15 +4,17 @@ The equations are those of `rps_pin.closed_loop.dynamics.derivatives`: with F = 
 external forces - J' lambda (lambda held) and c = J a + J' v,
 
     inverse dynamics     dtau = T' dF;
-    forward dynamics     da = T dw + x,  J x = -dc,  (T' M T) dw = T' (S' dtau - dF - M x),
+    forward dynamics     (T' M T) da_i = S' dtau - T' (dF + M x),  J x = -dc,  x_i = 0,
 
 and in independent coordinates y, which the rest follows,
 
-    dq = T dy,    dv = T dy' + V_y dy,    da = T dy'' + A_y dy + A_y' dy',
-    J V_y = -(J v)_q T,    J A_y = -(c_q T + c_v V_y),    J A_y' = -c_v T.
+    dq = T dy,    dv = T dy' + V_y dy,    J V_y = -(J v)_q T,
 
+    dtau = T' (F_q + M X_q) T dy + T' (F_v + M X_v) (T dy' + V_y dy) + T' M T dy'',
+
+X_q and X_v being the x of c_q and c_v. T' M x needs no x: it is -Y' dc with J_d' Y = (M T)_d.
 The derivatives of rnea are in closed form (see `rnea_derivatives`); of the rest of F, of J v and of
-c, CasADi's: the factors of A_d are used again, not
+c, CasADi's: the factors of J_d are used again, not
 differentiated. Derivatives by q are along the tangent of the configuration.
 """
 
@@ -81,15 +83,6 @@ class Slopes:
         return ca.sparsify(self._rnea_slopes[1] + ca.jacobian(self._rest, self.x.v))
 
     @cached_property
-    def _follow(self) -> tuple[Expression, Expression, Expression]:
-        """Return V_y, A_y and A_y', shape (nv, m)."""
-        x = self.x
-        rate_q = self._by_q(x.rows.jacobian @ x.v)
-        velocity = self._held(rate_q @ x.basis)
-        acceleration = self._held(self.opening_q @ x.basis + self.opening_v @ velocity)
-        return velocity, acceleration, self._held(self.opening_v @ x.basis)
-
-    @cached_property
     def opening_q(self) -> Expression:
         """c_q, shape (nc, nv)."""
         return self._by_q(self._opening)
@@ -99,9 +92,36 @@ class Slopes:
         """c_v, shape (nc, nv)."""
         return ca.jacobian(self._opening, self.x.v)
 
-    def _held(self, opening: Expression) -> Expression:
-        """Return X (nv, k) with J X = -opening, zero for the independent velocities."""
-        return ca.sparsify(-self.x.dependent(self.x.in_units(opening)))
+    @cached_property
+    def _mass_times_basis(self) -> Expression:
+        """M T, shape (nv, m)."""
+        return ca.sparsify(self.x.tree.mass_matrix() @ self.x.basis)
+
+    def _reduced(self, of_force: Expression, opening: Expression) -> Expression:
+        """Return T' (dF + M x), (m, k), for the x with J x = -opening and no independent entries.
+
+        T' M x = -Y' opening, J_d' Y = (M T)_d.
+        """
+        x, reduced = self.x, self.x.basis.T @ of_force
+        dependent = x.partition.dependent.tolist()
+        if dependent:
+            reduced -= self._adjoint.T @ opening
+        return ca.sparsify(reduced)
+
+    @cached_property
+    def _adjoint(self) -> Expression:
+        """Y, shape (nc, m)."""
+        return self.x.factors.transposed(
+            self._mass_times_basis[self.x.partition.dependent.tolist(), :]
+        )
+
+    @cached_property
+    def _reduced_q(self) -> Expression:
+        return self._reduced(self.force_q, self.opening_q)
+
+    @cached_property
+    def _reduced_v(self) -> Expression:
+        return self._reduced(self.force_v, self.opening_v)
 
     def at(self, multipliers: Expression, slopes: dict[str, Expression]) -> dict[str, Expression]:
         """Return derivatives with an expression in place of the multipliers."""
@@ -110,41 +130,40 @@ class Slopes:
 
     def inverse(self) -> InverseSlopes:
         """Return the derivatives of the actuator forces, the independent joints being actuated."""
-        T, M = self.x.basis, self.x.tree.mass_matrix()
-        V_y, A_y, A_dy = self._follow
-        by_q, by_v, by_a = T.T @ self.force_q, T.T @ self.force_v, T.T @ M
+        x, T = self.x, self.x.basis
+        rate_q = self._by_q(x.rows.jacobian @ x.v)
+        velocity_y = ca.sparsify(-x.dependent(rate_q @ T))  # V_y
         return InverseSlopes(
-            by_q,
-            by_v,
-            by_a,
-            T.T @ (self.force_q @ T + self.force_v @ V_y + M @ A_y),
-            T.T @ (self.force_v @ T + M @ A_dy),
-            self.x.mass_matrix,
+            T.T @ self.force_q,
+            T.T @ self.force_v,
+            self._mass_times_basis.T,
+            self._reduced_q @ T + self._reduced_v @ velocity_y,
+            self._reduced_v @ T,
+            x.mass_matrix,
         )
 
     def forward(self) -> ForwardSlopes:
         """Return the derivatives of the acceleration.
 
         Those of the independent entries: (T' M T) da_i = S' dtau less what inverse dynamics asks.
+        The others follow, J_d da_d = -(dc + J_i da_i).
         """
-        x = self.x
-        T, M = x.basis, x.tree.mass_matrix()
-
-        def response(of_force: Expression, opening: Expression) -> Expression:
-            """Return da of dF and dc, shapes (nv, k) and (nc, k)."""
-            held = self._held(opening)
-            along = x.inertia.solve(ca.sparsify(-(T.T @ (of_force + M @ held))))
-            return T @ along + held
-
-        by_q, by_v = response(self.force_q, self.opening_q), response(self.force_v, self.opening_v)
+        x, T = self.x, self.x.basis
         inverse = self.inverse()
         of_actuators = ca.sparsify(T[x.system.actuated.tolist(), :].T)
         along = x.inertia.solve(of_actuators)
         return ForwardSlopes(
-            by_q,
-            by_v,
+            self._whole(-x.inertia.solve(self._reduced_q), self.opening_q),
+            self._whole(-x.inertia.solve(self._reduced_v), self.opening_v),
             T @ along,
             -x.inertia.solve(ca.sparsify(inverse.position)),
             -x.inertia.solve(ca.sparsify(inverse.velocity)),
             along,
         )
+
+    def _whole(self, along: Expression, opening: Expression) -> Expression:
+        """Return da (nv, k) of its independent entries (m, k) and of dc (nc, k)."""
+        x, independent = self.x, self.x.independent.tolist()
+        da = -x.dependent(opening + x.jacobian[:, independent] @ along)
+        da[independent, :] = along
+        return da

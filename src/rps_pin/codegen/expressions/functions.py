@@ -147,12 +147,12 @@ def _acceleration(x: MechanismExpressions) -> Made:
     consistent = ca.sumsqr(opening) / speed / x.consistent**2
     check = ca.vertcat(x.opening + consistent, x.growth)
     given = {"q": x.q, "v": x.v, "w": w}
-    # One solution for both: A_d a_d = -(A_u w + s J' v).
-    return given, {"a": _moved(x, w, x.in_units(x.rows.bias)), "check": check}
+    # One solution for both: J_d a_d = -(J_u w + J' v).
+    return given, {"a": _moved(x, w, x.rows.bias), "check": check}
 
 
 def _moved(x: MechanismExpressions, u: Expression, bias: Expression | None = None) -> Expression:
-    """Return y with given independent entries and A y + bias = 0, shape (nv,)."""
+    """Return y with given independent entries and J y + bias = 0, shape (nv,)."""
     independent = x.independent.tolist()
     right = x.jacobian[:, independent] @ u
     y = -x.dependent(right if bias is None else right + bias)
@@ -198,7 +198,7 @@ def _constraint_forces(x: MechanismExpressions) -> Made:
     rest = x.required(x.a)
     rest[x.system.actuated.tolist()] -= x.tau
     rest -= x.least_force(x.reduced(rest)[0])  # what closures cannot carry
-    multipliers = x.in_rows(x.reduced(rest)[1])
+    multipliers = x.reduced(rest)[1]
     given = {"q": x.q, "v": x.v, "a": x.a, "tau": x.tau}
     return given, {"multipliers": x.rows.in_package(multipliers), "check": x.check}
 
@@ -252,7 +252,7 @@ def _forward_dynamics_derivatives(x: MechanismExpressions) -> Made:
     given, results = _MAKERS["forward_dynamics"](x)
     rest = x.required(x.a)
     rest[x.system.actuated.tolist()] -= x.tau
-    found = slopes.at(x.in_rows(x.reduced(rest)[1]), _by(slopes.forward()))
+    found = slopes.at(x.reduced(rest)[1], _by(slopes.forward()))
     names, values = list(found), list(found.values())
     values = ca.substitute(values, [x.a], [results["a"]])
     return given, dict(zip(names, values, strict=True)) | {"check": results["check"]}
@@ -269,7 +269,7 @@ def _integrate(x: MechanismExpressions) -> Made:
 
 @_function()
 def _closing_step(x: MechanismExpressions) -> Made:
-    step = -x.dependent(x.in_units(x.rows.gap))
+    step = -x.dependent(x.rows.gap)
     return {"q": x.q}, {"step": step, "squared_gap": _squared_gap(x), "growth": x.growth}
 
 
@@ -291,7 +291,7 @@ def _of_least_norm(x: MechanismExpressions, right: Expression) -> Expression:
 
     That is some solution less its part in the allowed motions, y - T (T' D^-2 T)^-1 T' D^-2 y.
     """
-    some = x.dependent(x.in_units(right))
+    some = x.dependent(right)
     if not x.independent.size:
         return some
     per_unit = ca.diag(ca.DM(1 / x.system.column_scale))

@@ -1,16 +1,16 @@
 """Dynamics of a mechanism with closed loops as sparse CasADi expressions.
 
-With s the scales that give the closures' rows one unit, A = diag(s) J their Jacobian in it, and
-velocities partitioned into independent ones u and dependent ones (columns A_d, full column rank),
+With J the closures' Jacobian, and velocities partitioned into independent ones u and dependent ones
+(columns J_d, of full column rank),
 
-    A_d T_d = -A_u,      v = T u,      a = T w + a_0,      A_d a_0 = -s J' v,
+    J_d T_d = -J_u,      v = T u,      a = T w + a_0,      J_d a_0 = -J' v,
 
 the forces f = rnea(q, v, a) + passive joint forces - external forces of a motion are carried by
 
-    A_d' y = (f - S' tau)_d,      lambda = s y,      T' S' tau = T' f,
+    J_d' lambda = (f - S' tau)_d,      T' S' tau = T' f,
 
-and (T' M T) w = T' (S' tau - f(a_0)) gives the acceleration. A_d is factorised once by orthogonal
-reflections (see `elimination`), which need no pivot.
+and (T' M T) w = T' (S' tau - f(a_0)) gives the acceleration. J_d, its rows
+scaled to one unit, is factorised once by orthogonal reflections (see `elimination`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from rps_pin.codegen.expressions.tree import Tree
 #: A CasADi SX expression.
 Expression = Any
 
-#: Sum of squared inverse pivots of A_d, in one unit, above which a state is handed to the Pinocchio
+#: Sum of squared inverse pivots of J_d, in one unit, above which a state is handed to the Pinocchio
 #: engine: its rounding errors are still far below 1e-10 there.
 GROWTH = 1e5
 #: The same for the spread of the pivots of T' M T, above which a motion may move no mass.
@@ -107,16 +107,16 @@ class MechanismExpressions:
         """Indices of the independent velocities, shape (m,)."""
         return self.partition.independent
 
-    @cached_property
+    @property
     def jacobian(self) -> Expression:
-        """A, shape (nc, nv): the rows in one unit."""
-        return self.in_units(self.rows.jacobian)
+        """J, shape (nc, nv)."""
+        return self.rows.jacobian
 
     @cached_property
     def factors(self) -> Householder:
-        """Of A_d."""
+        """Of J_d, its rows scaled to one unit."""
         dependent = self.partition.dependent.tolist()
-        return Householder(self.jacobian[:, dependent])
+        return Householder(self.jacobian[:, dependent], row_scale=self.system.row_scale)
 
     @cached_property
     def basis(self) -> Expression:
@@ -129,24 +129,20 @@ class MechanismExpressions:
         return ca.sparsify(basis)
 
     def dependent(self, right: Expression) -> Expression:
-        """Return x (nv, k), zero for the independent velocities, with A x = right (nc, k)."""
+        """Return x (nv, k), zero for the independent velocities, with J x = right (nc, k)."""
         x = ca.SX(self.tree.model.nv, right.shape[1])
         if self.partition.dependent.size:
             x[self.partition.dependent.tolist(), :] = self.factors.solve(ca.sparsify(right))
         return x
 
-    def in_units(self, rows: Expression) -> Expression:
-        """Return quantities of the closures' rows, (nc, k), in one unit."""
-        return _rows_times(self.system.row_scale, rows)
-
     @cached_property
     def drift(self) -> Expression:
         """The acceleration a_0, shape (nv,)."""
-        return ca.densify(-self.dependent(self.in_units(self.rows.bias)))
+        return ca.densify(-self.dependent(self.rows.bias))
 
     @cached_property
     def growth(self) -> Expression:
-        """Sum of the squared inverse pivots of A_d in one unit, over that of `GROWTH`."""
+        """Sum of the squared inverse pivots of J_d in one unit, over that of `GROWTH`."""
         if not self.partition.dependent.size:
             return ca.SX(0)
         units = self.system.column_scale[self.partition.dependent]
@@ -211,7 +207,7 @@ class MechanismExpressions:
         return self.tree.rnea(self.v, a) + self.passive_forces - self.external_forces
 
     def reduced(self, force: Expression) -> tuple[Expression, Expression]:
-        """Return T' f, shape (m,), and y with A_d' y = f_d, shape (nc,)."""
+        """Return T' f, shape (m,), and lambda with J_d' lambda = f_d, shape (nc,)."""
         independent, dependent = self.independent.tolist(), self.partition.dependent.tolist()
         if not dependent:
             return force[independent], ca.SX(self.jacobian.shape[0], 1)
@@ -272,11 +268,7 @@ class MechanismExpressions:
         missing: Expression,
     ) -> Forces:
         error = (force - unproduced - self.jacobian.T @ y)[self.system.passive.tolist()]
-        return Forces(tau, self.in_rows(y), ca.sqrt(ca.sumsqr(error)), unproduced, missing)
-
-    def in_rows(self, y: Expression) -> Expression:
-        """Return lambda of y, the multipliers of A."""
-        return _rows_times(self.system.row_scale, y)
+        return Forces(tau, y, ca.sqrt(ca.sumsqr(error)), unproduced, missing)
 
     # Motion under forces --------------------------------------------------------------------------
 
@@ -296,7 +288,7 @@ class MechanismExpressions:
         """The acceleration under the forces tau, shape (nv,)."""
         force = -self.required(self.drift)
         force[self.system.actuated.tolist()] += self.tau
-        return ca.densify(self.basis @ self.inertia.solve(self.reduced(force)[0]) + self.drift)
+        return ca.densify(self.basis @ self.inertia.solve(self.basis.T @ force) + self.drift)
 
     @cached_property
     def inertia_check(self) -> Expression:
