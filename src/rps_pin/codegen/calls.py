@@ -21,6 +21,8 @@ from rps_pin.validation import numbers, whole_number
 _ONE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 _ONE_HELD = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p)  # keeps the GIL: 60 ns less
 
+#: A batch from which on code for several samples at once is worth its building.
+LARGE_BATCH = 64
 #: Slices of a batch are whole groups of as many samples.
 _GROUP = 8
 
@@ -93,6 +95,8 @@ class CompiledFunction:
         self.name = name
         self.inputs = tuple(inputs)
         self.outputs = tuple(outputs)
+        #: Called before a batch of at least `LARGE_BATCH` samples.
+        self.before_batch: Callable[[], None] = lambda: None
         self._sizes = tuple(math.prod(one.shape) for one in (*self.inputs, *self.outputs))
         self._one_type: Callable[[int], Any] = _ONE if release else _ONE_HELD
         self._local = threading.local()
@@ -162,6 +166,8 @@ class CompiledFunction:
             _samples(array, batch, one.shape, size)
             for array, one, size in zip(arrays, self.inputs, sizes, strict=False)
         ]
+        if n >= LARGE_BATCH:
+            self.before_batch()
         outputs = [np.empty((*batch, *one.shape)) for one in self.outputs]
         status = np.empty(batch, dtype=np.int32)
         places = [(_address(array), 8 * stride) for array, stride in samples]

@@ -87,6 +87,26 @@ def build(
     return _by(found, source, prove, progress, limit)
 
 
+def build_in_background(
+    source: Source,
+    prove: Prove,
+    compiler: CompilerName = "auto",
+    on_ready: Callable[[Library], None] | None = None,
+    limit: float = 600.0,
+) -> Future[Library] | None:
+    """Return the build by a system's compiler, or None if there is none; arguments as `build`'s.
+
+    For code that TinyCC cannot compile, such as that of several samples at once.
+    """
+    found = [] if compiler == "tcc" else list(compilers.find(compiler))
+    return _in_background(found, source, prove, on_ready, limit) if found else None
+
+
+def kept(source: Source) -> Library | None:
+    """Return a library that is in the cache."""
+    return cache.find(cache.cache_folder(), source)
+
+
 def _automatically(
     source: Source,
     prove: Prove,

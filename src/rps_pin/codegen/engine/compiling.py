@@ -17,6 +17,7 @@ def compile_mechanism(
     parameters: Sequence[str] = (),
     wrench_frames: Sequence[str] = (),
     functions: Sequence[str] = tuple(GROUPS),
+    batches: bool = False,
     compiler: CompilerName = "auto",
     device: str = "cpu",
 ) -> CompiledMechanism:
@@ -36,6 +37,10 @@ def compile_mechanism(
     functions
         What is built now, of ``"dynamics"``, ``"kinematics"``, ``"closing"``, ``"forces"``,
         ``"simulation"`` and ``"derivatives"``. The rest is built when it is first called.
+    batches
+        Whether code for several samples at once (in the processor's vectors) is built now. It takes
+        as long again; left out, it is built in the background when the first large batch comes,
+        and batches are computed sample by sample until then.
     compiler
         ``"auto"``, ``"gcc"``, ``"clang"``, ``"cc"`` or ``"tcc"``; see
         `rps_pin.codegen.build.build`. With ``"auto"`` TinyCC, if it is installed, answers within
@@ -54,7 +59,7 @@ def compile_mechanism(
         If there is no compiler, or it fails; or if the code does not agree with the Pinocchio
         engine to 1e-10.
     """
-    code = GeneratedCode(mechanism, parameters, wrench_frames, compiler)
+    code = GeneratedCode(mechanism, parameters, wrench_frames, compiler, batches)
     if device != "cpu":
         raise InputError(f"device = {device!r}: it must be 'cpu' or 'cuda'")
     code.build(*functions)

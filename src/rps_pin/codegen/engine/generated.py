@@ -7,10 +7,10 @@ holds is used without making a single expression.
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import asdict
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen.build import Library, Source, build
-from rps_pin.codegen.build.builder import CompilerName
+from rps_pin.codegen.build.builder import CompilerName, build_in_background, kept
 from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
 from rps_pin.codegen.engine.identity import digest
 from rps_pin.codegen.engine.proof import Proof
@@ -68,6 +68,9 @@ class GeneratedCode:
         Frames at which wrenches act.
     compiler
         As for `build.build`.
+    batches
+        Whether code for several samples at once is built with the rest. Otherwise it is built in
+        the background when a batch first asks for it.
     """
 
     def __init__(
@@ -76,10 +79,13 @@ class GeneratedCode:
         parameters: Sequence[str] = (),
         wrench_frames: Sequence[str] = (),
         compiler: CompilerName = "auto",
+        batches: bool = False,
     ) -> None:
         self.mechanism = mechanism
         self.parameters, self.wrench_frames = tuple(parameters), tuple(wrench_frames)
-        self.compiler = compiler
+        self.compiler, self.batches = compiler, batches
+        self._with_lanes: set[str] = set()
+        self._lanes_in_use: set[str] = set()
         self._lock = threading.RLock()
         self._functions: dict[str, CompiledFunction] = {}
         self._better: list[Future[Library]] = []
@@ -96,7 +102,7 @@ class GeneratedCode:
 
     def with_wrenches(self, frames: Sequence[str]) -> GeneratedCode:
         """Return the code of the same mechanism for wrenches at other frames."""
-        return GeneratedCode(self.mechanism, self.parameters, frames, self.compiler)
+        return GeneratedCode(self.mechanism, self.parameters, frames, self.compiler, self.batches)
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
@@ -150,15 +156,44 @@ class GeneratedCode:
                     self._build(group)
 
     def _build(self, group: str) -> None:
-        names = self._names(group)
-        source = Source(
-            f"{self.mechanism.name or 'mechanism'}, {group}",
-            tuple(f"{name}_{end}" for name in names for end in ("one", "many")),
-            lambda: self._texts(group),
-            vectors=True,
-            determined_by=f"{self.identity} {group}",
+        lanes, single = self._source(group, lanes=True), self._source(group, lanes=False)
+        library = kept(lanes) if self.compiler in ("auto", "gcc", "clang", "cc") else None
+        prove, replace = self._proof_of(group), self._replacing(group)
+        if library is None and self.batches:
+            library = build(lanes, prove, self.compiler, replace)
+        has_lanes = library is not None
+        library = library or build(single, prove, self.compiler, replace)
+        functions = self._loaded(library, library.proof["signatures"])
+        if library.better is not None:
+            self._better.append(library.better)
+        if not has_lanes:
+            for function in functions.values():
+                function.before_batch = partial(self._want_lanes, group)
+        self._functions |= functions
+        self.libraries[group] = library
+
+    def _want_lanes(self, group: str) -> None:
+        """Build code for several samples at once in the background, once."""
+        with self._lock:
+            if group in self._with_lanes:
+                return
+            self._with_lanes.add(group)
+        source, prove = self._source(group, lanes=True), self._proof_of(group)
+        better = build_in_background(source, prove, self.compiler, self._replacing(group, True))
+        if better is not None:
+            self._better.append(better)
+
+    def _source(self, group: str, *, lanes: bool) -> Source:
+        kind = "batches" if lanes else "samples"
+        return Source(
+            f"{self.mechanism.name or 'mechanism'}, {group}, {kind}",
+            tuple(f"{name}_{end}" for name in self._names(group) for end in ("one", "many")),
+            lambda: self._texts(group, lanes),
+            vectors=lanes,
+            determined_by=f"{self.identity} {group} {kind}",
         )
 
+    def _proof_of(self, group: str) -> Callable[[Library], Mapping[str, Any]]:
         def prove(library: Library) -> Mapping[str, Any]:
             signatures = self._signatures(group)
             functions = self._loaded(library, signatures)
@@ -171,20 +206,25 @@ class GeneratedCode:
                 },
             }
 
+        return prove
+
+    def _replacing(self, group: str, lanes: bool = False) -> Callable[[Library], None]:
+        """Return what takes over a better library: one with lanes gives way to no other."""
+
         def replace(better: Library) -> None:
             with self._lock:
-                for name in names:
+                if group in self._lanes_in_use and not lanes:
+                    return
+                if lanes:
+                    self._lanes_in_use.add(group)
+                for name in self._names(group):
                     self._functions[name].replace(_entry(better, name))
                 self.libraries[group] = better
 
-        library = build(source, prove, self.compiler, replace)
-        self._functions |= self._loaded(library, library.proof["signatures"])
-        self.libraries[group] = library
-        if library.better is not None:
-            self._better.append(library.better)
+        return replace
 
     def wait(self) -> None:
-        """Wait for the code of better compilers that is being built in the background."""
+        """Wait for what is being built in the background."""
         for better in list(self._better):
             better.result()
 
@@ -200,15 +240,16 @@ class GeneratedCode:
             f"{', '.join(GROUPS)}"
         )
 
-    def _texts(self, group: str) -> tuple[str, ...]:
+    def _texts(self, group: str, lanes: bool) -> tuple[str, ...]:
         """Return the texts of the functions; they compile at the same time."""
         texts: list[str] = []
         for name in self._names(group):
-            texts += self._unit(name).library(lanes=name != "steps")  # one motion at a time
+            texts += self._unit(name).library(lanes=lanes and name != "steps")  # of one motion
         return tuple(texts)
 
     def _unit(self, name: str) -> Unit:
-        checked = frozenset({name} & _CHECKED)
+        is_checked = name in _CHECKED or name.startswith("frame_jacobian_")
+        checked = frozenset({name} if is_checked else ())
         with_loops = {one.name: one for one in routines(self.functions)}
         if name not in with_loops:
             kernel = Kernel(self.functions[name])
