@@ -51,8 +51,8 @@ class RPSRobot:
         The URDF of the open tree, generated from the parameters.
     mechanism : ClosedLoopModel
         The tree with its three spherical closures ``leg_1``, ``leg_2``, ``leg_3``; nv = 12, nine
-        rows, mobility 3, the prismatic joints actuated. Its characteristic length is h. Friction
-        and payload are in it.
+        rows, mobility 3, the prismatic joints actuated. Its characteristic length is h, and in its
+        home the platform is level. Friction and payload are in it.
     force_terms : ForceTerms
         What the closed form of the actuator forces is made of.
 
@@ -77,15 +77,7 @@ class RPSRobot:
         if payload is not None:
             platform = model.getJointId("platform_free")
             model.appendBodyToJoint(platform, payload.as_inertia(), pin.SE3.Identity())
-        self.mechanism = ClosedLoopModel(
-            model,
-            closures=[LoopClosure(*ball_frames(leg), name=f"leg_{leg}") for leg in LEGS],
-            actuated=[f"leg_{leg}_prismatic" for leg in LEGS],
-            effects=friction_effects(model, parameters),
-            characteristic_length=parameters.platform_radius,
-        )
-        joints = self.mechanism.model.joints
-        index = self.mechanism.model.getJointId
+        joints, index = model.joints, model.getJointId
         free = joints[index("platform_free")]
         revolute = [joints[index(f"leg_{leg}_revolute")] for leg in LEGS]
         prismatic = [joints[index(f"leg_{leg}_prismatic")] for leg in LEGS]
@@ -94,6 +86,29 @@ class RPSRobot:
         self._angle_v = [joint.idx_v for joint in revolute]
         self._length_q = [joint.idx_q for joint in prismatic]
         self._length_v = [joint.idx_v for joint in prismatic]
+        self.mechanism = ClosedLoopModel(
+            model,
+            closures=[LoopClosure(*ball_frames(leg), name=f"leg_{leg}") for leg in LEGS],
+            actuated=[f"leg_{leg}_prismatic" for leg in LEGS],
+            home=self._level(model),
+            effects=friction_effects(model, parameters),
+            characteristic_length=parameters.platform_radius,
+        )
+
+    def _level(self, model: pin.Model) -> Array:
+        """Return the configuration of the platform level, in the middle of the legs' limits."""
+        heights = self.parameters.base_radius * np.linspace(0.05, 3.0, 60)
+        pose = np.column_stack([heights, np.zeros((heights.size, 2))])
+        legs = inverse_kinematics(self.parameters, pose, errors="mask")
+        within = np.flatnonzero(legs.reachable)
+        # Heights of the base's radius and about it are well conditioned.
+        near = within[heights[within] <= 1.2 * self.parameters.base_radius]
+        chosen = near if near.size else within if within.size else np.arange(20)
+        at = int(chosen[chosen.size // 2])
+        q: Array = pin.neutral(model)
+        q[self._free_q + 2] = heights[at]
+        q[self._length_q], q[self._angle_q] = legs.length[at], legs.angle[at]
+        return q
 
     @classmethod
     def from_preset(cls, name: str) -> RPSRobot:

@@ -22,7 +22,7 @@ from rps_pin.codegen.engine.applied import with_parameters
 from rps_pin.codegen.expressions.independent import regular_samples
 from rps_pin.codegen.expressions.parameters import Parameters
 from rps_pin.codegen.expressions.routines import BLOCK
-from rps_pin.errors import CompileError, RPSPinError
+from rps_pin.errors import CompileError, RPSPinError, SingularityError
 from rps_pin.numerics.linear_algebra import Decomposition, condition_number, null_space
 
 #: Largest difference from the Pinocchio engine, relative to the largest number of a result.
@@ -35,6 +35,8 @@ _ZERO, _CANCELLED = 1e-6, 1e-3
 STEP, _AWAY = 1e-5, 1e-3
 #: Condition number of J_d that the walk towards a singularity does not pass.
 _SINGULAR = 1e3
+#: And above which a state is too near to one to be of use.
+_USABLE = 1e4
 #: Condition number of J_d above which generated code may flag a state.
 _MAY_FLAG = 1e3
 
@@ -87,7 +89,10 @@ class Proof:
         nv = mechanism.model.nv
         self._dependent = np.setdiff1d(np.arange(nv), independent)
         home = self._m.close(mechanism.home, within_limits=False)
-        places = [*regular_samples(self._m.system, home).configurations[:5]]
+        found = regular_samples(self._m.system, home).configurations
+        places = [q for q in found if self._condition(q) < _USABLE][:5]
+        if not places:
+            raise CompileError(f"{mechanism.name}: all states near home are singular", "")
         self.samples = [self._sample(q) for q in (*places, self._towards_singularity(places[-1]))]
 
     def _sample(self, q: Array) -> Sample:
@@ -107,11 +112,11 @@ class Proof:
             np.abs(pin.computeGeneralizedGravity(model, m.system.data, q)).max(initial=0)
         )
         wrenches = max(weight, _ZERO) * rng.normal(size=6 * len(self._frames))
-        tau = m.inverse_dynamics(q, v, a, wrenches=self._acting(wrenches)).tau
-        jacobian = m.system.scaled(m.jacobian(q))[:, self._dependent]
-        return Sample(
-            q, v, a, tau, u, w, wrenches, self._parameters, near, condition_number(jacobian)
-        )
+        try:
+            tau = m.inverse_dynamics(q, v, a, wrenches=self._acting(wrenches)).tau
+        except SingularityError:  # actuators that hardly move one of the motions
+            tau = 0.1 * weight * rng.normal(size=m.system.actuated.size)
+        return Sample(q, v, a, tau, u, w, wrenches, self._parameters, near, self._condition(q))
 
     def _closed(self, q: Array) -> Array:
         """Return q after one of Newton's steps of least norm: closed to rounding error."""
@@ -120,6 +125,10 @@ class Proof:
         gaps = system.row_scale * self._m.loop_errors(q).position
         step = -system.column_scale * factors.least_norm(gaps)
         return np.asarray(pin.integrate(self._m.model, q, step))
+
+    def _condition(self, q: Array) -> float:
+        """Return the condition number of J_d, in one unit."""
+        return condition_number(self._m.system.scaled(self._m.jacobian(q))[:, self._dependent])
 
     def _towards_singularity(self, q: Array) -> Array:
         """Return the end of a walk in an allowed direction, short of a singularity."""
@@ -132,7 +141,7 @@ class Proof:
                 q = m.close(pin.integrate(m.model, q, step), within_limits=False, restarts=0)
             except (RPSPinError, np.linalg.LinAlgError):
                 break
-            now = condition_number(m.system.scaled(m.jacobian(q))[:, self._dependent])
+            now = self._condition(q)
             if not now < _SINGULAR:
                 break
             if now > worst:

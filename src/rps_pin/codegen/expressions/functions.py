@@ -184,7 +184,8 @@ def _inverse_dynamics(x: MechanismExpressions) -> Made:
     }
     if x.system.actuated.size < x.independent.size:
         results |= {"unproduced": found.unproduced, "missing": found.missing}
-    return {"q": x.q, "v": x.v, "a": x.a}, results | {"check": x.check}
+    check = ca.vertcat(x.opening, x.growth + found.growth)
+    return {"q": x.q, "v": x.v, "a": x.a}, results | {"check": check}
 
 
 @_function(wrenches=True)

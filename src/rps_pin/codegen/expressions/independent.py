@@ -218,9 +218,9 @@ def _condition(matrix: Array) -> float:
 def choose(system: ConstraintSystem, jacobians: Array, pattern: Bools | None = None) -> Partition:
     """Return the independent velocities of a mechanism, the same for the same arguments.
 
-    The actuated ones where they determine the motion. Otherwise the velocities with the largest
-    part in the motions that those chosen before leave (QR with column pivoting of bases of the
-    motions at all samples at once), actuated ones preferred.
+    The actuated ones where they determine the motion, at half of the samples or more. Otherwise the
+    velocities with the largest part in the motions that those chosen before leave (QR with column
+    pivoting of bases of the motions at all samples at once), actuated ones preferred.
 
     Parameters
     ----------
@@ -253,18 +253,20 @@ def choose(system: ConstraintSystem, jacobians: Array, pattern: Bools | None = N
         )
     found = ranks.pop()
 
-    def partition(independent: Indices) -> Partition:
+    def partition(independent: Indices, at: Array = jacobians) -> Partition:
         dependent = np.setdiff1d(np.arange(columns), independent)
-        worst = max(_condition(jacobian[:, dependent]) for jacobian in jacobians)
+        worst = max(_condition(jacobian[:, dependent]) for jacobian in at)
         is_actuated = np.array_equal(independent, system.actuated)
         return Partition(
             independent, dependent, idle, found, rows - found, is_actuated, float(worst)
         )
 
     if system.actuated.size == columns - found:
-        actuated = partition(system.actuated)
-        if actuated.condition <= _ACCEPTED:
-            return actuated
+        # Home may be a singularity of the actuators, which is no reason against them elsewhere.
+        conditions = [_condition(jacobian[:, system.passive]) for jacobian in jacobians]
+        regular = np.array(conditions) <= _ACCEPTED
+        if 2 * np.count_nonzero(regular) >= len(jacobians):
+            return partition(system.actuated, jacobians[regular])
     motions = np.array([_motions(jacobian, found) for jacobian in jacobians])
     best: Partition | None = None
     for preference in _PREFERENCES:

@@ -40,6 +40,8 @@ Expression = Any
 GROWTH = 1e5
 #: The same for the spread of the pivots of T' M T, above which a motion may move no mass.
 SPREAD = 1e12
+#: Keeps a quotient of two numbers that vanish at zero.
+_NOTHING = 1e-300
 
 
 class Forces(NamedTuple):
@@ -55,6 +57,8 @@ class Forces(NamedTuple):
     """Residual force of an underactuated mechanism, shape (nv,); else structurally zero."""
     missing: Expression
     """Its squared size, relative to that of the reduced force."""
+    growth: Expression
+    """As `MechanismExpressions.growth`, of the actuators' part in the motions."""
 
 
 class MechanismExpressions:
@@ -145,9 +149,7 @@ class MechanismExpressions:
         """Sum of the squared inverse pivots of J_d in one unit, over that of `GROWTH`."""
         if not self.partition.dependent.size:
             return ca.SX(0)
-        units = self.system.column_scale[self.partition.dependent]
-        inverse = [pivot.value / units[pivot.column] for pivot in self.factors.inverse_pivots]
-        return _sum_of_squares(inverse) / GROWTH**2
+        return _growth(self.factors, 1 / self.system.column_scale[self.partition.dependent])
 
     @cached_property
     def opening(self) -> Expression:
@@ -228,25 +230,27 @@ class MechanismExpressions:
         actuated, none = self.system.actuated.tolist(), ca.SX(self.tree.model.nv, 1)
         reduced, y = self.reduced(force)
         if self.partition.is_actuated:
-            return self._forces(force, reduced, y, none, ca.SX(1, 1))
+            return self._forces(force, reduced, y, none, ca.SX(1, 1), ca.SX(0))
         of_actuators = self.basis[actuated, :]  # S T, (na, m)
         scale = self.system.column_scale[self.system.actuated]
         if len(actuated) >= self.independent.size:
-            weighted = _rows_times(1 / scale, of_actuators)
-            tau = _rows_times(1 / scale, Householder(weighted).transposed(reduced))
+            factors = Householder(_rows_times(1 / scale, of_actuators))
+            tau = _rows_times(1 / scale, factors.transposed(reduced))
+            growth = _growth(factors, 1 / self.system.column_scale[self.independent])
             unproduced = missing = none
             share = ca.SX(1, 1)
         else:
             metric = _rows_times(1 / self.system.column_scale, self.basis)
             lower = ca.chol(ca.densify(metric.T @ metric)).T  # (D^-1 T)' (D^-1 T) = L L'
             whitened = ca.solve(lower, ca.densify(reduced))
-            tau = Householder(ca.solve(lower, ca.densify(of_actuators.T))).solve(whitened)
+            factors = Householder(ca.solve(lower, ca.densify(of_actuators.T)))
+            tau, growth = factors.solve(whitened), _growth(factors, scale)
             missing = ca.solve(lower, reduced - of_actuators.T @ tau)
-            share = ca.sumsqr(missing) / ca.sumsqr(whitened)
+            share = ca.sumsqr(missing) / (ca.sumsqr(whitened) + _NOTHING)
             unproduced = self.least_force(reduced - of_actuators.T @ tau)
         rest = force - unproduced
         rest[actuated] -= tau
-        return self._forces(force, tau, self.reduced(rest)[1], unproduced, share)
+        return self._forces(force, tau, self.reduced(rest)[1], unproduced, share, growth)
 
     def least_force(self, reduced: Expression) -> Expression:
         """Return the least force f (nv,) with a given T' f, D^-2 T (T' D^-2 T)^-1 T' f.
@@ -266,9 +270,10 @@ class MechanismExpressions:
         y: Expression,
         unproduced: Expression,
         missing: Expression,
+        growth: Expression,
     ) -> Forces:
         error = (force - unproduced - self.jacobian.T @ y)[self.system.passive.tolist()]
-        return Forces(tau, y, ca.sqrt(ca.sumsqr(error)), unproduced, missing)
+        return Forces(tau, y, ca.sqrt(ca.sumsqr(error)), unproduced, missing, growth)
 
     # Motion under forces --------------------------------------------------------------------------
 
@@ -305,5 +310,7 @@ def _rows_times(factors: Array, rows: Expression) -> Expression:
     return ca.sparsify(ca.diag(ca.DM(factors)) @ rows)
 
 
-def _sum_of_squares(numbers: Sequence[Expression]) -> Expression:
-    return sum((x * x for x in numbers), ca.SX(0))
+def _growth(factors: Householder, units: Array) -> Expression:
+    """Return the sum of the squared inverse pivots, times the columns' units, over `GROWTH`'s."""
+    inverse = (pivot.value * units[pivot.column] for pivot in factors.inverse_pivots)
+    return sum((x * x for x in inverse), ca.SX(0)) / GROWTH**2
