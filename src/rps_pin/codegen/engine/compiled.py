@@ -66,7 +66,9 @@ class CompiledMechanism:
         self._codes: dict[tuple[str, ...], GeneratedCode] = {code.wrench_frames: code}
         self._lock, self._local = threading.Lock(), threading.local()
         self._plain = not (code.parameters or code.wrench_frames)
-        self._forward = code["forward_dynamics"].call
+        self._calls = _Calls(code)
+        actuated = code.mechanism.system.actuated.size
+        self._underactuated = actuated < code.partition.independent.size
 
     # Structure ------------------------------------------------------------------------------------
 
@@ -343,39 +345,40 @@ class CompiledMechanism:
         threads: int = 1,
     ) -> GeneratedForces:
         """Return the forces of motions; see `ClosedLoopModel.inverse_dynamics`."""
-        found: Sequence[Any]
-        *found, status = self._generated(wrenches)["inverse_dynamics"](
-            q, v, a, *self._extra("inverse_dynamics", wrenches, parameters), threads=threads
+
+        def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
+            result = m.inverse_dynamics(q, v, a, wrenches=w)
+            lacking = result.unproduced is not None
+            found: list[Any] = [result.tau, result.constraint_forces]
+            found += [np.array([result.residual])]
+            if self._underactuated:
+                found += [result.unproduced if lacking else np.zeros(m.model.nv)]
+                found += [np.array([float(lacking)])]
+            return found
+
+        tau, multipliers, residual, *rest = self._run(
+            "inverse_dynamics",
+            (q, v, a),
+            answer,
+            wrenches,
+            parameters=parameters,
+            errors=errors,
+            threads=threads,
         )
-        if status.__class__ is not int or status:
-            count = len(found)
-
-            def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
-                result = m.inverse_dynamics(q, v, a, wrenches=w)
-                lacking = result.unproduced is not None
-                answers = [result.tau, result.constraint_forces, np.array([result.residual])]
-                return [*answers, result.unproduced if lacking else 0.0, float(lacking)][:count]
-
-            given = (q, v, a)
-            found = self._settled(
-                "inverse_dynamics", found, status, given, answer, wrenches, parameters, errors
-            )
-        tau, multipliers, residual, *rest = found
         unproduced = None
         if rest:
             lacking = rest[1][..., 0] > least_effort.RESIDUAL**2
             if np.any(lacking):
                 unproduced = np.where(lacking[..., None], rest[0], 0.0)
-        at = np.array(q, dtype=np.float64)
-        passive = self.mechanism.system
+        at = q.copy() if q.__class__ is np.ndarray else np.array(q, dtype=np.float64)
+        return GeneratedForces(tau, multipliers, residual, unproduced, (self, at, parameters))
 
-        def passive_jacobian() -> Array:
-            rows, columns = passive.factorisation.scales
-            jacobian = self.jacobian(at, parameters=parameters)
-            return np.asarray(rows * jacobian[..., passive.passive] * columns)
-
-        size: Any = residual[..., 0] if residual.ndim > 1 else float(residual[0])
-        return GeneratedForces(tau, multipliers, size, unproduced, passive_jacobian)
+    def passive_jacobian(self, q: Array, parameters: ArrayLike | None = None) -> Array:
+        """Return J_p, all entries in one unit, shape (..., nc, np)."""
+        system = self.mechanism.system
+        rows, columns = system.factorisation.scales
+        jacobian = self.jacobian(q, parameters=parameters)[..., system.passive]
+        return np.asarray(rows * jacobian * columns)
 
     def generalised_force(
         self,
@@ -424,10 +427,6 @@ class CompiledMechanism:
         **options: Any,
     ) -> Array:
         """Return accelerations under actuator forces, (..., nv); see `ClosedLoopModel`."""
-        if self._plain and wrenches is None and not options:
-            a, status = self._forward(q, v, tau)
-            if status.__class__ is int and not status:
-                return np.asarray(a)
 
         def answer(m: ClosedLoopModel, q: Array, v: Array, tau: Array, w: Any) -> Sequence[Any]:
             return (m.forward_dynamics(q, v, tau, wrenches=w),)
@@ -597,11 +596,16 @@ class CompiledMechanism:
 
         `refused` tells of the first result which samples are flagged too.
         """
-        extra = self._extra(name, wrenches, parameters)
-        *found, status = self._generated(wrenches)[name](*given, *extra, threads=threads)
+        if self._plain and not wrenches and parameters is None:
+            *found, status = self._calls[name](*given, threads=threads)
+        else:
+            extra = self._extra(name, wrenches, parameters)
+            *found, status = self._generated(wrenches)[name](*given, *extra, threads=threads)
         if refused is not None:
             status = status | refused(found[0])
             status = int(status) if found[0].ndim == 1 else status
+        if status.__class__ is int and not status:
+            return found  # type: ignore[no-any-return]
         return self._settled(name, found, status, given, answer, wrenches, parameters, errors)
 
     def _one(
@@ -725,6 +729,18 @@ class CompiledMechanism:
         elif parameters is not None:
             raise InputError("the mechanism was compiled without parameters; name them in compile")
         return extra
+
+
+class _Calls(dict[str, Callable[..., Any]]):
+    """Calls of functions by name, each looked up once."""
+
+    def __init__(self, code: GeneratedCode) -> None:
+        super().__init__()
+        self._code = code
+
+    def __missing__(self, name: str) -> Callable[..., Any]:
+        self[name] = call = self._code[name].call
+        return call
 
 
 def _stacked(wrenches: Sequence[ArrayLike]) -> Array:

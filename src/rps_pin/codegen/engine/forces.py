@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.inverse_dynamics import orientation
 from rps_pin.numerics.linear_algebra import condition_number
+
+
+class HasPassiveJacobian(Protocol):
+    """A `CompiledMechanism`."""
+
+    def passive_jacobian(self, q: Array, parameters: ArrayLike | None = None) -> Array:
+        """Return J_p."""
 
 
 class GeneratedForces:
@@ -24,19 +32,27 @@ class GeneratedForces:
         None if the actuators produce the motion of every sample.
     """
 
-    __slots__ = ("_passive_jacobian", "constraint_forces", "residual", "tau", "unproduced")
+    __slots__ = ("_at", "_residual", "constraint_forces", "tau", "unproduced")
 
     def __init__(
         self,
         tau: Array,
         constraint_forces: Array,
-        residual: Any,
+        residual: Array,
         unproduced: Array | None,
-        passive_jacobian: Callable[[], Array],
+        at: tuple[HasPassiveJacobian, Array, Any],
     ) -> None:
-        self.tau, self.constraint_forces, self.residual = tau, constraint_forces, residual
-        self.unproduced = unproduced
-        self._passive_jacobian = passive_jacobian
+        self.tau, self.constraint_forces, self._residual = tau, constraint_forces, residual
+        self.unproduced, self._at = unproduced, at
+
+    @property
+    def residual(self) -> Any:
+        """Norm of the equations' error on the passive rows, float or (...)."""
+        return self._residual[..., 0] if self._residual.ndim > 1 else float(self._residual[0])
+
+    def _passive_jacobian(self) -> Array:
+        mechanism, q, parameters = self._at
+        return mechanism.passive_jacobian(q, parameters)
 
     @property
     def condition(self) -> Any:
