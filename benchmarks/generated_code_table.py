@@ -134,9 +134,10 @@ def same(found: Array, expected: Array) -> None:
 def add_derivatives(figures: Figures, one: Case, fast: Any) -> None:
     """Measure the derivatives of inverse and forward dynamics, where both engines have them."""
     exact, q, v, a, tau = one.mechanism, one.q, one.v, one.a, one.tau
+    names = [one.independent] if one.floating else []
     both: dict[str, Callable[[Any], Any]] = {
         "inverse": lambda engine: engine.inverse_dynamics_derivatives(q, v, a),
-        "forward": lambda engine: engine.forward_dynamics_derivatives(q, v, tau, one.independent),
+        "forward": lambda engine: engine.forward_dynamics_derivatives(q, v, tau, *names),
     }
     for which, call in both.items():
         try:
@@ -169,12 +170,13 @@ def stepped(one: Case, fast: Any) -> dict[str, Callable[[], Motion]]:
     q, v, tau = one.start()
 
     def generated() -> Motion:
-        state = [q, v]
+        at, rate = q, v
 
         def step() -> None:
-            state[:] = fast.step(*state, tau, STEP)
+            nonlocal at, rate
+            at, rate = fast.step(at, rate, tau, STEP)
 
-        return step, lambda: one.mechanism.loop_gap(state[0])
+        return step, lambda: one.mechanism.loop_gap(at)
 
     def today() -> Motion:
         stepper = Stepper(one.mechanism, q, v)
