@@ -1,4 +1,4 @@
-r"""Quantities of a mechanism as named CasADi functions, from which C and CUDA are generated.
+"""Quantities of a mechanism as named CasADi functions, from which C and CUDA are generated.
 
 Where it says (check), the last result
 of the function is ``check``: the opening of the loops and the growth of rounding errors, at most 1
@@ -6,39 +6,39 @@ each where the other results hold (see `expressions`). External wrenches (6 for 
 and moment in world axes at the frame's origin) and parameters follow the arguments listed, if the
 mechanism was given any.
 
-=======================  ==============  ==========================================================
-name                     arguments       results
-=======================  ==============  ==========================================================
-gaps                     q               e (nc)
-jacobian                 q               J (nc nv)
-motion_basis             q               T (nv m) (check)
-velocity                 q, u            v (nv) (check)
-acceleration             q, v, w         a (nv) (check)
-inverse_dynamics         q, v, a         tau (na), lambda (nc), residual (1); if there are fewer
-                                         actuators than motions: residual force (nv), its squared
-                                         share (1) (check)
-forward_dynamics         q, v, tau       a (nv) (check)
-constraint_forces        q, v, a, tau    lambda (nc) (check)
-generalised_force        q, v, a         rnea + passive - external forces (nv)
-mass_matrix              q               T' M T (m m) (check)
-bias                     q, v            T' (required force of a_0) (m) (check)
-gravity_forces           q               T' g (m) (check)
-energy                   q, v            kinetic, potential (2)
-inverse_dynamics_\        q, v, a         derivatives of tau by q, v, a (m nv each), by position,
-derivatives                              velocity, acceleration (m m each) (check)
-forward_dynamics_\        q, v, tau       derivatives of a by q, v (nv nv), tau (nv na), and of its
-derivatives                              independent entries: position, velocity (m m), actuation
-                                         (m na) (check)
-integrate                q, dv           q (nq)
-closing_step             q               dv of the dependent velocities (nv), squared gap (1),
-                                         growth (1)
-stage                    q, v, tau       a (nv), power of actuators, wrenches, damping and friction
-                                         (1), growth (1)
-least_norm_step          q               dv of least norm (nv), squared gap (1), growth (1)
-projection               q, v            dv of least norm (nv), v less its opening part of least
-                                         norm (nv), squared gap (1), growth (1)
-projected_velocity       q, v            v (nv), its dependent entries changed
-=======================  ==============  ==========================================================
+============================  ==============  ======================================================
+name                          arguments       results
+============================  ==============  ======================================================
+gaps                          q               e (nc)
+jacobian                      q               J (nc nv)
+motion_basis                  q               T (nv m) (check)
+velocity                      q, u            v (nv) (check)
+acceleration                  q, v, w         a (nv) (check)
+inverse_dynamics              q, v, a         tau (na), lambda (nc), residual (1); if there are
+                                              fewer actuators than motions: residual force (nv), its
+                                              squared share (1) (check)
+forward_dynamics              q, v, tau       a (nv) (check)
+constraint_forces             q, v, a, tau    lambda (nc) (check)
+generalised_force             q, v, a         rnea + passive - external forces (nv)
+mass_matrix                   q               T' M T (m m) (check)
+bias                          q, v            T' (required force of a_0) (m) (check)
+gravity_forces                q               T' g (m) (check)
+energy                        q, v            kinetic, potential (2)
+inverse_dynamics_derivatives  q, v, a         derivatives of tau by q, v, a (m nv each), by
+                                              position, velocity, acceleration (m m each) (check)
+forward_dynamics_derivatives  q, v, tau       derivatives of a by q, v (nv nv), tau (nv na), and of
+                                              its independent entries: position, velocity (m m),
+                                              actuation (m na) (check)
+integrate                     q, dv           q (nq)
+closing_step                  q               dv of the dependent velocities (nv), squared gap (1),
+                                              growth (1)
+stage                         q, v, tau       a (nv), power of actuators, wrenches, damping and
+                                              friction (1), growth (1)
+least_norm_step               q               dv of least norm (nv), squared gap (1), growth (1)
+projection                    q, v            dv of least norm (nv), v less its opening part of
+                                              least norm (nv), squared gap (1), growth (1)
+projected_velocity            q, v            v (nv), its dependent entries changed
+============================  ==============  ======================================================
 """
 
 from __future__ import annotations

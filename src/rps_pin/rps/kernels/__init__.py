@@ -3,7 +3,7 @@
 A kernel takes and returns numbers and tuples of numbers: floats, NumPy arrays (one entry a sample),
 complex numbers (derivatives by complex step) or CasADi expressions. There are no shapes, checks or
 objects; those stand around the kernels, in `rps_pin.rps.kinematics` and `rps_pin.rps.dynamics`.
-Compiled functions call kernels too (see `rps_pin.numerics.compiled`).
+Ticks of control loops are generated from them (see `rps_pin.control.generated`).
 
 - `tilt_functions`: Stumpff functions and the coefficients of the rotation
 - `platform`: rotation, quaternion, angular velocity and acceleration, rigid-body wrench
