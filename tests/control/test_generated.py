@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from rps_pin import InputError, RPSRobot
 from rps_pin.control import Answers, ComputedTorque, Gains, PDControl, RealTimeRobot, Status
+from rps_pin.control.estimator import real_time_robot
 from rps_pin.control.generated import engine, proof
-from rps_pin.control.generated.tick import ESTIMATE, LAWS, tick_texts
+from rps_pin.control.generated.tick import DYNAMICS, ESTIMATE, LAWS, tick_texts
 from rps_pin.errors import CompileError
 from rps_pin.rps import Payload
 from tests import processes
@@ -200,7 +201,33 @@ def test_the_state_of_a_generated_tick_is_there() -> None:
             assert one.forces_for([0.1, 0.2, 0.3]) & ~Status.BEYOND_LIMIT == 0
         np.testing.assert_allclose(ours.answers.forces, theirs.answers.forces, rtol=1e-10)
         np.testing.assert_allclose(ours.answers.reactions, theirs.answers.reactions, atol=1e-9)
+        assert ours._forces_generated
     assert ours.state.geometry.pose == pytest.approx(theirs.state.geometry.pose, rel=1e-12)
+
+
+def test_inverse_dynamics_are_the_interpreted_ones() -> None:
+    rng = np.random.default_rng(12)
+    for robot in robots():
+        ours, theirs = (RealTimeRobot(robot, [0.225, 0, 0], compiled=c) for c in (True, False))
+        generated = 0
+        for _ in range(2000):
+            size = [0.02, 0.4, 0.4] if rng.random() < 0.8 else [0.3, 3.0, 3.0]
+            x = np.array([0.225, 0.0, 0.0]) + rng.normal(size=3) * size
+            motion: list[Any] = [x, rng.normal(size=3), 10 * rng.normal(size=3)]
+            motion = [as_given(rng, row) for row in motion]
+            if rng.random() < 0.1:
+                motion[rng.integers(3)] = nonsense(rng, x)
+            assert ours.inverse_dynamics(*motion) == theirs.inverse_dynamics(*motion)
+            generated += ours._forces_generated
+            for one in ("forces", "reactions"):
+                found, expected = getattr(ours.answers, one), getattr(theirs.answers, one)
+                error = worst(found - expected) / max(1.0, np.abs(expected).max())
+                assert error < TOLERANCE / min(1.0, abs(theirs.force_determinant) + 1e-9), motion
+            assert ours.force_determinant == pytest.approx(theirs.force_determinant, abs=1e-12)
+            assert ours.force_age == theirs.force_age
+            if ours.force_status:
+                assert ours.force_status_text == theirs.force_status_text
+        assert generated > 1000
 
 
 def test_an_estimate_of_a_controller_may_be_called_on_its_own() -> None:
@@ -289,7 +316,7 @@ def test_it_can_be_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:
     ]
 
 
-@pytest.mark.parametrize("name", [ESTIMATE, "computed_torque_task"])
+@pytest.mark.parametrize("name", [ESTIMATE, DYNAMICS, "computed_torque_task"])
 def test_wrong_code_is_refused(name: str) -> None:
     from rps_pin.codegen.build import Library, Source
     from rps_pin.codegen.build.tcc import compile_library
@@ -297,10 +324,10 @@ def test_wrong_code_is_refused(name: str) -> None:
     (text,) = tick_texts(name)
     right, wrong = "return (int)y[1];", "return (int)y[1] + 8;"
 
-    def make(robot: RPSRobot, start: Array, compiled: Any, **settings: Any) -> Any:
-        if name == ESTIMATE:
-            return RealTimeRobot(robot, start, compiled=compiled)
-        return ComputedTorque(robot, start, Gains(900.0, 60.0), compiled=compiled, **settings)
+    make = {
+        ESTIMATE: real_time_robot._proven_estimate,
+        DYNAMICS: real_time_robot._proven_dynamics,
+    }.get(name) or loop(name, robots()[0], False)._proven
 
     def library(words: str) -> Library:
         return compile_library(Source(f"test {name}", (f"{name}_tick",), (words,)))

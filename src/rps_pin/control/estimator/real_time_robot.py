@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -21,7 +23,10 @@ from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, thre
 from rps_pin.control.estimator.output_arrays import Answers
 from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.estimator.state_estimate import StateEstimate, departure, state_estimate
-from rps_pin.control.generated.engine import NOT_REGULAR, Compiled, GeneratedTick, generated_tick
+from rps_pin.control.generated.code import NOT_REGULAR, GeneratedDynamics, GeneratedTick
+from rps_pin.control.generated.engine import Compiled, generated_tick
+from rps_pin.control.generated.proof import Ticked
+from rps_pin.control.generated.tick import DYNAMICS, ESTIMATE
 from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
@@ -128,15 +133,41 @@ class RealTimeRobot:
         #: Of this object, or of the controller that has it.
         self.generated: GeneratedTick | None = None
         self._fast: GeneratedTick | None = None
+        self._dynamics: GeneratedDynamics | None = None
+        self._robot = robot
         self.reset(near)
-        self._fast, self.engine = generated_tick(
-            *(compiled, "estimate", self.answers[:5], self._period),
-            *(self._filter.share, self.take, _proof_loop),
+        self.engine = self._use_estimate(compiled)
+        if self._fast is not None:
+            self._use_dynamics(compiled)
+
+    def _use_estimate(self, compiled: Compiled) -> str:
+        """Let generated code compute estimates, if there is any; return what runs."""
+        own = self._period, self._filter.share, self.take
+        self._fast, engine = generated_tick(
+            *(compiled, ESTIMATE, _proven_estimate),
+            lambda library: GeneratedTick(ESTIMATE, library, self.answers[:5], *own),
         )
         if self._fast is not None:
             self.generated = self._fast
             self._fast.set_numbers(self.numbers())
             self._fast.set_memory(self.memory())
+        return engine
+
+    def _use_dynamics(self, compiled: Compiled) -> None:
+        """Let generated code compute forces, if there is any."""
+        self._dynamics, _ = generated_tick(
+            *(compiled, DYNAMICS, _proven_dynamics),
+            lambda library: GeneratedDynamics(DYNAMICS, library, self.answers[5:]),
+        )
+        if self._dynamics is not None:
+            terms = self._robot.force_terms
+            self._dynamics.set_numbers(
+                {
+                    **self.numbers(),
+                    **{one.name: getattr(terms, one.name) for one in fields(terms)},
+                    "force_limit": self._limits.greatest_force,
+                }
+            )
 
     @property
     def compiled(self) -> bool:
@@ -154,8 +185,9 @@ class RealTimeRobot:
         self._geometry_flags = 0
         self.status = self._accept(d, directions, _ZERO)
         self._filter.reset()
-        self.force_status, self.force_age, self.force_determinant = Status.OK, 0, 0.0
+        self.force_status, self.force_age, self._force_determinant = Status.OK, 0, 0.0
         self._pose: Triple | None = None
+        self._forces_generated = False
         self.answers.forces[:] = self.answers.reactions[:] = 0.0
         if self._fast is not None:
             self._fast.set_memory(self.memory())
@@ -177,13 +209,15 @@ class RealTimeRobot:
 
     def memory(self) -> dict[str, Any]:
         """Return what the next tick starts from: `ESTIMATE_MEMORY`."""
-        geometry, _, speed, _ = self._state
+        geometry, rate, speed, _ = self._state
         return {
             "length": geometry.length,
             "direction": geometry.direction,
             "speed": speed,
             "started": 0.0 if self._filter.last is None else 1.0,
             "determinant": self._determinant,
+            "pose": geometry.pose,
+            "rate": rate,
         }
 
     def take(self, memory: dict[str, Any]) -> None:
@@ -216,6 +250,13 @@ class RealTimeRobot:
         if self.generated is not None and self.generated.ahead:
             return self.generated.remembered("determinant")
         return self._determinant
+
+    @property
+    def force_determinant(self) -> float:
+        """See the class."""
+        if self._forces_generated and self._dynamics is not None:
+            return self._dynamics.remembered("determinant")
+        return self._force_determinant
 
     # Each tick ------------------------------------------------------------------------------------
 
@@ -282,8 +323,12 @@ class RealTimeRobot:
         pose, rate, acceleration
             Pose (m, rad, rad) and its first and second time derivatives, shape (3,) each.
         """
+        if self._dynamics is not None:
+            number = self._dynamics.forces(pose, rate, acceleration)
+            if number != NOT_REGULAR:
+                return self._forces_computed(number)
         x, dx, ddx = three_floats(pose), three_floats(rate), three_floats(acceleration)
-        self._pose = x
+        self._in_python(x)
         if x is None or dx is None or ddx is None:
             return self._keep_forces(flags.BAD_INPUT)
         geometry = leg_geometry(x, self._g, self._h)
@@ -305,12 +350,28 @@ class RealTimeRobot:
         acceleration
             The pose's second time derivative, shape (3,).
         """
+        fast = self._fast
+        if fast is not None and self._dynamics is not None and (fast.ahead or fast.ready):
+            number = self._dynamics.forces(*fast.motion(), acceleration)
+            if number != NOT_REGULAR:
+                return self._forces_computed(number)
         geometry, rate, _, _ = self.state
-        self._pose = geometry.pose
+        self._in_python(geometry.pose)
         ddx = three_floats(acceleration)
         if ddx is None:
             return self._keep_forces(flags.BAD_INPUT)
         return self._solve(geometry, rate, ddx, self._geometry_flags)
+
+    def _forces_computed(self, number: int) -> Status:
+        """Note forces that generated code has written."""
+        self._forces_generated, self.force_age = True, 0
+        self.force_status = status = STATUSES[number]
+        return status
+
+    def _in_python(self, pose: Triple | None) -> None:
+        """Begin inverse dynamics in Python, at a pose."""
+        self._force_determinant = self.force_determinant  # of the last good forces
+        self._forces_generated, self._pose = False, pose
 
     # On demand ------------------------------------------------------------------------------------
 
@@ -363,6 +424,8 @@ class RealTimeRobot:
     def force_status_text(self) -> str:
         """The reasons of `force_status`, as text."""
         status, pose = self.force_status, self._pose
+        if self._forces_generated and self._dynamics is not None:
+            pose = self._dynamics.pose
         messages = []
         if status & Status.BAD_INPUT:
             messages.append(
@@ -437,7 +500,7 @@ class RealTimeRobot:
         out = self.answers.forces
         out[0], out[1], out[2] = forces
         self.answers.reactions[:] = solved[:9]
-        self.force_age, self.force_determinant = 0, determinant
+        self.force_age, self._force_determinant = 0, determinant
         self.force_status = status = STATUSES[number]
         return status
 
@@ -456,9 +519,32 @@ class RealTimeRobot:
         return status
 
 
-def _proof_loop(robot: RPSRobot, start: Array, compiled: Compiled, **_: Any) -> RealTimeRobot:
-    """Return an object to prove generated code with."""
-    return RealTimeRobot(robot, start, compiled=compiled)
+def _proven_estimate(
+    robot: RPSRobot, start: Array, compiled: Compiled, **_: Any
+) -> Callable[..., Ticked]:
+    """Return what computes estimates to prove generated code with."""
+    one = RealTimeRobot(robot, start, compiled=False)
+    one._use_estimate(compiled)
+
+    def ticked(length: Any, target: Any, speed: Any, dt: float | None) -> Ticked:
+        status = one.estimate(length, speed, dt=dt)
+        return int(status), one.answers._asdict(), one.generated is not None and one.generated.ahead
+
+    return ticked
+
+
+def _proven_dynamics(
+    robot: RPSRobot, start: Array, compiled: Compiled, **_: Any
+) -> Callable[..., Ticked]:
+    """Return what computes forces of targets likewise."""
+    one = RealTimeRobot(robot, start, compiled=False)
+    one._use_dynamics(compiled)
+
+    def ticked(length: Any, target: Any, speed: Any, dt: float | None) -> Ticked:
+        status = one.inverse_dynamics(*(target or (start, start, start)))
+        return int(status), one.answers._asdict(), one._forces_generated
+
+    return ticked
 
 
 def _text(values: Triple | None) -> str:

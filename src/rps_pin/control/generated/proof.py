@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from rps_pin.arrays import Array
-from rps_pin.codegen.build import Library
-from rps_pin.control.generated.tick import CONTROL_ANSWERS
 from rps_pin.errors import CompileError
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.robot import RPSRobot
 
+if TYPE_CHECKING:
+    from rps_pin.codegen.build import Library
+
+#: Status, answers by name, and whether generated code computed them.
+Ticked: TypeAlias = tuple[int, Mapping[str, Array], bool]
 #: See `prove`.
-MakeLoop: TypeAlias = Callable[..., Any]
+MakeLoop: TypeAlias = Callable[..., Callable[..., Ticked]]
 #: Largest difference relative to the size of what is compared.
 TOLERANCE = 1e-10
 _TICKS, _PERIOD = 300, 1e-3
@@ -43,8 +46,9 @@ def prove(name: str, library: Library, make: MakeLoop) -> dict[str, Any]:
     library
         Its machine code.
     make
-        Makes a loop of a robot, a start, an engine (the library, or False) and settings of
-        `Controller`.
+        Makes a function of length, target, speed and dt that computes a tick, of a robot, a start,
+        an engine (the library, or False) and settings of `Controller`. It returns the status, the
+        answers by name, and whether generated code computed them.
 
     Returns
     -------
@@ -62,22 +66,25 @@ def prove(name: str, library: Library, make: MakeLoop) -> dict[str, Any]:
             make(case.robot, case.start, compiled, **case.settings) for compiled in (library, False)
         )
         for k, arguments in enumerate(case.ticks):
-            one, other = _ticked(ours, *arguments), _ticked(theirs, *arguments)
-            if one[0] != other[0]:
+            status, answers, fast = ours(*arguments)
+            status_wanted, wanted, _ = theirs(*arguments)
+            where = f"proof of {name}, motion {number}, tick {k}"
+            if status != status_wanted:
                 raise CompileError(
-                    f"proof of {name}, motion {number}, tick {k}: the status is {one[0]!r}; it "
-                    f"must be {other[0]!r}",
+                    f"{where}: the status is {status}; it must be {status_wanted}",
                     library.compiler,
                 )
-            generated += _is_ahead(ours)
-            for what, found, expected in zip(_ANSWERS, one[1:], other[1:], strict=True):
-                size = case.weight if what == "forces" else 1e-3
+            generated += fast
+            for what, expected in wanted.items():
+                found, size = answers[what], 1e-3
+                if what in ("forces", "reactions"):
+                    size = case.weight
                 difference = float(abs(found - expected).max() / max(size, abs(expected).max()))
                 worst = max(worst, difference)
                 if not difference <= TOLERANCE:
                     raise CompileError(
-                        f"proof of {name}, motion {number}, tick {k}: {what} is {found.tolist()}; "
-                        f"it must be {expected.tolist()} to {TOLERANCE}",
+                        f"{where}: {what} is {found.tolist()}; it must be {expected.tolist()}, to "
+                        f"{TOLERANCE} of its size",
                         library.compiler,
                     )
         ticks += len(case.ticks)
@@ -87,27 +94,6 @@ def prove(name: str, library: Library, make: MakeLoop) -> dict[str, Any]:
             library.compiler,
         )
     return {"ticks": ticks, "generated": generated, "worst": worst}
-
-
-_ANSWERS = tuple(CONTROL_ANSWERS)
-
-
-def _ticked(loop: Any, length: Any, target: Any, speed: Any, dt: float | None) -> tuple[Any, ...]:
-    """Return the status of a tick, and its answers."""
-    if hasattr(loop, "tick"):
-        status, estimate, forces = (
-            loop.tick(length, target, speed, dt=dt),
-            loop.estimate,
-            loop.forces,
-        )
-    else:
-        status, estimate, forces = loop.estimate(length, speed, dt=dt), loop, np.zeros(3)
-    return (int(status), *estimate.answers[:5], forces)
-
-
-def _is_ahead(loop: Any) -> bool:
-    generated = (loop.estimate if hasattr(loop, "tick") else loop).generated
-    return bool(generated is not None and generated.ahead)
 
 
 def cases() -> Iterator[Case]:

@@ -32,7 +32,7 @@ from rps_pin.control.loop.limits import none_beyond, within_limits
 from rps_pin.control.loop.setpoints import Setpoint, all_below
 from rps_pin.numerics.elementary import Number, select_all
 from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, kernel, symbols
-from rps_pin.rps.generated.forces import TERMS, actuator_forces, terms_of
+from rps_pin.rps.generated.forces import TERMS, forces_and_reactions, terms_of
 from rps_pin.rps.generated.layout import Layout
 from rps_pin.rps.kinematics.tracking import Triple
 
@@ -55,8 +55,22 @@ CONTROL_NUMBERS = Layout(
     | TERMS.sizes
     | {"kp": 3, "kd": 3, "ki": 3, "stop": 1, "side": 1, "force_limit": 3}
 )
-#: Numbers that a tick hands to the next: `started` is 1 after the first reading.
-ESTIMATE_MEMORY = Layout({"length": 3, "direction": 6, "speed": 3, "started": 1, "determinant": 1})
+#: Those of inverse dynamics.
+DYNAMICS_NUMBERS = Layout(ESTIMATE_NUMBERS.sizes | TERMS.sizes | {"force_limit": 1})
+#: Numbers that a tick hands to the next: `started` is 1 after the first reading. The last three are
+#: only read.
+ESTIMATE_MEMORY = Layout(
+    {
+        "length": 3,
+        "direction": 6,
+        "speed": 3,
+        "started": 1,
+        "determinant": 1,
+        "pose": 3,
+        "rate": 3,
+    }
+)
+DYNAMICS_MEMORY = Layout({"determinant": 1})
 CONTROL_MEMORY = Layout(
     ESTIMATE_MEMORY.sizes
     | {
@@ -74,12 +88,14 @@ CONTROL_MEMORY = Layout(
 ESTIMATE_READING = Layout(
     {"reading": 3, "reading_speed": 3, "measured": 1, "elapsed": 1, "share": 1}
 )
+DYNAMICS_READING = Layout({"pose": 3, "rate": 3, "acceleration": 3})
 CONTROL_READING = Layout(
     ESTIMATE_READING.sizes | {"pose": 3, "rate": 3, "acceleration": 3, "given": 1}
 )
 #: What a tick writes for the caller, in the order of `Answers`; a controller also its forces.
 ESTIMATE_ANSWERS = {"pose": 3, "rate": 3, "twist": 6, "angle": 3, "speed": 3}
 CONTROL_ANSWERS = ESTIMATE_ANSWERS | {"forces": 3}
+DYNAMICS_ANSWERS = {"forces": 3, "reactions": 9}
 
 _Law = Callable[..., Any]
 #: Laws by name: functions of state, setpoint, h, feedback and dynamics.
@@ -92,8 +108,8 @@ LAWS: Mapping[str, _Law] = {
         for compensation in ("gravity", "feed_forward", "none")
     },
 }
-#: The tick of `RealTimeRobot` beside those of the laws.
-ESTIMATE = "estimate"
+#: The ticks of `RealTimeRobot` beside those of the laws.
+ESTIMATE, DYNAMICS = "estimate", "inverse_dynamics"
 #: One C function holds a tick: its parts share most of their values.
 _CHUNK = 4000
 
@@ -108,22 +124,24 @@ class Form(NamedTuple):
 
 
 def form_of(name: str) -> Form:
-    """Return the layouts of a tick: `ESTIMATE`, or the name of a law."""
+    """Return the layouts of a tick: `ESTIMATE`, `DYNAMICS`, or the name of a law."""
+    if name == DYNAMICS:
+        return Form(DYNAMICS_NUMBERS, DYNAMICS_MEMORY, DYNAMICS_READING, DYNAMICS_ANSWERS)
     if name == ESTIMATE:
         return Form(ESTIMATE_NUMBERS, ESTIMATE_MEMORY, ESTIMATE_READING, ESTIMATE_ANSWERS)
     return Form(CONTROL_NUMBERS, CONTROL_MEMORY, CONTROL_READING, CONTROL_ANSWERS)
 
 
-class Estimated(NamedTuple):
-    """An estimate as expressions."""
+class Tick(NamedTuple):
+    """A tick as expressions."""
 
-    state: StateEstimate
     regular: Number
     """Whether it is a regular one."""
     status: Number
     """`Status`, of a regular one."""
     memory: dict[str, Any]
     answers: dict[str, Any]
+    state: StateEstimate | None = None
 
 
 def tick_kernel(name: str) -> Kernel:
@@ -136,19 +154,21 @@ def tick_kernel(name: str) -> Kernel:
         "numbers": symbols("n", form.numbers.size),
         "memory": symbols("m", form.memory.size),
         "reading": symbols("r", form.reading.size),
-        "direction": symbols("direction", 6),
-        "progress": symbols("progress", 3),
     }
-    numbers = form.numbers.split(given["numbers"])
-    memory = form.memory.split(given["memory"])
-    reading = form.reading.split(given["reading"])
-    found = _estimate(numbers, memory, reading, given["direction"], given["progress"][0])
-    if name != ESTIMATE:
-        found = _control(LAWS[name], numbers, memory, reading, found)
+    numbers, memory, reading = (
+        layout.split(given[one]) for layout, one in zip(form[:3], given, strict=True)
+    )
+    if name == DYNAMICS:
+        found = _forces(numbers, reading)
+    else:
+        given |= {"direction": symbols("direction", 6), "progress": symbols("progress", 3)}
+        found = _estimate(numbers, memory, reading, given["direction"], given["progress"][0])
+        if name != ESTIMATE:
+            found = _control(LAWS[name], numbers, memory, reading, found)
     outputs = {
         "verdict": (found.regular, found.status),
         "memory": form.memory.join(found.memory),
-        **{one: found.answers[one] for one in form.answers},
+        **{f"{one}_answer": found.answers[one] for one in form.answers},
     }
     made = kernel(f"{name}_kernel", given, outputs)
     return Kernel(made.function, _CHUNK)
@@ -160,7 +180,7 @@ def _estimate(
     reading: dict[str, Any],
     direction: tuple[Number, ...],
     done: Number,
-) -> Estimated:
+) -> Tick:
     """Return the estimate of `RealTimeRobot.estimate`."""
     g, h = numbers["radii"]
     d, elapsed, last = reading["reading"], reading["elapsed"], memory["length"]
@@ -184,8 +204,7 @@ def _estimate(
         * (abs(sum(twist)) < math.inf)
     )
     kept = within_limits(geometry, numbers["bounds"]) * none_beyond(speed, numbers["speed_limit"])
-    return Estimated(
-        state,
+    return Tick(
         regular,
         flags.BEYOND_LIMIT * (1.0 - kept),
         {
@@ -194,6 +213,8 @@ def _estimate(
             "speed": speed,
             "started": 1.0,
             "determinant": jacobian.determinant,
+            "pose": geometry.pose,
+            "rate": state.rate,
         },
         {
             "pose": geometry.pose,
@@ -202,6 +223,7 @@ def _estimate(
             "angle": geometry.angle,
             "speed": speed,
         },
+        state,
     )
 
 
@@ -210,11 +232,12 @@ def _control(
     numbers: dict[str, Any],
     memory: dict[str, Any],
     reading: dict[str, Any],
-    found: Estimated,
-) -> Estimated:
+    found: Tick,
+) -> Tick:
     """Return the tick of a controller, after its estimate."""
     g, h = numbers["radii"]
     given, elapsed, state = reading["given"], reading["elapsed"], found.state
+    assert state is not None
     pose, rate, acceleration = (
         select_all(given, reading[name], memory[f"target_{name}"])
         for name in ("pose", "rate", "acceleration")
@@ -235,8 +258,7 @@ def _control(
     after: dict[str, Any] = {}
     force = law(state, setpoint, h, _feedback(numbers, memory, reading, after), _dynamics(numbers))
     regular = regular * (abs(sum(force)) < math.inf) * forces_within(force, numbers["force_limit"])
-    return Estimated(
-        state,
+    return Tick(
         regular,
         found.status,
         {
@@ -249,6 +271,28 @@ def _control(
         },
         {**found.answers, "forces": force},
     )
+
+
+def _forces(numbers: dict[str, Any], reading: dict[str, Any]) -> Tick:
+    """Return `RealTimeRobot.inverse_dynamics`."""
+    g, h = numbers["radii"]
+    pose, rate, acceleration = reading["pose"], reading["rate"], reading["acceleration"]
+    platform = platform_tips(pose, h)
+    geometry = legs_to(platform, g)
+    (_, x, y), length, _, direction, tilt = geometry
+    forces, reactions = forces_and_reactions(
+        *(terms_of(numbers), (x, y, tilt), length, direction, rate, acceleration)
+    )
+    determinant = closure_determinant(geometry, g, h)
+    regular = (
+        in_range(pose, g, h)
+        * legs_have_length(platform, g)
+        * (abs(determinant) >= numbers["near"])
+        * (abs(sum((*forces, *reactions))) < math.inf)
+    )
+    kept = within_limits(geometry, numbers["bounds"]) * none_beyond(forces, numbers["force_limit"])
+    answers = {"forces": forces, "reactions": reactions}
+    return Tick(regular, flags.BEYOND_LIMIT * (1.0 - kept), {"determinant": determinant}, answers)
 
 
 def _feedback(
@@ -281,7 +325,8 @@ def _dynamics(numbers: dict[str, Any]) -> Dynamics:
 
     def dynamics(geometry: LegGeometry, rate: Triple, acceleration: Triple) -> Triple:
         (_, x, y), length, _, direction, tilt = geometry
-        return actuator_forces(terms, (x, y, tilt), length, direction, rate, acceleration)
+        motion = (length, direction, rate, acceleration)
+        return forces_and_reactions(terms, (x, y, tilt), *motion)[0]
 
     return dynamics
 
@@ -296,13 +341,13 @@ def _product(conditions: Any) -> Number:
 # C ------------------------------------------------------------------------------------------------
 
 
-def tick_texts(name: str) -> tuple[str, ...]:
-    """Return the C text of a tick, with ``int NAME_tick(double *x, double *const *answers)``.
+_BODY = """{followed}
+    {name}_kernel(numbers, memory, reading, {more}{written});
+"""
 
-    x holds numbers, memory and reading, one after the other. Of a regular tick it returns the
-    `Status`, and writes the memory and the answers; of any other it returns -1 and writes nothing.
-    """
-    form = form_of(name)
+
+def _followed(form: Form) -> str:
+    """Return the C statements that follow the leg lengths to a reading."""
     numbers, memory, reading = (layout.slices for layout in form[:3])
     arguments = [
         f"memory + {memory['length'].start}",
@@ -313,7 +358,19 @@ def tick_texts(name: str) -> tuple[str, ...]:
         f"numbers + {numbers['most_steps'].start}",
         *("direction", "progress"),
     ]
-    written = ["verdict", "memory_out", *form.answers]
+    return f"""
+    REAL direction[6], progress[3];
+    {FOLLOW.name}({", ".join(arguments)});"""
+
+
+def tick_texts(name: str) -> tuple[str, ...]:
+    """Return the C text of a tick, with ``int NAME_tick(double *x, double *const *answers)``.
+
+    x holds numbers, memory and reading, one after the other. Of a regular tick it returns the
+    `Status`, and writes the memory and the answers; of any other it returns -1 and writes nothing.
+    """
+    form = form_of(name)
+    written = ["verdict", "memory_out", *(f"{one}_answer" for one in form.answers)]
     routine = Routine(
         name,
         (
@@ -321,15 +378,22 @@ def tick_texts(name: str) -> tuple[str, ...]:
             ("memory", form.memory.size),
             ("reading", form.reading.size),
         ),
-        (("verdict", 2), ("memory_out", form.memory.size), *form.answers.items()),
-        f"""
-    REAL direction[6], progress[3];
-    {FOLLOW.name}({", ".join(arguments)});
-    {name}_kernel(numbers, memory, reading, direction, progress, {", ".join(written)});
-""",
+        (
+            *(("verdict", 2), ("memory_out", form.memory.size)),
+            *((f"{one}_answer", size) for one, size in form.answers.items()),
+        ),
+        _BODY.format(followed="", more="", name=name, written=", ".join(written))
+        if name == DYNAMICS
+        else _BODY.format(
+            followed=_followed(form),
+            more="direction, progress, ",
+            name=name,
+            written=", ".join(written),
+        ),
         (FOLLOW.name, f"{name}_kernel"),
     )
-    unit = Unit(f"{name}_unit", (*follow_kernels(), tick_kernel(name)), (FOLLOW, routine), (name,))
+    kernels = (*follow_kernels(), tick_kernel(name))
+    unit = Unit(f"{name}_unit", kernels, (FOLLOW, routine), (name,))
     return (unit.c99() + _entry(unit.name, name, form),)
 
 

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import fields
 from typing import Any, Literal, get_args
 
@@ -35,7 +36,9 @@ from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time
 from rps_pin.control.estimator.real_time_robot import RealTimeRobot
 from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.estimator.state_estimate import StateEstimate
-from rps_pin.control.generated.engine import NOT_REGULAR, Compiled, GeneratedTick, generated_tick
+from rps_pin.control.generated.code import NOT_REGULAR, GeneratedTick
+from rps_pin.control.generated.engine import Compiled, generated_tick
+from rps_pin.control.generated.proof import Ticked
 from rps_pin.control.laws import pid
 from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SetpointRateFilter
@@ -176,9 +179,11 @@ class Controller(ABC):
         self._generated: GeneratedTick | None = None
         self._speed_measured = False
         self.reset(near)
+        law, answers = self._generated_law, (*self.estimate.answers[:5], self.forces)
+        own = period, self._rate_filter.share, self._take
         self._generated, self.engine = generated_tick(
-            *(compiled, self._generated_law, (*self.estimate.answers[:5], self.forces), period),
-            *(self._rate_filter.share, self._take, self._proof_loop),
+            *(compiled, law, self._proven),
+            lambda library: GeneratedTick(law, library, answers, *own),
         )
         if self._generated is not None:
             self.estimate.generated, self.estimate.engine = self._generated, self.engine
@@ -287,13 +292,22 @@ class Controller(ABC):
         self.status = status = STATUSES[number]
         return status
 
-    def _proof_loop(
+    def _proven(
         self, robot: RPSRobot, start: Array, compiled: Compiled, **settings: Any
-    ) -> Controller:
-        """Return a controller with this law, to prove its generated code."""
-        gains = Gains.placed(15.0, integral=0.2)
-        settings |= {"space": self.space, "compiled": compiled}
-        return type(self)(robot, start, gains, **settings)
+    ) -> Callable[..., Ticked]:
+        """Return what computes ticks to prove generated code with."""
+        one = self._like(robot, start, space=self.space, compiled=compiled, **settings)
+
+        def ticked(length: Any, target: Any, speed: Any, dt: float | None) -> Ticked:
+            status = one.tick(length, target, speed, dt=dt)
+            answers = {**one.estimate.answers._asdict(), "forces": one.forces}
+            return int(status), answers, one._generated is not None and one._generated.ahead
+
+        return ticked
+
+    def _like(self, robot: RPSRobot, start: Array, **settings: Any) -> Controller:
+        """Return a controller with this law."""
+        return type(self)(robot, start, Gains.placed(15.0, integral=0.2), **settings)
 
     @property
     def _generated_law(self) -> str:

@@ -34,7 +34,7 @@ class RobotLimits:
     def __init__(self, parameters: RPSParameters) -> None:
         self._parameters = p = parameters
         self.greatest_speed = p.actuator_speed_limit
-        self._greatest_force = p.actuator_force_limit
+        self.greatest_force = p.actuator_force_limit
         cone, rest = p.spherical_cone_limit, p.spherical_rest_angle
         least_cosine = math.cos(cone + LIMIT_TOLERANCE) if cone < math.pi else -2.0
         lengths, angles = p.leg_length_limits, p.leg_angle_limits
@@ -50,7 +50,7 @@ class RobotLimits:
 
     def too_strong(self, force: Triple) -> bool:
         """Return whether an actuator is beyond its force limit."""
-        return not none_beyond(force, self._greatest_force)
+        return not none_beyond(force, self.greatest_force)
 
     def messages(self, geometry: LegGeometry) -> list[str]:
         """Return a sentence for each violated limit of length, angle or ball joint."""
@@ -61,7 +61,7 @@ class RobotLimits:
 
     def actuator_messages(self, quantity: str, values: Iterable[float]) -> list[str]:
         """Return a sentence for each actuator beyond its limit of ``speed`` or ``force``."""
-        speed, force = (self.greatest_speed, "m/s"), (self._greatest_force, "N")
+        speed, force = (self.greatest_speed, "m/s"), (self.greatest_force, "N")
         limit, unit = speed if quantity == "speed" else force
         return [
             f"leg {leg}: {quantity} is {value:.6g} {unit}; its limit is {limit:.6g} {unit}"

@@ -28,7 +28,6 @@ from rps_pin.arrays import Array
 from rps_pin.control.estimator.effective_inertia import effective_inertia
 from rps_pin.control.estimator.leg_jacobian import wrench_of_force
 from rps_pin.control.estimator.state_estimate import StateEstimate
-from rps_pin.control.generated.engine import Compiled
 from rps_pin.control.laws import Compensation, pd_control
 from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.gains import Gains
@@ -69,13 +68,10 @@ class PDControl(Controller):
         self.compensation = cast("Compensation", checked)
         super().__init__(robot, near, gains, **settings)
 
-    def _proof_loop(
-        self, robot: RPSRobot, start: Array, compiled: Compiled, **settings: Any
-    ) -> Controller:
+    def _like(self, robot: RPSRobot, start: Array, **settings: Any) -> Controller:
         inertia = effective_inertia(robot, start, space=self.space)
         gains = Gains.placed(15.0, integral=0.2).times(inertia)
-        settings |= {"compensation": self.compensation, "space": self.space, "compiled": compiled}
-        return PDControl(robot, start, gains, **settings)
+        return PDControl(robot, start, gains, compensation=self.compensation, **settings)
 
     @property
     def _generated_law(self) -> str:

@@ -121,7 +121,7 @@ def joint_reactions(
     x, dx, ddx = poses.checked_motion(pose, rate, acceleration)
     actuator = robot.actuator_forces(x, dx, ddx, wrench=wrench)
     motion, legs = robot.motion(x, dx, ddx)
-    axes = _leg_axes(legs.angle)
+    axes = leg_axes(np.cos(legs.angle), np.sin(legs.angle))
     p = robot.parameters
     weight = np.einsum("...ji,j->...i", axes, p.gravity)  # gravity in leg axes
     rod = p.rod_mass * (_point_acceleration(legs, legs.length - p.rod_com, sliding=True) - weight)
@@ -142,21 +142,41 @@ def joint_reactions(
     load = None if wrench is None else checked_wrench(wrench, x.shape[:-1])
     force, couple = _platform_wrench(robot, x, motion, load)
     arms = p.platform_radius * RADIAL @ np.swapaxes(motion.rotation, -1, -2)
-    known = np.einsum("...ij,...j->...i", axes, tip)
-    across = _across_planes(arms, force - known.sum(-2), couple - np.cross(arms, known).sum(-2))
-    tip[..., 1] = -across  # y is against the joint's axis
-    spherical = known + across[..., None] * ACROSS
+    spherical = in_balance(axes, arms, tip, force, couple)
     prismatic = _prismatic(p, legs, tip, rod)
     revolute = _revolute(p, legs, prismatic, cylinder)
     return JointReactions(actuator, spherical, tip, prismatic, revolute, axes, legs.length)
 
 
-def _leg_axes(angle: Array) -> Array:
-    """Return s, -a and t of each leg as columns, shape (..., 3 legs, 3, 3)."""
-    cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
+def leg_axes(cosine: Array, sine: Array) -> Array:
+    """Return s, -a and t of legs of directions (..., 3 legs) as columns, (..., 3 legs, 3, 3)."""
+    cosine, sine = cosine[..., None], sine[..., None]
     along = -cosine * RADIAL + sine * _UP
     upwards = sine * RADIAL + cosine * _UP
     return np.stack([along, np.broadcast_to(-ACROSS, along.shape), upwards], axis=-1)
+
+
+def in_balance(axes: Array, arms: Array, tip: Array, force: Array, couple: Array) -> Array:
+    """Return the legs' forces on the platform in base axes, shape (..., 3 legs, 3).
+
+    The arrays may be of CasADi expressions, with the dtype object.
+
+    Parameters
+    ----------
+    axes
+        Of `leg_axes`.
+    arms
+        From the platform's centre to its joints, base axes, shape (..., 3 legs, 3).
+    tip
+        The forces in leg axes, shape (..., 3 legs, 3), but for y, which is put there.
+    force, couple
+        What the legs must exert on the platform, about its centre, base axes, shape (..., 3).
+    """
+    known = (axes @ tip[..., None])[..., 0]
+    across = _across_planes(arms, force - known.sum(-2), couple - np.cross(arms, known).sum(-2))
+    tip[..., 1] = -across  # y is against the joint's axis
+    spherical: Array = known + across[..., None] * ACROSS
+    return spherical
 
 
 def _point_acceleration(legs: LegMotion, distance: Array | float, *, sliding: bool) -> Array:

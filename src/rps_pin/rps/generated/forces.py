@@ -1,4 +1,4 @@
-"""Actuator forces of a motion as expressions: `rps_pin.rps.dynamics.force_equations`."""
+"""Forces of a motion as expressions: `rps_pin.rps.dynamics.force_equations`, `joint_reactions`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ import numpy as np
 
 from rps_pin.numerics.elementary import Number
 from rps_pin.rps.dynamics.force_equations import ForceTerms, forces_of_motion, legs_of_tilt
+from rps_pin.rps.dynamics.joint_reactions import in_balance, leg_axes
 from rps_pin.rps.generated.layout import Layout
+from rps_pin.rps.kernels import platform
 from rps_pin.rps.kernels.tips import tip_slopes
+from rps_pin.rps.kinematics.legs import RADIAL
 
 _SIZES = {"platform_moment": 3, "platform_inertia": 6, "gravity": 3}
 #: The numbers of `ForceTerms`.
@@ -27,15 +30,15 @@ def terms_of(groups: dict[str, Any]) -> ForceTerms:
     return ForceTerms(**terms)
 
 
-def actuator_forces(
+def forces_and_reactions(
     terms: ForceTerms,
     tilt: tuple[Number, Number, tuple[Number, ...]],
     length: Sequence[Number],
     direction: Sequence[Number],
     rate: Sequence[Number],
     acceleration: Sequence[Number],
-) -> tuple[Number, Number, Number]:
-    """Return the forces of the actuators, N.
+) -> tuple[tuple[Number, Number, Number], tuple[Number, ...]]:
+    """Return the forces of the actuators, N; and of each leg on the platform, base axes, 9.
 
     Parameters
     ----------
@@ -48,15 +51,23 @@ def actuator_forces(
     rate, acceleration
         Of the pose (3).
     """
-    x, y, functions = tilt
-    coefficients: Any = tuple(map(_one, functions))
-    legs = legs_of_tilt(
-        *(_one(x), _one(y), coefficients, tip_slopes(_one(x), _one(y), coefficients)),
-        *(_three(length), _three(direction[:3]), _three(direction[3:])),
-    )
-    forces = forces_of_motion(terms, legs, _three(rate), _three(acceleration), None)
-    one, two, three = forces.axial[:, 0]
-    return one, two, three
+    x, y, *coefficients = map(_one, (*tilt[:2], *tilt[2]))
+    functions: Any = tuple(coefficients)
+    cosine, sine = _three(direction[:3]), _three(direction[3:])
+    slopes = tip_slopes(x, y, functions)
+    legs = legs_of_tilt(x, y, functions, slopes, _three(length), cosine, sine)
+    found = forces_of_motion(terms, legs, _three(rate), _three(acceleration), None)
+    one, two, three = found.axial[:, 0]
+
+    axes = leg_axes(cosine.T, sine.T)
+    rows = [np.concatenate(row) for row in platform.rotation(x, y, functions)]
+    arms = (RADIAL @ np.stack(rows).T) * terms.platform_radius
+    tip = np.zeros((1, 3, 3), dtype=object)
+    tip[..., 0], tip[..., 2] = found.push.T, -found.across.T
+    force = np.concatenate(found.force)
+    couple = np.concatenate(platform.to_base(x, y, functions, found.moment))
+    reactions = in_balance(axes, arms[None], tip, force[None], couple[None])
+    return (one, two, three), tuple(reactions.ravel())
 
 
 def _objects(numbers: Sequence[Number]) -> Any:

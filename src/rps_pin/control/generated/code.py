@@ -1,0 +1,230 @@
+"""Ticks in machine code, with the arrays that they read and write."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, three_floats
+from rps_pin.control.generated.tick import CONTROL_READING, DYNAMICS_READING, form_of
+from rps_pin.errors import CompileError
+
+if TYPE_CHECKING:
+    from rps_pin.codegen.build import Library
+
+#: ``int NAME_tick(double *x, double *const *answers)``, with Python's lock: it takes a microsecond.
+_TICK = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+#: Of a tick that is not regular.
+NOT_REGULAR = -1
+_IN_CONTROL, _IN_DYNAMICS = CONTROL_READING.slices, DYNAMICS_READING.slices
+_LENGTH, _SPEED = _IN_CONTROL["reading"], _IN_CONTROL["reading_speed"]
+_MEASURED, _ELAPSED = _IN_CONTROL["measured"].start, _IN_CONTROL["elapsed"].start
+_SHARE, _GIVEN = _IN_CONTROL["share"].start, _IN_CONTROL["given"].start
+_TARGET = tuple(_IN_CONTROL[name] for name in ("pose", "rate", "acceleration"))
+_MOTION = tuple(_IN_DYNAMICS[name] for name in ("pose", "rate", "acceleration"))
+
+
+class _MachineCode:
+    """Machine code of a tick, with its arrays; for use in one thread.
+
+    Parameters
+    ----------
+    name
+        Of the tick.
+    library
+        Its machine code.
+    answers
+        Contiguous arrays that a tick writes.
+
+    Attributes
+    ----------
+    engine : str
+        What runs.
+
+    Raises
+    ------
+    CompileError
+        If an array is not contiguous.
+    """
+
+    def __init__(self, name: str, library: Library, answers: Sequence[Array]) -> None:
+        if not all(one.flags.c_contiguous for one in answers):
+            raise CompileError("generated code writes to contiguous arrays only", "")
+        self._form = form_of(name)
+        sizes = [layout.size for layout in self._form[:3]]
+        self._array = np.zeros(sum(sizes))
+        self._answers = tuple(answers)
+        pointers = [one.ctypes.data for one in answers]
+        self._out = (ctypes.c_void_p * len(pointers))(*pointers)
+        self._x = ctypes.c_void_p(self._array.ctypes.data)
+        doubles, (n, m, _) = self._array.data, sizes
+        self._numbers, self._memory = doubles[:n], doubles[n : n + m]
+        self._reading: Any = doubles[n + m :]
+        self._library = library  # it keeps the code
+        self._tick = _TICK(library.address(f"{name}_tick"))
+        self.engine = f"generated code, by {library.compiler}"
+
+    def set_numbers(self, groups: Mapping[str, Any]) -> None:
+        """Set what a loop does not change."""
+        self._numbers[:] = _doubles(self._form.numbers.join(groups))
+
+    def remembered(self, name: str) -> float:
+        """Return one number of the memory."""
+        return self._memory[self._form.memory.slices[name].start]
+
+    def _motion_read(self, places: tuple[slice, ...], motion: Any) -> bool:
+        """Put pose, rate and acceleration of any type into the reading."""
+        reading = self._reading
+        try:
+            pose, rate, acceleration = motion
+            reading[places[0]] = pose
+            reading[places[1]] = rate
+            reading[places[2]] = acceleration
+        except (TypeError, ValueError):
+            try:
+                pose, rate, acceleration = motion
+            except (TypeError, ValueError):
+                return False
+            values = zip(places, (pose, rate, acceleration), strict=True)
+            return all(self._converted(place, value) for place, value in values)
+        return True
+
+    def _read(self, place: slice, values: Numbers) -> bool:
+        """Put three numbers of any type into the reading."""
+        try:
+            self._reading[place] = values
+        except (TypeError, ValueError):
+            return self._converted(place, values)
+        return True
+
+    def _converted(self, place: slice, values: Numbers) -> bool:
+        three = three_floats(values)
+        if three is not None:
+            self._reading[place] = _doubles(three)
+        return three is not None
+
+
+class GeneratedTick(_MachineCode):
+    """The ticks of one loop, with its memory.
+
+    Parameters
+    ----------
+    name
+        `tick.ESTIMATE`, or the name of a law.
+    library, answers
+        As for `_MachineCode`.
+    period
+        Time between two ticks, s.
+    share
+        The filters' share, by the time between two ticks.
+    take
+        Called with the memory by `pull`.
+
+    Attributes
+    ----------
+    ready : bool
+        Whether the memory is what the next tick starts from.
+    ahead : bool
+        Whether the memory is newer than what its owner has.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        library: Library,
+        answers: Sequence[Array],
+        period: float,
+        share: Callable[[float], float],
+        take: Callable[[dict[str, Any]], None],
+    ) -> None:
+        super().__init__(name, library, answers)
+        self._share, self._take, self._period = share, take, period
+        self.ready = self.ahead = False
+        self._set_time(period)
+
+    def set_memory(self, groups: Mapping[str, Any]) -> None:
+        """Set what the next tick starts from."""
+        self._memory[:] = _doubles(self._form.memory.join(groups))
+        self.ready, self.ahead = True, False
+
+    def pull(self) -> None:
+        """Give the memory to the owner, if it is newer."""
+        if self.ahead:
+            self.ahead = False
+            self._take(self._form.memory.split(self._memory.tolist()))
+
+    @property
+    def measured(self) -> bool:
+        """Whether the last tick was given a speed."""
+        return bool(self._reading[_MEASURED])
+
+    def motion(self) -> tuple[memoryview, memoryview]:
+        """Return the pose and its rate that the last tick left."""
+        at = self._form.memory.slices
+        return self._memory[at["pose"]], self._memory[at["rate"]]
+
+    def _set_time(self, elapsed: float) -> None:
+        self._reading[_ELAPSED] = elapsed
+        self._reading[_SHARE] = self._share(elapsed)
+        self._usual = elapsed == self._period
+
+    def estimate(self, length: Numbers, speed: Numbers, dt: float | None) -> int:
+        """Compute a regular tick of `RealTimeRobot`: its `Status`, or `NOT_REGULAR`."""
+        reading = self._reading
+        try:
+            reading[_LENGTH] = length
+        except (TypeError, ValueError):
+            if not self._converted(_LENGTH, length):
+                return NOT_REGULAR
+        if speed is None:
+            reading[_MEASURED] = 0.0
+        elif self._read(_SPEED, speed):
+            reading[_MEASURED] = 1.0
+        else:
+            return NOT_REGULAR
+        if dt is not None or not self._usual:
+            elapsed = self._period if dt is None else elapsed_time(dt)
+            if not 0.0 < elapsed < math.inf:
+                return NOT_REGULAR
+            self._set_time(elapsed)
+        number: int = self._tick(self._x, self._out)
+        if number != NOT_REGULAR:
+            self.ahead = True
+        return number
+
+    def control(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> int:
+        """Compute a regular tick of a controller likewise."""
+        if target is None:
+            self._reading[_GIVEN] = 0.0
+        elif self._motion_read(_TARGET, target):
+            self._reading[_GIVEN] = 1.0
+        else:
+            return NOT_REGULAR
+        return self.estimate(length, speed, dt)
+
+
+class GeneratedDynamics(_MachineCode):
+    """Inverse dynamics in machine code."""
+
+    def forces(self, pose: Any, rate: Any, acceleration: Numbers) -> int:
+        """Compute forces and reactions of a motion: the `Status`, or `NOT_REGULAR`."""
+        if not self._motion_read(_MOTION, (pose, rate, acceleration)):
+            return NOT_REGULAR
+        number: int = self._tick(self._x, self._out)
+        return number
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """The pose of the last call."""
+        z, x, y = self._reading[_MOTION[0]].tolist()
+        return z, x, y
+
+
+def _doubles(values: Sequence[float]) -> memoryview:
+    return memoryview(array("d", values))
