@@ -72,7 +72,8 @@ class Evaluation:
         a4, p4 = slope(moved(q2, t * (v3 - v / 2)), v4)
         q3 = moved(q, t / 12 * (3 * v + 2 * v2 + 2 * v3 - v4))
         q4 = moved(q3, t / 12 * (2 * v2 - v + 2 * v3 + 3 * v4))
-        closed, _ = self._closed(q4, alone)
         v4 = v + t / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        step, v4, _, _ = self("projection", [q4, v4, *alone])
+        closed, _ = self._closed(moved(q4, step), alone)
         (after,) = self("projected_velocity", [closed, v4, *alone])
         return [closed, after, t / 6 * (p1 + 2 * p2 + 2 * p3 + p4)]

@@ -48,7 +48,6 @@ from typing import Any
 
 import casadi as ca
 
-from rps_pin.closed_loop.constraints.equations import OPEN
 from rps_pin.codegen.expressions.derivatives import ForwardSlopes, InverseSlopes, Slopes
 from rps_pin.codegen.expressions.elimination import LDL
 from rps_pin.codegen.expressions.mechanism import Expression, MechanismExpressions
@@ -317,4 +316,5 @@ def _projected_velocity(x: MechanismExpressions) -> Made:
 
 def _squared_gap(x: MechanismExpressions) -> Expression:
     """Sum of the squared gaps in one unit, over the squared characteristic length."""
-    return x.opening * OPEN**2
+    gaps = ca.DM(x.system.row_scale) * ca.densify(x.rows.gap)
+    return ca.sumsqr(gaps) / x.system.equations.length**2

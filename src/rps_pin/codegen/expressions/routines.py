@@ -132,7 +132,7 @@ def _step(functions: MechanismFunctions) -> Routine:
     check[1] = FMAX(check[1], c[0]);
     /* From an open configuration, or far off the manifold: too long a step. */
     check[0] = first[0] / CONST({OPEN**2!r});
-    if (ANY(LT(CONST({_LAST}), first[0]))) {{
+    if (ANY(LT({_LAST}, first[0]))) {{
         {_call("closed", ["q2"], alone, "q_next", "first", "c")}
         check[0] = FMAX(check[0], c[0]);
         check[1] = FMAX(check[1], c[1]);
