@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import RPSPinError
-from rps_pin.validation import choice
 
 Errors = Literal["raise", "mask"]
 #: Answers of one sample, from its arguments.
@@ -42,9 +41,8 @@ def settled(
     RPSPinError
         That of the first sample which has no answer, and which one it is.
     """
-    choice(errors, "errors", ("raise", "mask"))
     if isinstance(status, int):
-        return answer(*given) if status else found
+        return _one([part.shape for part in found], given, answer, errors) if status else found
     flagged = np.argwhere(status)
     if not flagged.size:
         return found
@@ -69,23 +67,31 @@ def settled(
     return found
 
 
-def by_samples(answer: Answer, given: Sequence[ArrayLike], errors: Errors = "raise") -> list[Any]:
+def by_samples(
+    answer: Answer,
+    given: Sequence[ArrayLike],
+    shapes: Sequence[tuple[int, ...]],
+    errors: Errors = "raise",
+) -> Sequence[Any]:
     """Return an engine's answers of all samples, (..., *shape); arguments (..., n) each."""
     arrays = [np.asarray(array, dtype=np.float64) for array in given]
     batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
     if not batch:
-        return list(answer(*arrays))
-    found: list[Array] | None = None
-    spread = [_spread(array, batch) for array in arrays]
-    for index in np.ndindex(batch):  # the shapes are those of the first sample that has an answer
-        try:
-            first = answer(*(array[index] for array in spread))
-        except RPSPinError:
-            continue
-        found = [np.empty(batch + np.shape(part)) for part in first]
-        break
-    every = np.ones(batch, dtype=np.int32)
-    return list(settled(found or [], every, arrays, answer, errors))
+        return _one(shapes, arrays, answer, errors)
+    found = [np.empty(batch + shape) for shape in shapes]
+    return settled(found, np.ones(batch, dtype=np.int32), arrays, answer, errors)
+
+
+def _one(
+    shapes: Sequence[tuple[int, ...]], given: Sequence[ArrayLike], answer: Answer, errors: Errors
+) -> Sequence[Any]:
+    """Return an engine's answers of one sample, or NaN."""
+    try:
+        return answer(*given)
+    except RPSPinError:
+        if errors == "raise":
+            raise
+        return [np.full(shape, np.nan) for shape in shapes]
 
 
 def _spread(array: ArrayLike, batch: tuple[int, ...]) -> Array:

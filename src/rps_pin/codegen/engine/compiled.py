@@ -36,7 +36,7 @@ from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.simulation import simulate
 from rps_pin.codegen.expressions.functions import UNDER_WRENCHES
 from rps_pin.errors import InputError
-from rps_pin.validation import choice, numbers, whole_number
+from rps_pin.validation import choice, numbers, positive_number, whole_number
 
 #: Answers of the Pinocchio engine for one sample, in the order of a function's outputs.
 Reference = Callable[..., Sequence[Any]]
@@ -177,8 +177,9 @@ class CompiledMechanism:
         def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
             return (m.close(q, fixed=fixed, within_limits=within_limits, restarts=restarts), 0.0)
 
+        whole_number(restarts, "restarts", 0)
         if fixed:
-            return np.asarray(self._by_samples(answer, (q_guess,), **options)[0])
+            return self._by_one(answer, q_guess, **options)
         return self._closed(
             "closed_near", self._normalised(q_guess), answer, within_limits, options
         )
@@ -189,7 +190,7 @@ class CompiledMechanism:
         def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
             return (m.project(q, within_limits=within_limits),)
 
-        return np.asarray(self._by_samples(answer, (q_guess,), **options)[0])
+        return self._by_one(answer, q_guess, **options)
 
     def complete(
         self,
@@ -230,8 +231,14 @@ class CompiledMechanism:
             [self.model.joints[self.model.getJointId(name)].nq == 1 for name in self.actuated]
         )
         if not (simple and self.code.partition.is_actuated):
-            return np.asarray(self._by_samples(answer, (start,), **options)[0])
+            return self._by_one(answer, start, **options)
         return self._closed("closed", start, answer, within_limits, options)
+
+    def _by_one(self, answer: Reference, start: ArrayLike, **options: Any) -> Array:
+        """Return the Pinocchio engine's configurations, from where it starts."""
+        shapes = [(self.model.nq,)]
+        found = self._by_samples(lambda m, q: answer(m, q)[:1], (start,), shapes, **options)
+        return np.asarray(found[0])
 
     def _closed(
         self, name: str, start: Array, answer: Reference, within_limits: bool, options: Any
@@ -249,9 +256,14 @@ class CompiledMechanism:
     def _normalised(self, q: ArrayLike) -> Array:
         """Return configurations with quaternions of unit length."""
         system = self.mechanism.system
+        nq = self.model.nq
+        given = numbers(q, "q_guess", f"numbers of shape (..., {nq})")
+        if given.shape[-1:] != (nq,):
+            raise InputError(f"q_guess has shape {given.shape}; expected (..., {nq})")
         if all(joint.nq == joint.nv for joint in list(self.model.joints)[1:]):
-            return numbers(q, "q_guess", f"numbers of shape (..., {self.model.nq})")
-        return np.asarray(by_samples(lambda one: (system.normalised(one, "q_guess"),), (q,))[0])
+            return given
+        normalised = by_samples(lambda one: (system.normalised(one, "q_guess"),), (given,), [(nq,)])
+        return np.asarray(normalised[0])
 
     # Velocity and acceleration --------------------------------------------------------------------
 
@@ -323,7 +335,8 @@ class CompiledMechanism:
             return m.frame_placement(q, frame), m.frame_jacobian(q, frame, independent)
 
         if not self._has(independent):
-            return np.asarray(self._by_samples(answer, (q,), **options)[0])
+            shapes = [(6, self._mobility(independent))]
+            return np.asarray(self._by_samples(answer, (q,), shapes, **options)[0])
         name = f"frame_jacobian_{self.mechanism.system.frame(frame)}"
         placement, jacobian = self._run(name, (q,), world, **options)
         if axes == "world":
@@ -491,7 +504,10 @@ class CompiledMechanism:
             return m.inverse_dynamics_derivatives(q, v, a, wrenches=w)
 
         if not self.code.partition.is_actuated:
-            found = self._by_samples(answer, (q, v, a), wrenches=wrenches, **options)
+            m, nv = len(self.actuated_indices), self.model.nv
+            shapes = [(m, nv)] * 3 + [(m, m)] * 3
+            given = (q, v, a)
+            found = self._by_samples(answer, given, shapes, True, wrenches=wrenches, **options)
         else:
             name, given = "inverse_dynamics_derivatives", (q, v, a)
             found = self._run(name, given, answer, wrenches, **options)
@@ -514,7 +530,9 @@ class CompiledMechanism:
 
         given = (q, v, tau)
         if not self._has(independent):
-            found = self._by_samples(answer, given, wrenches=wrenches, **options)
+            na, nv, m = len(self.actuated_indices), self.model.nv, self._mobility(independent)
+            shapes = [(nv, nv), (nv, nv), (nv, na), (m, m), (m, m), (m, na)]
+            found = self._by_samples(answer, given, shapes, True, wrenches=wrenches, **options)
         else:
             found = self._run("forward_dynamics_derivatives", given, answer, wrenches, **options)
         return ForwardDynamicsDerivatives(*found)
@@ -556,7 +574,11 @@ class CompiledMechanism:
             stepper.advance(tau, float(h[0]))
             return stepper.q, stepper.v, np.nan
 
-        h = np.asarray(duration, dtype=np.float64)[..., None]
+        h = numbers(duration, "duration", "positive numbers of s")[..., None]
+        if not np.all((h > 0) & (h < np.inf)):
+            if h.ndim == 1:
+                positive_number(duration, "duration", "s")
+            raise InputError("duration: all must be positive numbers of s, finite")
         found = self._run("step", (q, v, tau, h), answer, wrenches, **options)
         return found[0], found[1]
 
@@ -596,6 +618,7 @@ class CompiledMechanism:
 
         `refused` tells of the first result which samples are flagged too.
         """
+        _checked(errors, threads)
         if self._plain and not wrenches and parameters is None:
             *found, status = self._calls[name](*given, threads=threads)
         else:
@@ -630,7 +653,16 @@ class CompiledMechanism:
         """Return the result of a function of independent joints, if it is generated for these."""
         if self._has(independent):
             return self._one(name, given, answer, **options)
-        return np.asarray(self._by_samples(answer, given, **options)[0])
+        m = self._mobility(independent)
+        nv, others = self.model.nv, (m,)
+        shape: dict[str, tuple[int, ...]] = {"motion_basis": (nv, m), "mass_matrix": (m, m)}
+        shape |= {"velocity": (nv,), "acceleration": (nv,)}
+        shapes = [shape.get(name, others)]
+        return np.asarray(self._by_samples(answer, given, shapes, **options)[0])
+
+    def _mobility(self, independent: Sequence[str] | None) -> int:
+        """Return the number of the independent velocities."""
+        return int(self.mechanism.system.independent(independent).size)
 
     def _has(self, independent: Sequence[str] | None) -> bool:
         """Return whether these are the independent velocities of the generated code."""
@@ -643,18 +675,23 @@ class CompiledMechanism:
         self,
         answer: Reference,
         given: Sequence[ArrayLike],
+        shapes: Sequence[tuple[int, ...]],
+        under: bool = False,
         *,
         wrenches: Wrenches | None = None,
         parameters: ArrayLike | None = None,
         errors: Errors = "raise",
         threads: int = 1,
     ) -> Sequence[Any]:
-        """Return the Pinocchio engine's answers; `threads` are no use to it."""
-        whole_number(threads, "threads")
-        under = wrenches is not None
+        """Return the Pinocchio engine's answers; `threads` are no use to it.
+
+        `shapes` are those of a sample's answers, and `under` says whether wrenches count.
+        """
+        _checked(errors, threads)
         code = self._generated(wrenches)
         extra = self._inputs(code, under, wrenches, parameters)
-        return by_samples(self._answers(answer, len(given), code, under), (*given, *extra), errors)
+        answers = self._answers(answer, len(given), code, under)
+        return by_samples(answers, (*given, *extra), shapes, errors)
 
     def _settled(
         self,
@@ -741,6 +778,14 @@ class _Calls(dict[str, Callable[..., Any]]):
     def __missing__(self, name: str) -> Callable[..., Any]:
         self[name] = call = self._code[name].call
         return call
+
+
+def _checked(errors: Errors, threads: int) -> None:
+    """Refuse options that are not possible."""
+    if errors not in ("raise", "mask"):
+        choice(errors, "errors", ("raise", "mask"))
+    if threads != 1:
+        whole_number(threads, "threads")
 
 
 def _stacked(wrenches: Sequence[ArrayLike]) -> Array:

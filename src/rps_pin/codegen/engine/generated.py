@@ -22,7 +22,7 @@ from rps_pin.codegen.build.builder import CompilerName, build_in_background, kep
 from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
 from rps_pin.codegen.engine.identity import digest
 from rps_pin.codegen.engine.proof import Proof
-from rps_pin.codegen.expressions.functions import MechanismFunctions
+from rps_pin.codegen.expressions.functions import MechanismFunctions, is_matrix
 from rps_pin.codegen.expressions.independent import Partition, choose, regular_samples
 from rps_pin.codegen.expressions.mechanism import MechanismExpressions
 from rps_pin.codegen.expressions.parameters import Parameters
@@ -273,6 +273,9 @@ class GeneratedCode:
             count, outputs = len(one.inputs), unit.handed_out(name)
             inputs = [[key, shapes[i]] for i, (key, _) in enumerate(one.inputs)]
             results = [[key, shapes[count + i]] for i, (key, _) in enumerate(outputs)]
+            for result in results:
+                if is_matrix(str(result[0])) and len(result[1]) == 1:
+                    result[1] = [*result[1], 1]
             found[name] = [inputs, results]
         return found
 

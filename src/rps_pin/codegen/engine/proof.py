@@ -27,9 +27,26 @@ from rps_pin.numerics.linear_algebra import Decomposition, condition_number, nul
 
 #: Largest difference from the Pinocchio engine, relative to the largest number of a result.
 ACCEPTED = 1e-10
-#: Numbers below this count as rounding errors of zero, in SI units; also this much of a function's
-#: largest number: a result that is smaller is left of sums that cancel.
-_ZERO, _CANCELLED = 1e-6, 1e-3
+#: A weight below this is no measure of wrenches, N.
+_WEIGHTLESS = 1e-6
+#: Results that are all below this may be zero: differences are relative to this then. SI units, of
+#: forces and inertias for a mechanism whose mass matrix has entries up to 1.
+_ZERO = 1e-3
+#: Functions whose results are proportional to the masses.
+_OF_MASS = frozenset(
+    (
+        "inverse_dynamics",
+        "constraint_forces",
+        "generalised_force",
+        "mass_matrix",
+        "bias",
+        "gravity_forces",
+        "energy",
+        "inverse_dynamics_derivatives",
+    )
+)
+#: And those below this much of a function's largest number: they are left of sums that cancel.
+_CANCELLED = 1e-3
 #: Of a proof's steps in time, those of a call together, s, and of Newton's guesses, rad or
 #: characteristic lengths.
 STEP, _AWAY = 1e-5, 1e-3
@@ -57,6 +74,8 @@ class Sample(NamedTuple):
     """q with its dependent velocities moved a little."""
     condition: float
     """Of J_d, in one unit."""
+    mass: float
+    """Largest entry of the tree's mass matrix; 1 if it has no mass."""
 
 
 class Proof:
@@ -111,12 +130,15 @@ class Proof:
         weight = float(
             np.abs(pin.computeGeneralizedGravity(model, m.system.data, q)).max(initial=0)
         )
-        wrenches = max(weight, _ZERO) * rng.normal(size=6 * len(self._frames))
+        wrenches = max(weight, _WEIGHTLESS) * rng.normal(size=6 * len(self._frames))
         try:
             tau = m.inverse_dynamics(q, v, a, wrenches=self._acting(wrenches)).tau
         except SingularityError:  # actuators that hardly move one of the motions
             tau = 0.1 * weight * rng.normal(size=m.system.actuated.size)
-        return Sample(q, v, a, tau, u, w, wrenches, self._parameters, near, self._condition(q))
+        mass = float(np.abs(tree_mass(m.system, q)).max()) or 1.0
+        return Sample(
+            q, v, a, tau, u, w, wrenches, self._parameters, near, self._condition(q), mass
+        )
 
     def _closed(self, q: Array) -> Array:
         """Return q after one of Newton's steps of least norm: closed to rounding error."""
@@ -173,11 +195,12 @@ class Proof:
                 continue
             expected = self.expected(name, sample, found)
             sizes = [np.abs(one).max(initial=0.0) for one in expected if one is not None]
-            least = max(_ZERO, _CANCELLED * float(np.max(sizes, initial=0.0)))
+            zero = _ZERO * (sample.mass if name in _OF_MASS else 1.0)
+            least = max(zero, _CANCELLED * float(np.max(sizes, initial=0.0)))
             for k, (one, of_batch, wanted) in enumerate(zip(found, batch, expected, strict=False)):
                 if wanted is not None:
                     for result in (one, of_batch[i]):
-                        relative = self._difference(name, function, k, result, wanted, least)
+                        relative = self._difference(function, k, result, wanted, least)
                         worst = max(worst, relative)
             compared += 1
         if not compared:
@@ -185,17 +208,23 @@ class Proof:
         return worst
 
     def _difference(
-        self, name: str, function: CompiledFunction, k: int, found: Array, wanted: Any, least: float
+        self, function: CompiledFunction, k: int, found: Array, wanted: Any, least: float
     ) -> float:
         """Return the relative difference of a result; raise if it is above what is accepted."""
-        wanted = np.reshape(wanted, found.shape)
+        wanted = np.asarray(wanted)
+        if wanted.shape != found.shape:
+            raise CompileError(
+                f"generated code of {function.name}: {function.outputs[k].name} has shape "
+                f"{found.shape}, not {wanted.shape}",
+                "",
+            )
         error = np.abs(found - wanted)
         size = max(float(np.abs(wanted).max(initial=0.0)), least)
         relative = float(error.max(initial=0.0)) / size
         if not relative <= ACCEPTED:
             at = np.unravel_index(int(np.argmax(error)), error.shape)
             raise CompileError(
-                f"generated code of {name} does not agree with the Pinocchio engine: "
+                f"generated code of {function.name} does not agree with the Pinocchio engine: "
                 f"{function.outputs[k].name}{list(map(int, at))} = {found[at]!r}, not "
                 f"{wanted[at]!r}: {relative:.3g} relative, at most {ACCEPTED:g} is accepted",
                 "",
@@ -242,7 +271,7 @@ class Proof:
                 self._reduced(s.q, pin.computeGeneralizedGravity(m.model, m.system.data, s.q)),
             ),
             "energy": lambda: (np.array(m.energy(s.q, s.v)),),
-            "closed": lambda: (s.q,),
+            "closed": lambda: (self._completed(s, found[0]),),
             "step": lambda: self._steps(s, 1),
             "steps": lambda: self._steps(s, BLOCK),
             "inverse_dynamics_derivatives": lambda: m.inverse_dynamics_derivatives(
@@ -253,6 +282,14 @@ class Proof:
             ),
         }
         return answers[name]()
+
+    def _completed(self, s: Sample, q: Array) -> Array:
+        """Return q, or what differs from it, if it is open or has not the given coordinates.
+
+        It need not be s.q: near a singularity two configurations are near the guess.
+        """
+        moved = pin.difference(self._m.model, s.near, q)[self._independent]
+        return np.asarray(q + np.abs(moved).max(initial=self._m.loop_gap(q)))
 
     def _acting(self, wrenches: Array) -> dict[str, Array] | None:
         parts = wrenches.reshape(-1, 6)

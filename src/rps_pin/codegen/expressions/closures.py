@@ -53,6 +53,21 @@ class _InWorld(NamedTuple):
     """Whether it is spherical."""
 
 
+class Carrier(NamedTuple):
+    """Motion of the body in whose axes some rows are, in those axes; it is not the world."""
+
+    rows: slice
+    """Of one closure."""
+    is_point: bool
+    """Whether the closure is spherical."""
+    spin_jacobian: Expression
+    """Shape (3, nv)."""
+    spin: Expression
+    """Angular velocity, shape (3,)."""
+    spin_rate: Expression
+    """Its derivative at constant v, shape (3,)."""
+
+
 class ClosureRows:
     """Rows of all closures of a mechanism, stacked in order.
 
@@ -131,6 +146,18 @@ class ClosureRows:
                     result[here] += cross(carrier.spin, moved)
                     result[here] += cross(carrier.spin_rate, gaps[here])
         return tidy(result)
+
+    def carriers(self) -> list[Carrier]:
+        """Return the moving common ancestors of spherical and rigid closures."""
+        found = []
+        for closure in self._in_world:
+            if closure.joint:
+                turn, _ = self._tree.world(closure.joint)
+                motion = self._carrier(closure.joint)
+                own = (motion.spin_jacobian, motion.spin, motion.spin_rate)
+                turned = (tidy(turn.T @ one) for one in own)
+                found.append(Carrier(closure.rows, closure.is_point, *turned))
+        return found
 
     def _carrier(self, joint: int) -> Motion:
         """Return a joint's motion relative to the world."""

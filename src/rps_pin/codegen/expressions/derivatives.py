@@ -16,6 +16,14 @@ X_q and X_v being the x of c_q and c_v. T' M x needs no x: it is -Y' dc with J_d
 The derivatives of rnea are in closed form (see `rnea_derivatives`); of the rest of F, of J v and of
 c, CasADi's: the factors of J_d are used again, not
 differentiated. Derivatives by q are along the tangent of the configuration.
+
+Derivatives by q alone, or v alone, lead off the closed motions, where the rows of spherical and
+rigid closures in a moving body's axes and in the package's are not turned alike. With w and w' that
+body's angular velocity and acceleration, e the gap, e' = J v and mu the multipliers, all zero but
+w, w' and mu, the package's c, in the body's axes, has in addition
+
+    spherical   2 w x de' + w' x de + w x (w x de),    and F has  -W' (de x mu),  w = W v;
+    rigid       w x de'.
 """
 
 from __future__ import annotations
@@ -25,6 +33,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
+from rps_pin.codegen.expressions.closures import Carrier
 from rps_pin.codegen.expressions.mechanism import Expression, MechanismExpressions
 from rps_pin.codegen.expressions.rnea_derivatives import rnea_derivatives
 
@@ -68,6 +77,7 @@ class Slopes:
         self._rest = x.passive_forces - x.external_forces - x.rows.jacobian.T @ self.multipliers
         self._rnea_slopes = rnea_derivatives(x.tree, x.v, x.a)
         self._opening = x.rows.jacobian @ x.a + x.rows.bias
+        self._carriers = x.rows.carriers()
 
     def _by_q(self, expression: Expression) -> Expression:
         return ca.sparsify(ca.jacobian(expression, self.x.q) @ self._tangent)
@@ -75,7 +85,14 @@ class Slopes:
     @cached_property
     def force_q(self) -> Expression:
         """F_q, shape (nv, nv)."""
-        return ca.sparsify(self._rnea_slopes[0] + self._by_q(self._rest))
+        slope = self._rnea_slopes[0] + self._by_q(self._rest)
+        for carrier in self._carriers:
+            if carrier.is_point:
+                along = (
+                    ca.skew(self.multipliers[carrier.rows]) @ self.x.rows.jacobian[carrier.rows, :]
+                )
+                slope += carrier.spin_jacobian.T @ along
+        return ca.sparsify(slope)
 
     @cached_property
     def force_v(self) -> Expression:
@@ -83,14 +100,40 @@ class Slopes:
         return ca.sparsify(self._rnea_slopes[1] + ca.jacobian(self._rest, self.x.v))
 
     @cached_property
+    def rate_q(self) -> Expression:
+        """(J v)_q, shape (nc, nv)."""
+        return self._by_q(self.x.rows.jacobian @ self.x.v)
+
+    @cached_property
     def opening_q(self) -> Expression:
         """c_q, shape (nc, nv)."""
-        return self._by_q(self._opening)
+        slope = self._by_q(self._opening)
+        for carrier in self._carriers:
+            slope[carrier.rows, :] += self._turned(
+                carrier, self.rate_q[carrier.rows, :], self.x.rows.jacobian[carrier.rows, :]
+            )
+        return ca.sparsify(slope)
 
     @cached_property
     def opening_v(self) -> Expression:
         """c_v, shape (nc, nv)."""
-        return ca.jacobian(self._opening, self.x.v)
+        slope = ca.jacobian(self._opening, self.x.v)
+        for carrier in self._carriers:
+            slope[carrier.rows, :] += self._turned(carrier, self.x.rows.jacobian[carrier.rows, :])
+        return ca.sparsify(slope)
+
+    def _turned(
+        self, carrier: Carrier, rates: Expression, gaps: Expression | None = None
+    ) -> Expression:
+        """Return the additional terms of dc, of changes of e' and e, shape (rows, nv) each."""
+        spin = ca.skew(carrier.spin)
+        if not carrier.is_point:
+            return ca.vertcat(*(spin @ part for part in ca.vertsplit(rates, 3)))
+        turned = 2 * spin @ rates
+        if gaps is not None:
+            spin_rate = carrier.spin_rate + carrier.spin_jacobian @ self.x.a
+            turned += (ca.skew(spin_rate) + spin @ spin) @ gaps
+        return turned
 
     @cached_property
     def _mass_times_basis(self) -> Expression:
@@ -131,8 +174,7 @@ class Slopes:
     def inverse(self) -> InverseSlopes:
         """Return the derivatives of the actuator forces, the independent joints being actuated."""
         x, T = self.x, self.x.basis
-        rate_q = self._by_q(x.rows.jacobian @ x.v)
-        velocity_y = ca.sparsify(-x.dependent(rate_q @ T))  # V_y
+        velocity_y = ca.sparsify(-x.dependent(self.rate_q @ T))  # V_y
         return InverseSlopes(
             T.T @ self.force_q,
             T.T @ self.force_v,

@@ -91,6 +91,11 @@ class MechanismFunctions:
         return ca.Function(name, list(given.values()), outputs, list(given), list(results))
 
 
+def is_matrix(result: str) -> bool:
+    """Return whether a result of this name is a matrix, even if it has a single column."""
+    return result in ("jacobian", "basis", "placement", "mass") or result.startswith("by_")
+
+
 Made = tuple[dict[str, Expression], dict[str, Expression]]
 _MAKERS: dict[str, Callable[[MechanismExpressions], Made]] = {}
 #: Functions that take wrenches.

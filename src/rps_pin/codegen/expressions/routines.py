@@ -68,8 +68,8 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
         {_call(kernel, ["q_closed"], extra, "dv", "gap", "growth")}
         check[1] = FMAX(check[1], growth[0]);
         if (k == 0) first[0] = gap[0];
-        /* A gap that grows, before it is rounding error, is not this routine's matter. */
-        check[0] = SELECT(AND(LT(before, gap[0]), LT({_CLOSED}, gap[0])),
+        /* A gap that grows, before it is near rounding error, is not this routine's matter. */
+        check[0] = SELECT(AND(LT(before, gap[0]), LT({_LAST}, gap[0])),
                           CONST(2), check[0]);
         before = gap[0];
         if (!ANY(LT({_CLOSED}, gap[0]))) break;
