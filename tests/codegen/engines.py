@@ -76,7 +76,8 @@ CALLS: Mapping[str, Mapping[str, Call]] = {
         "acceleration": lambda e, s: e.acceleration(s.q, s.v, s.w),
     },
     "closing": {
-        "close": lambda e, s: e.close(s.near, within_limits=False),
+        # Near the guess, but the Pinocchio engine's steps are damped: it ends elsewhere.
+        "gap of close": lambda e, s: e.loop_gap(e.close(s.near, within_limits=False)),
     },
     "forces": {
         "generalised_force": lambda e, s: e.generalised_force(s.q, s.v, s.a),
