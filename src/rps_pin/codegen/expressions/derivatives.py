@@ -166,6 +166,26 @@ class Slopes:
     def _reduced_v(self) -> Expression:
         return self._reduced(self.force_v, self.opening_v)
 
+    def by_parameters(self) -> tuple[Expression, Expression]:
+        """Return the gaps' derivatives by the parameters, (nc, np), and those of T' F, (m, np).
+
+        The second with independent positions, velocities and accelerations held, which the rest of
+        the mechanism follows with its loops closed:
+
+            dq = X dp,  dv = V dp,  J X = -e_p,  J V = -((J v)_p + (J v)_q X),
+            d(T' F) = T' F_p + T' (F_q X + F_v V) + T' M A,  J A = -(c_p + c_q X + c_v V).
+        """
+        x, p = self.x, self.x.parameters.symbols
+        gaps = ca.jacobian(x.rows.gap, p)
+        rate = x.rows.jacobian @ x.v
+        followed = -x.dependent(ca.sparsify(gaps))
+        opening = ca.jacobian(rate, p) + self._by_q(rate) @ followed
+        speeds = -x.dependent(ca.sparsify(opening))
+        whole = x.tree.rnea(x.v, x.a) + self._rest
+        force = ca.jacobian(whole, p) + self.force_q @ followed + self.force_v @ speeds
+        bias = ca.jacobian(self._opening, p) + self.opening_q @ followed + self.opening_v @ speeds
+        return gaps, self._reduced(ca.sparsify(force), ca.sparsify(bias))
+
     def at(self, multipliers: Expression, slopes: dict[str, Expression]) -> dict[str, Expression]:
         """Return derivatives with an expression in place of the multipliers."""
         values = ca.substitute(list(slopes.values()), [self.multipliers], [ca.densify(multipliers)])

@@ -29,6 +29,11 @@ inverse_dynamics_derivatives  q, v, a         derivatives of tau by q, v, a (m n
 forward_dynamics_derivatives  q, v, tau       derivatives of a by q, v (nv nv), tau (nv na), and of
                                               its independent entries: position, velocity (m m),
                                               actuation (m na) (check)
+gaps_by_parameters       q               derivatives of e (nc np)
+inverse_dynamics_by\     q, v, a         derivatives of tau (m np), independent positions, velocities
+_parameters                              and accelerations held, the rest following (check)
+forward_dynamics_by\     q, v, tau       derivatives of the independent accelerations (m np), in the
+_parameters                              same way (check)
 integrate                     q, dv           q (nq)
 closing_step                  q               dv of the dependent velocities (nv), squared gap (1),
                                               growth (1)
@@ -261,6 +266,31 @@ def _forward_dynamics_derivatives(x: MechanismExpressions) -> Made:
     names, values = list(found), list(found.values())
     values = ca.substitute(values, [x.a], [results["a"]])
     return given, dict(zip(names, values, strict=True)) | {"check": results["check"]}
+
+
+@_function()
+def _gaps_by_parameters(x: MechanismExpressions) -> Made:
+    gaps = ca.jacobian(x.rows.in_package(x.rows.gap), x.parameters.symbols)
+    return {"q": x.q}, {"by_parameters": gaps}
+
+
+@_function(wrenches=True)
+def _inverse_dynamics_by_parameters(x: MechanismExpressions) -> Made:
+    slopes = Slopes(x)
+    found = slopes.at(x.forces.multipliers, {"by_parameters": slopes.by_parameters()[1]})
+    return {"q": x.q, "v": x.v, "a": x.a}, found | {"check": x.check}
+
+
+@_function(wrenches=True)
+def _forward_dynamics_by_parameters(x: MechanismExpressions) -> Made:
+    slopes = Slopes(x)
+    given, results = _MAKERS["forward_dynamics"](x)
+    rest = x.required(x.a)
+    rest[x.system.actuated.tolist()] -= x.tau
+    change = -x.inertia.solve(slopes.by_parameters()[1])
+    found = slopes.at(x.reduced(rest)[1], {"by_parameters": change})
+    found = {k: ca.substitute(f, x.a, results["a"]) for k, f in found.items()}
+    return given, found | {"check": results["check"]}
 
 
 # Moves on the manifold ----------------------------------------------------------------------------
