@@ -8,6 +8,7 @@ singular configuration) is handed to the Pinocchio engine, which answers or rais
 from __future__ import annotations
 
 import copy
+import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
@@ -35,7 +36,7 @@ from rps_pin.codegen.engine.forces import GeneratedForces
 from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.simulation import simulate
 from rps_pin.codegen.expressions.functions import UNDER_WRENCHES
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, SingularityError
 from rps_pin.validation import choice, numbers, positive_number, whole_number
 
 #: Answers of the Pinocchio engine for one sample, in the order of a function's outputs.
@@ -548,6 +549,76 @@ class CompiledMechanism:
         """Return A (..., 2 m, 2 m) and B (..., 2 m, na); see `ClosedLoopModel.linearize`."""
         found = self.forward_dynamics_derivatives(q, v, tau, independent, **options)
         return linearisation(found)
+
+    # By parameters --------------------------------------------------------------------------------
+
+    def gaps_by_parameters(self, q: ArrayLike, **options: Any) -> Array:
+        """Return the gaps' derivatives by the parameters, q held, shape (..., nc, np)."""
+        return self._by_parameters("gaps_by_parameters", (q,), "loop_errors", None, options)
+
+    def inverse_dynamics_by_parameters(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> Array:
+        """Return the actuator forces' derivatives by the parameters, shape (..., na, np).
+
+        The actuated joints' positions, velocities and accelerations are held, and the rest of the
+        mechanism follows with its loops closed: the derivatives of the forces that the same motion
+        of the actuators takes. Where these do not determine the motion, they are those of the
+        forces T' f at the independent velocities, shape (..., m, np).
+
+        Raises
+        ------
+        InputError
+            If the mechanism was compiled without parameters.
+        SingularityError
+            If a configuration is singular or nearly.
+        """
+        name, given = "inverse_dynamics_by_parameters", (q, v, a)
+        return self._by_parameters(name, given, "inverse_dynamics", wrenches, options)
+
+    def forward_dynamics_by_parameters(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> Array:
+        """Return the independent accelerations' derivatives by the parameters, (..., m, np).
+
+        Forces, and the independent joints' positions and velocities, are held; see
+        `inverse_dynamics_by_parameters`.
+        """
+        name, given = "forward_dynamics_by_parameters", (q, v, tau)
+        return self._by_parameters(name, given, "forward_dynamics", wrenches, options)
+
+    def _by_parameters(
+        self,
+        name: str,
+        given: Sequence[ArrayLike],
+        answered: str,
+        wrenches: Wrenches | None,
+        options: Any,
+    ) -> Array:
+        if not self.code.parameters:
+            raise InputError("the mechanism was compiled without parameters; name them in compile")
+
+        def answer(m: ClosedLoopModel, *arrays: Any) -> Sequence[Any]:
+            getattr(m, answered)(*arrays[:3])  # which says what is wrong, if it is wrong
+            raise SingularityError(
+                "the configuration is too nearly singular for derivatives by parameters",
+                math.inf,
+                m.max_condition,
+            )
+
+        return self._one(name, given, answer, wrenches, **options)
 
     # Simulation -----------------------------------------------------------------------------------
 

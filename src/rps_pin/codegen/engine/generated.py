@@ -46,12 +46,21 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "simulation": ("step", "steps"),
     "derivatives": ("inverse_dynamics_derivatives", "forward_dynamics_derivatives"),
 }
+#: And with parameters.
+OF_PARAMETERS: Mapping[str, tuple[str, ...]] = {
+    "parameters": (
+        "gaps_by_parameters",
+        "inverse_dynamics_by_parameters",
+        "forward_dynamics_by_parameters",
+    ),
+}
+_ALL = {**GROUPS, **OF_PARAMETERS}
 #: Functions whose last output is a check.
 _CHECKED = frozenset(
     name
-    for group in GROUPS.values()
+    for group in _ALL.values()
     for name in group
-    if name not in ("gaps", "jacobian", "generalised_force", "energy")
+    if name not in ("gaps", "jacobian", "generalised_force", "energy", "gaps_by_parameters")
 )
 
 
@@ -124,8 +133,14 @@ class GeneratedCode:
 
     @cached_property
     def _proof(self) -> Proof:
-        independent = self.partition.independent
-        return Proof(self.mechanism, independent, self.parameters, self.wrench_frames)
+        partition = self.partition
+        return Proof(
+            self.mechanism,
+            partition.independent,
+            self.parameters,
+            self.wrench_frames,
+            partition.redundant_rows > 0,
+        )
 
     @cached_property
     def identity(self) -> str:
@@ -138,7 +153,7 @@ class GeneratedCode:
         try:
             return self._functions[name]
         except KeyError:
-            group = next((g for g, names in GROUPS.items() if name in names), name)
+            group = next((g for g, names in _ALL.items() if name in names), name)
             self.build(group)
         return self._functions[name]
 
@@ -231,13 +246,14 @@ class GeneratedCode:
     def _names(self, group: str) -> tuple[str, ...]:
         if group == "derivatives" and not self.partition.is_actuated:
             return ("forward_dynamics_derivatives",)  # the forces follow from no actuated motion
-        if group in GROUPS:
-            return GROUPS[group]
+        possible = _ALL if self.parameters else GROUPS
+        if group in possible:
+            return possible[group]
         if group.startswith("frame_"):
             return (group,)
         raise InputError(
-            f"no group of functions {group!r}{did_you_mean(group, GROUPS)}; there are: "
-            f"{', '.join(GROUPS)}"
+            f"no group of functions {group!r}{did_you_mean(group, possible)}; there are: "
+            f"{', '.join(possible)}"
         )
 
     def _texts(self, group: str, lanes: bool) -> tuple[str, ...]:

@@ -47,6 +47,9 @@ _OF_MASS = frozenset(
 )
 #: And those below this much of a function's largest number: they are left of sums that cancel.
 _CANCELLED = 1e-3
+#: Derivatives by parameters are compared with differences of order 4 instead.
+_OF_DIFFERENCES, _DIFFERENCE = 1e-7, 1e-4
+_STENCIL = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
 #: Of a proof's steps in time, those of a call together, s, and of Newton's guesses, rad or
 #: characteristic lengths.
 STEP, _AWAY = 1e-5, 1e-3
@@ -89,6 +92,8 @@ class Proof:
         Indices of the independent velocities.
     parameters, wrench_frames
         As for `MechanismExpressions`.
+    redundant
+        Whether some of the closures' rows depend on others.
     """
 
     def __init__(
@@ -97,12 +102,18 @@ class Proof:
         independent: Indices,
         parameters: Sequence[str],
         wrench_frames: Sequence[str],
+        redundant: bool = False,
     ) -> None:
         self._rng = np.random.default_rng(0)
-        self._parameters = Parameters(mechanism.system, parameters).nominal
-        if parameters:
-            size = np.where(self._parameters, 0.03 * np.abs(self._parameters), 1e-3)
-            self._parameters = self._parameters + size * self._rng.uniform(size=size.size)
+        nominal = [_nominal(mechanism, group) for group in parameters]
+        moved = [
+            _range(group, one, redundant) for group, one in zip(parameters, nominal, strict=True)
+        ]
+        #: How far parameters are moved for derivatives.
+        self._direction = np.concatenate([np.zeros(0), *moved])
+        self._parameters = np.concatenate([np.zeros(0), *nominal])
+        self._parameters += 0.03 * self._direction * self._rng.uniform(size=self._direction.size)
+        self._nominal, self._groups = mechanism, tuple(parameters)
         self._m = with_parameters(mechanism, parameters, self._parameters)
         self._frames, self._independent = tuple(wrench_frames), independent
         nv = mechanism.model.nv
@@ -221,12 +232,13 @@ class Proof:
         error = np.abs(found - wanted)
         size = max(float(np.abs(wanted).max(initial=0.0)), least)
         relative = float(error.max(initial=0.0)) / size
-        if not relative <= ACCEPTED:
+        accepted = _OF_DIFFERENCES if function.name.endswith("_by_parameters") else ACCEPTED
+        if not relative <= accepted:
             at = np.unravel_index(int(np.argmax(error)), error.shape)
             raise CompileError(
                 f"generated code of {function.name} does not agree with the Pinocchio engine: "
                 f"{function.outputs[k].name}{list(map(int, at))} = {found[at]!r}, not "
-                f"{wanted[at]!r}: {relative:.3g} relative, at most {ACCEPTED:g} is accepted",
+                f"{wanted[at]!r}: {relative:.3g} relative, at most {accepted:g} is accepted",
                 "",
             )
         return relative
@@ -248,6 +260,8 @@ class Proof:
         if name.startswith("frame_"):
             frame = m.model.frames[int(name.rpartition("_")[2])].name
             return m.frame_placement(s.q, frame), self._frame_jacobian(s.q, frame)
+        if name.endswith("_by_parameters"):
+            return (self._slope(s, name, found[0]) if s is self.samples[0] else None,)
         if name == "closed_near":
             # The answer is any closed configuration.
             return (found[0] + m.loop_gap(found[0]),)
@@ -290,6 +304,50 @@ class Proof:
         """
         moved = pin.difference(self._m.model, s.near, q)[self._independent]
         return np.asarray(q + np.abs(moved).max(initial=self._m.loop_gap(q)))
+
+    def _slope(self, s: Sample, name: str, found: Array) -> Array:
+        """Return a function's derivatives by the parameters, corrected in one random direction.
+
+        The derivative in that direction is the Pinocchio engine's, by differences.
+        """
+        answer = {
+            "gaps_by_parameters": self._gaps,
+            "inverse_dynamics_by_parameters": self._reduced_force,
+            "forward_dynamics_by_parameters": self._independent_acceleration,
+        }[name]
+        direction = self._direction * self._rng.uniform(0.5, 1.0, self._direction.size)
+        slope, mechanism = np.zeros(found.shape[:-1]), self._m
+        for times, weight in _STENCIL:
+            values = s.parameters + times * _DIFFERENCE * direction
+            self._m = with_parameters(self._nominal, self._groups, values)
+            slope += weight / _DIFFERENCE * answer(s)
+        self._m = mechanism
+        error = slope - found @ direction
+        return np.asarray(found + np.multiply.outer(error, direction) / (direction @ direction))
+
+    def _gaps(self, s: Sample) -> Array:
+        return self._m.loop_errors(s.q).position
+
+    def _followed(self, s: Sample) -> tuple[Array, Array]:
+        """Return q and v of the independent positions and velocities, the loops closed."""
+        m, q = self._m, s.q
+        for _ in range(6):
+            gaps = m.system.row_scale * m.loop_errors(q).position
+            rows = m.system.scaled(m.jacobian(q))[:, self._dependent]
+            move = np.zeros(m.model.nv)
+            move[self._dependent] = -Decomposition(rows).least_norm(gaps)
+            q = pin.integrate(m.model, q, m.velocity_scale * move)
+        return q, self._basis(q) @ s.u
+
+    def _reduced_force(self, s: Sample) -> Array:
+        q, v = self._followed(s)
+        a, acting = self._acceleration(q, v, s.w), self._acting(s.wrenches)
+        return self._reduced(q, self._m.generalised_force(q, v, a, wrenches=acting))
+
+    def _independent_acceleration(self, s: Sample) -> Array:
+        q, v = self._followed(s)
+        a = self._m.forward_dynamics(q, v, s.tau, wrenches=self._acting(s.wrenches))
+        return np.asarray(a[self._independent])
 
     def _acting(self, wrenches: Array) -> dict[str, Array] | None:
         parts = wrenches.reshape(-1, 6)
@@ -336,3 +394,22 @@ class Proof:
             states.append((stepper.q, stepper.v))
         qs, vs = zip(*states, strict=True)
         return np.concatenate(qs), np.concatenate(vs)
+
+
+def _nominal(mechanism: ClosedLoopModel, group: str) -> Array:
+    return Parameters(mechanism.system, [group]).nominal
+
+
+def _range(group: str, nominal: Array, redundant: bool) -> Array:
+    """Return how far the parameters of a group may be moved, so that inertias stay such.
+
+    Where rows are redundant, lengths and directions are not moved: that could lock the mechanism.
+    """
+    kind = group.partition(":")[0]
+    if kind in ("placement", "closure"):
+        return np.full(nominal.size, 0.0 if redundant else 0.05)
+    if kind == "payload":
+        return np.array([1.0, *[1e-3] * 3, 1e-2, 0.0, 1e-2, 0.0, 0.0, 1e-2])
+    if kind == "gravity":
+        return np.ones(3)
+    return np.where(nominal, np.abs(nominal), 1e-3 * np.abs(nominal).max())

@@ -1,10 +1,9 @@
 """Quantities of a mechanism as named CasADi functions, from which C and CUDA are generated.
 
-Where it says (check), the last result
-of the function is ``check``: the opening of the loops and the growth of rounding errors, at most 1
-each where the other results hold (see `expressions`). External wrenches (6 for each frame, force
-and moment in world axes at the frame's origin) and parameters follow the arguments listed, if the
-mechanism was given any.
+Where it says (check), the last result of the function is ``check``: the opening of the loops and
+the growth of rounding errors, at most 1 each where the other results hold (see `mechanism`).
+External wrenches (6 for each frame, force and moment in world axes at the frame's origin) and
+parameters follow the arguments listed, if the mechanism was given any.
 
 ============================  ==============  ======================================================
 name                          arguments       results
@@ -29,11 +28,6 @@ inverse_dynamics_derivatives  q, v, a         derivatives of tau by q, v, a (m n
 forward_dynamics_derivatives  q, v, tau       derivatives of a by q, v (nv nv), tau (nv na), and of
                                               its independent entries: position, velocity (m m),
                                               actuation (m na) (check)
-gaps_by_parameters       q               derivatives of e (nc np)
-inverse_dynamics_by\     q, v, a         derivatives of tau (m np), independent positions, velocities
-_parameters                              and accelerations held, the rest following (check)
-forward_dynamics_by\     q, v, tau       derivatives of the independent accelerations (m np), in the
-_parameters                              same way (check)
 integrate                     q, dv           q (nq)
 closing_step                  q               dv of the dependent velocities (nv), squared gap (1),
                                               growth (1)
@@ -44,6 +38,12 @@ projection                    q, v            dv of least norm (nv), v less its 
                                               least norm (nv), squared gap (1), growth (1)
 projected_velocity            q, v            v (nv), its dependent entries changed
 ============================  ==============  ======================================================
+
+With parameters there are also their derivatives: ``gaps_by_parameters`` (q), (nc np);
+``inverse_dynamics_by_parameters`` (q, v, a), those of T' f (m np), f the required force, which is
+tau where the actuated joints are the independent ones; ``forward_dynamics_by_parameters`` (q, v,
+tau), those of the independent accelerations (m np); both (check). Independent positions,
+velocities and accelerations are held; the rest of the mechanism follows, its loops closed.
 """
 
 from __future__ import annotations
@@ -73,7 +73,8 @@ class MechanismFunctions:
 
     def names(self) -> list[str]:
         """Return the names of all functions."""
-        return list(_MAKERS)
+        with_parameters = bool(self.expressions.parameters.labels)
+        return [name for name in _MAKERS if with_parameters or not name.endswith("_by_parameters")]
 
     def __getitem__(self, name: str) -> Any:
         """Return the `casadi.Function` of a name."""
