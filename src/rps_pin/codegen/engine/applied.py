@@ -12,6 +12,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure, LoopClosure, joint_id
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen.expressions.parameters import Parameters
+from rps_pin.errors import InputError
 
 
 def with_parameters(
@@ -50,7 +51,7 @@ def _apply(model: pin.Model, closures: list[Closure], group: str, values: Array)
     if kind == "gravity":
         model.gravity.linear = values
     elif kind == "inertia":
-        model.inertias[joint_id(model, name, group)] = pin.Inertia.FromDynamicParameters(values)
+        model.inertias[joint_id(model, name, group)] = _body(values, group)
     elif kind == "mass":
         joint = joint_id(model, name, group)
         body = model.inertias[joint]
@@ -64,8 +65,21 @@ def _apply(model: pin.Model, closures: list[Closure], group: str, values: Array)
         closures[index] = _moved_ends(model, closures[index], values)
     else:
         frame = model.frames[model.getFrameId(name)]
-        body = frame.placement.act(pin.Inertia.FromDynamicParameters(values))
+        body = frame.placement.act(_body(values, group))
         model.inertias[frame.parentJoint] = model.inertias[frame.parentJoint] + body
+
+
+def _body(values: Array, group: str) -> pin.Inertia:
+    """Return a body; Pinocchio divides by its mass, which may be zero."""
+    if values[0]:
+        return pin.Inertia.FromDynamicParameters(values)
+    if values[1:4].any():
+        raise InputError(
+            f"{group}: first moment {values[1:4]} kg m without mass; the Pinocchio engine cannot "
+            "answer here"
+        )
+    xx, xy, yy, xz, yz, zz = values[4:]
+    return pin.Inertia(0.0, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
 def _moved_ends(model: pin.Model, closure: Closure, values: Array) -> LoopClosure:

@@ -10,6 +10,7 @@ name                          arguments       results
 ============================  ==============  ======================================================
 gaps                          q               e (nc)
 jacobian                      q               J (nc nv)
+gap_accelerations             q, v, a         J a + J' v (nc)
 motion_basis                  q               T (nv m) (check)
 velocity                      q, u            v (nv) (check)
 acceleration                  q, v, w         a (nv) (check)
@@ -19,6 +20,9 @@ inverse_dynamics              q, v, a         tau (na), lambda (nc), residual (1
 forward_dynamics              q, v, tau       a (nv) (check)
 constraint_forces             q, v, a, tau    lambda (nc) (check)
 generalised_force             q, v, a         rnea + passive - external forces (nv)
+equations_of_motion           q, v, a, tau,   rnea + passive - external forces - S' tau
+                              lambda          - J' lambda (nv)
+tree_mass_matrix              q               M (nv nv)
 mass_matrix                   q               T' M T (m m) (check)
 bias                          q, v            T' (required force of a_0) (m) (check)
 gravity_forces                q               T' g (m) (check)
@@ -29,6 +33,9 @@ forward_dynamics_derivatives  q, v, tau       derivatives of a by q, v (nv nv), 
                                               its independent entries: position, velocity (m m),
                                               actuation (m na) (check)
 integrate                     q, dv           q (nq)
+tangent                       q               dq/dt of each velocity (nq nv)
+unit_lengths                  q               squared lengths, less 1, of quaternions and
+                                              (cos, sin) (nq - nv)
 closing_step                  q               dv of the dependent velocities (nv), squared gap (1),
                                               growth (1)
 stage                         q, v, tau       a (nv), power of actuators, wrenches, damping and
@@ -139,6 +146,12 @@ def _jacobian(x: MechanismExpressions) -> Made:
 
 
 @_function()
+def _gap_accelerations(x: MechanismExpressions) -> Made:
+    accelerations = x.rows.package_jacobian() @ x.a + x.rows.package_bias()
+    return {"q": x.q, "v": x.v, "a": x.a}, {"gap_accelerations": accelerations}
+
+
+@_function()
 def _motion_basis(x: MechanismExpressions) -> Made:
     return {"q": x.q}, {"basis": x.basis, "check": x.check}
 
@@ -217,6 +230,20 @@ def _constraint_forces(x: MechanismExpressions) -> Made:
 @_function(wrenches=True)
 def _generalised_force(x: MechanismExpressions) -> Made:
     return {"q": x.q, "v": x.v, "a": x.a}, {"force": x.required(x.a)}
+
+
+@_function(wrenches=True)
+def _equations_of_motion(x: MechanismExpressions) -> Made:
+    multipliers = ca.SX.sym("multipliers", x.jacobian.shape[0])
+    error = x.required(x.a) - x.rows.package_jacobian().T @ multipliers
+    error[x.system.actuated.tolist()] -= x.tau
+    given = {"q": x.q, "v": x.v, "a": x.a, "tau": x.tau, "multipliers": multipliers}
+    return given, {"error": error}
+
+
+@_function()
+def _tree_mass_matrix(x: MechanismExpressions) -> Made:
+    return {"q": x.q}, {"mass": x.tree.mass_matrix()}
 
 
 @_function()
@@ -301,6 +328,16 @@ def _forward_dynamics_by_parameters(x: MechanismExpressions) -> Made:
 def _integrate(x: MechanismExpressions) -> Made:
     move = ca.SX.sym("move", x.tree.model.nv)
     return {"q": x.q, "move": move}, {"moved": x.tree.integrate(x.q, move)}
+
+
+@_function()
+def _tangent(x: MechanismExpressions) -> Made:
+    return {"q": x.q}, {"tangent": x.tree.tangent(x.q)}
+
+
+@_function()
+def _unit_lengths(x: MechanismExpressions) -> Made:
+    return {"q": x.q}, {"lengths": x.tree.unit_lengths(x.q)}
 
 
 @_function()

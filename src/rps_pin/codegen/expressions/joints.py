@@ -83,6 +83,19 @@ class Joint:
             rotation, start = rotation @ part.at[0] @ turn, start + part.nq
         return rotation, translation
 
+    def unit_lengths(self, q: Expression) -> Expression:
+        """Return the squared lengths, less 1, of quaternions and (cos, sin) pairs, (nq - nv, 1).
+
+        A part that turns about k axes by more coordinates than velocities has k + 1 of them, last.
+        """
+        lengths, start = [ca.SX(0, 1)], 0
+        for part in self._parts:
+            start += part.nq
+            if part.nq > part.nv:
+                axes = int(np.linalg.matrix_rank(part.subspace[1]))
+                lengths.append(ca.sumsqr(q[start - axes - 1 : start]) - 1)
+        return ca.vertcat(*lengths)
+
     def integrate(self, q: Expression, dv: Expression) -> Expression:
         """Return q moved by the tangent vector dv, as `pinocchio.integrate` does: (nq, 1)."""
         moved, i, k = [], 0, 0

@@ -280,6 +280,11 @@ class Tree:
             result[coordinates, velocities] = joint.tangent(q[coordinates])
         return ca.sparsify(result)
 
+    def unit_lengths(self, q: Expression) -> Expression:
+        """Return the squared lengths, less 1, of q's quaternions and (cos, sin), (nq - nv, 1)."""
+        own = (joint.unit_lengths(q[coordinates]) for joint, coordinates, _ in self._joints)
+        return ca.vertcat(ca.SX(0, 1), *own)
+
     # Placements and Jacobians ---------------------------------------------------------------------
 
     def world(self, joint: int) -> Placement:
