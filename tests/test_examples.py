@@ -17,12 +17,13 @@ import urllib.request
 import uuid
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from rps_pin import RPSRobot
+from rps_pin import ClosedLoopModel, RPSRobot
 from rps_pin.control import ComputedTorque, Gains
 from rps_pin.trajectories import PathSample, circle
 from tests.processes import start
@@ -122,7 +123,8 @@ def largest_tilt_error(duration: float) -> float:
 
 
 def test_there_is_an_example_of_each_kind_and_a_page_that_names_it():
-    assert NAMES == ["control_loop.py", "drive_over_socket.py", "logging_and_live_view.py"]
+    loops = ["control_loop.py", "drive_over_socket.py", "logging_and_live_view.py"]
+    assert [*loops, "plan_swing.py"] == NAMES
     page = (EXAMPLES / "README.md").read_text("utf-8")
     assert all(name in page for name in NAMES)
 
@@ -366,3 +368,80 @@ def test_the_controller_ends_with_a_drive_that_is_safe_or_silent(controller):
 
 def test_the_last_readings_may_be_lost(controller):
     assert controller.follow(controller.reading(0), controller.reading(11)) == ""
+
+
+# A plan -------------------------------------------------------------------------------------------
+
+
+def numbers(printed: str, line: str) -> list[float]:
+    """Return the numbers of a line that begins with some words."""
+    found = next(one for one in printed.splitlines() if one.startswith(line))
+    return [float(x) for x in re.findall(r"(?<![\w.])-?\d[\d.]*(?:e[-+]\d+)?", found)]
+
+
+def test_a_swing_is_planned_that_the_simulations_follow(example, tmp_path):
+    printed = example.run("plan_swing.py", "--output", "figures")
+    assert "IPOPT: Solve_Succeeded" in printed
+    energy, plain, saved = numbers(printed, "energy")
+    assert saved == pytest.approx(100 * (1 - energy / plain), abs=0.1)
+    assert saved > 80
+    assert max(numbers(printed, "largest torque")[:2]) <= 2.0
+    assert numbers(printed, "largest gap at the nodes")[0] <= 1e-9
+    for engine in ("Pinocchio", "generated code"):
+        place, speed, gap, _ = numbers(printed, f"simulation, {engine}")
+        assert place < 1e-4
+        assert speed < 1e-3
+        assert gap < 1e-12
+    written = sorted(path.name for path in (tmp_path / "figures").iterdir())
+    assert written == ["swing.png", "swing.svg"]
+    with Image.open(tmp_path / "figures" / "swing.png") as picture:
+        assert len(picture.convert("L").getcolors()) > 2  # drawn upon
+
+
+@pytest.fixture(scope="module")
+def swing() -> dict[str, Any]:
+    """What the example defines."""
+    return runpy.run_path(str(EXAMPLES / "plan_swing.py"))
+
+
+def test_energy_that_nothing_lowers_and_an_error_of_fourth_order(swing):
+    """A plan is the best of its neighbours' limits; half the step leaves a sixteenth of the error.
+
+    The error is that of the simulated end, without what the torques' steps in time add.
+    """
+    robot = ClosedLoopModel.load(swing["MECHANISM"])
+    start, goal = (swing["closed"](robot, swing[end]) for end in ("START", "GOAL"))
+    plans, errors = {}, {}
+    for intervals in (20, 40):
+        nodes = np.linspace(0.0, 1.0, 2 * intervals + 1)
+        guess = swing["minimum_jerk"](robot, start, goal, nodes)
+        for limit in (2.0, 2.5, np.inf):
+            plan, stats = swing["planned"](robot, guess, limit)
+            assert stats["success"]
+            plans[limit] = plan
+            assert max(map(robot.loop_gap, plan.q)) < 1e-9
+            assert abs(plan.tau).max() < limit * (1 + 1e-6)
+            np.testing.assert_allclose(plan.q[[0, -1]], [start, goal], atol=1e-8)
+            assert not plan.u[[0, -1]].any()
+        energies = [plan.energy() for plan in plans.values()]
+        assert energies == sorted(energies, reverse=True)
+        assert guess.energy() > energies[0]
+        simulation = swing["simulated"](robot, plans[np.inf])
+        errors[intervals] = abs(simulation.q[-1] - goal).max()
+    assert errors[40] < errors[20] / 8
+
+
+def test_too_little_torque_is_no_plan(example):
+    process = example.start("plan_swing.py", "--limit", "0.5", "--intervals", "10")
+    printed, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert "no plan: try a longer duration or a higher limit" in printed
+
+
+@pytest.mark.parametrize("option", ["--limit", "--intervals"])
+def test_an_impossible_option_is_wrong_usage(option, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["plan_swing.py", option, "0"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(EXAMPLES / "plan_swing.py"), run_name="__main__")
+    assert ended.value.code == 2
+    assert f"{option} 0" in capsys.readouterr().err
