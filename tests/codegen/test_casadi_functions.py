@@ -163,6 +163,18 @@ def test_the_closing_step_closes_the_loops(name: str | int) -> None:
     assert gaps[-1] < 1e-13
 
 
+@each("name", FILES)
+def test_closing_steps_and_lengths_determine_the_dependent_coordinates(name: str) -> None:
+    """Also where rows of the closures are redundant: as many equations as unknowns."""
+    m, f, q, *_ = state(name)
+    x = ca.SX.sym("q", q.size)
+    equations = ca.vertcat(f.closing_step(q=x)["step"][f.dependent.tolist()], f.unit_lengths(x))
+    unknown = np.setdiff1d(np.arange(q.size), m.system.coordinates[f.independent])
+    slopes = ca.Function("slopes", [x], [ca.jacobian(equations, x)[:, unknown.tolist()]])(q).full()
+    assert slopes.shape[0] == slopes.shape[1]
+    assert np.linalg.cond(slopes) < 1e3
+
+
 # Derivatives --------------------------------------------------------------------------------------
 
 
@@ -386,3 +398,13 @@ def test_one_name_need_not_be_in_a_list() -> None:
 def test_a_copy_has_the_same_functions() -> None:
     _, f, q, *_ = state("five_bar")
     np.testing.assert_array_equal(copy.copy(f).gaps(q), f.gaps(q))
+
+
+def test_a_body_without_mass_for_the_pinocchio_engine() -> None:
+    m, _, q, v, a, *_ = state("five_bar")
+    nothing = np.zeros(10)
+    same = with_parameters(m, ["payload:left_tip"], nothing)
+    assert relative(same.inverse_dynamics(q, v, a).tau, m.inverse_dynamics(q, v, a).tau) < 1e-14
+    nothing[2] = 0.1
+    with pytest.raises(InputError, match=r"payload:left_tip: first moment .* without mass"):
+        with_parameters(m, ["payload:left_tip"], nothing)
