@@ -82,6 +82,11 @@ def greatest(a: Number, b: Number, c: Number) -> Number:
     return select(less(most, c), c, most)
 
 
+def least(a: Number, b: Number, c: Number) -> Number:
+    """Return the least of three numbers."""
+    return -greatest(-a, -b, -c)
+
+
 def clamp(x: Number, lower: Number, upper: Number) -> Number:
     """Return x, or the bound that it passes; the lower one of NaN."""
     bounded = select(less(lower, x), x, lower)

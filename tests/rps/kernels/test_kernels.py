@@ -112,6 +112,9 @@ FORMS: dict[Kernel, tuple[Any, ...]] = {
     forces.row_products: (ROWS, V3),
     forces.column_products: (ROWS, V3),
     forces.squared_norm: (ROWS,),
+    limits.length_margin: (V3, 0.0, 0.0),
+    limits.angle_margin: (V3, V3, V2, 0.0),
+    limits.cone_margin: (V3, 0.0),
 }
 #: Their derivative is not asked for.
 JUDGING = (
@@ -122,7 +125,7 @@ JUDGING = (
 )
 #: Of numbers that only compare.
 COMPARING = {
-    limits.within,
+    *(limits.within, forces.is_regular),
     *(continuation.solve_step, continuation.follow_legs, continuation.newton_and_chord),
     *(continuation.refined, continuation.after_step, continuation.step_end),
     continuation.to_be_trusted,

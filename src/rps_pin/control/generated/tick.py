@@ -32,8 +32,9 @@ from rps_pin.control.loop.limits import none_beyond, within_limits
 from rps_pin.control.loop.setpoints import Setpoint, all_below
 from rps_pin.numerics.elementary import Number, select_all
 from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, kernel, symbols
-from rps_pin.rps.generated.forces import TERMS, forces_and_reactions, terms_of
+from rps_pin.rps.generated.forces import TERMS, terms_of
 from rps_pin.rps.generated.layout import Layout
+from rps_pin.rps.generated.reactions import forces_and_reactions
 from rps_pin.rps.kinematics.tracking import Triple
 
 #: Numbers that a loop does not change: of the robot and of `RealTimeRobot`.

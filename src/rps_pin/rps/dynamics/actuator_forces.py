@@ -26,9 +26,15 @@ from rps_pin.rps.dynamics.force_equations import (
 )
 from rps_pin.rps.dynamics.loads import checked_wrench
 from rps_pin.rps.kernels import legs, tips
-from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE
+from rps_pin.rps.kernels import limits as margins
 from rps_pin.rps.kinematics.inverse_kinematics import inverse_kinematics
-from rps_pin.rps.kinematics.legs import PoseLegs, legs_of_pose
+from rps_pin.rps.kinematics.legs import (
+    ANY_ANGLE,
+    PoseLegs,
+    cosine_of_cone,
+    cosine_of_half,
+    legs_of_pose,
+)
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.kinematics.samples import Errors, check_errors_option, refuse
 from rps_pin.rps.parameters import RPSParameters
@@ -136,20 +142,15 @@ def _beyond_limits(p: RPSParameters, block: LegBlock) -> Bools | bool:
     beyond: Bools | bool = False
     low, high = p.leg_length_limits
     if low > 0 or math.isfinite(high):
-        length = block.length
-        beyond = (length.min(axis=0) < low + LIMIT_TOLERANCE) | (
-            length.max(axis=0) > high - LIMIT_TOLERANCE
-        )
+        beyond = margins.length_margin(block.length, low, high) < 0.0
     low, high = p.leg_angle_limits
-    half = (high - low) / 2
-    if half < math.pi:
-        middle = (low + high) / 2
-        # cos(phi - middle) >= cos(half)
-        inside = math.cos(middle) * block.cosine + math.sin(middle) * block.sine
-        beyond = beyond | (inside.min(axis=0) < math.cos(half) + LIMIT_TOLERANCE)
+    half = cosine_of_half(low, high)
+    if half != ANY_ANGLE:
+        middle = math.cos((low + high) / 2), math.sin((low + high) / 2)
+        beyond = beyond | (margins.angle_margin(block.cosine, block.sine, middle, half) < 0.0)
     if p.spherical_cone_limit < math.pi:
-        cosine = _cone_cosines(p, block).min(axis=0)
-        beyond = beyond | (cosine < math.cos(p.spherical_cone_limit) + LIMIT_TOLERANCE)
+        limit = cosine_of_cone(p.spherical_cone_limit)
+        beyond = beyond | (margins.cone_margin(_cone_cosines(p, block), limit) < 0.0)
     return beyond
 
 

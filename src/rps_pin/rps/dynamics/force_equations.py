@@ -152,11 +152,11 @@ def legs_of_tilt(
 
 def may_be_singular(block: LegBlock, platform_radius: float) -> Bools:
     """Return which poses may be singular, or have a leg without length, shape (n,)."""
-    gain = forces.squared_norm(block.cofactors) * block.over_determinant**2
-    # The legs' planes hold the platform with forces that grow like 1 / cos(|w| / 2), whose square
-    # is (1 + C) / 2, and a leg turns as fast as its tip moves over its length.
-    lever = np.minimum(1.0, block.length.min(axis=0) / platform_radius)
-    close: Bools = ~(gain < CLOSE**2 * (lever * lever) * (0.5 + 0.5 * block.tilt[2]))
+    shortest = block.length.min(axis=0) / platform_radius
+    regular = forces.is_regular(
+        block.cofactors, block.over_determinant, shortest, block.tilt[2], CLOSE
+    )
+    close: Bools = ~regular
     return close
 
 

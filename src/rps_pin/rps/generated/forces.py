@@ -1,4 +1,4 @@
-"""Forces of a motion as expressions: `rps_pin.rps.dynamics.force_equations`, `joint_reactions`."""
+"""Forces of a motion as expressions: `rps_pin.rps.dynamics.force_equations`."""
 
 from __future__ import annotations
 
@@ -8,13 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from rps_pin.numerics.elementary import Number
-from rps_pin.rps.dynamics.force_equations import ForceTerms, forces_of_motion, legs_of_tilt
-from rps_pin.rps.dynamics.joint_reactions import in_balance, leg_axes
+from rps_pin.numerics.elementary import Number, least
+from rps_pin.rps.dynamics.force_equations import (
+    CLOSE,
+    ForceTerms,
+    LegBlock,
+    forces_of_motion,
+    legs_of_tilt,
+)
 from rps_pin.rps.generated.layout import Layout
-from rps_pin.rps.kernels import platform
+from rps_pin.rps.kernels import forces
 from rps_pin.rps.kernels.tips import tip_slopes
-from rps_pin.rps.kinematics.legs import RADIAL
 
 _SIZES = {"platform_moment": 3, "platform_inertia": 6, "gravity": 3}
 #: The numbers of `ForceTerms`.
@@ -30,44 +34,52 @@ def terms_of(groups: dict[str, Any]) -> ForceTerms:
     return ForceTerms(**terms)
 
 
-def forces_and_reactions(
+#: tilt_x, tilt_y and `tilt_functions`.
+Tilt = tuple[Number, Number, tuple[Number, ...]]
+
+
+def leg_block(tilt: Tilt, length: Sequence[Number], direction: Sequence[Number]) -> LegBlock:
+    """Return what solves for the forces of legs: d (3), m; cosines and sines of phi (6)."""
+    x, y, *coefficients = map(_one, (*tilt[:2], *tilt[2]))
+    functions: Any = tuple(coefficients)
+    return legs_of_tilt(
+        *(x, y, functions, tip_slopes(x, y, functions)),
+        *(column(length), column(direction[:3]), column(direction[3:])),
+    )
+
+
+def is_regular(block: LegBlock, platform_radius: Number) -> Number:
+    """Return whether the legs hold the platform by far: `force_equations.may_be_singular`."""
+    cofactors = [[of[0] for of in row] for row in block.cofactors]
+    shortest = least(*block.length[:, 0]) / platform_radius
+    over, cosine = block.over_determinant[0], block.tilt[2][0]
+    return forces.is_regular(cofactors, over, shortest, cosine, CLOSE)
+
+
+def actuator_forces(
     terms: ForceTerms,
-    tilt: tuple[Number, Number, tuple[Number, ...]],
-    length: Sequence[Number],
-    direction: Sequence[Number],
+    block: LegBlock,
     rate: Sequence[Number],
     acceleration: Sequence[Number],
-) -> tuple[tuple[Number, Number, Number], tuple[Number, ...]]:
-    """Return the forces of the actuators, N; and of each leg on the platform, base axes, 9.
+    wrench: Sequence[Number],
+) -> tuple[Number, Number, Number]:
+    """Return the forces of the actuators, N.
 
     Parameters
     ----------
     terms
         Of `terms_of`.
-    tilt
-        tilt_x, tilt_y and `tilt_functions`.
-    length, direction
-        Of the legs: d (3), m; cosines and sines of phi (6).
+    block
+        Of `leg_block`.
     rate, acceleration
         Of the pose (3).
+    wrench
+        On the platform (6).
     """
-    x, y, *coefficients = map(_one, (*tilt[:2], *tilt[2]))
-    functions: Any = tuple(coefficients)
-    cosine, sine = _three(direction[:3]), _three(direction[3:])
-    slopes = tip_slopes(x, y, functions)
-    legs = legs_of_tilt(x, y, functions, slopes, _three(length), cosine, sine)
-    found = forces_of_motion(terms, legs, _three(rate), _three(acceleration), None)
+    load: Any = _objects(wrench)[:, None]
+    found = forces_of_motion(terms, block, column(rate), column(acceleration), load)
     one, two, three = found.axial[:, 0]
-
-    axes = leg_axes(cosine.T, sine.T)
-    rows = [np.concatenate(row) for row in platform.rotation(x, y, functions)]
-    arms = (RADIAL @ np.stack(rows).T) * terms.platform_radius
-    tip = np.zeros((1, 3, 3), dtype=object)
-    tip[..., 0], tip[..., 2] = found.push.T, -found.across.T
-    force = np.concatenate(found.force)
-    couple = np.concatenate(platform.to_base(x, y, functions, found.moment))
-    reactions = in_balance(axes, arms[None], tip, force[None], couple[None])
-    return (one, two, three), tuple(reactions.ravel())
+    return one, two, three
 
 
 def _objects(numbers: Sequence[Number]) -> Any:
@@ -82,5 +94,6 @@ def _one(number: Number) -> Any:
     return _objects([number])
 
 
-def _three(numbers: Sequence[Number]) -> Any:
+def column(numbers: Sequence[Number]) -> Any:
+    """Return a number of each leg, or of each component, as an array (3, 1) of expressions."""
     return _objects(numbers)[:, None]

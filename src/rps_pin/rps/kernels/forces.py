@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
-from rps_pin.numerics.elementary import Number
+from rps_pin.numerics.elementary import Number, less, select
 from rps_pin.rps.kernels.platform import Vector
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions
 from rps_pin.rps.kernels.tips import Slopes, Three
@@ -108,6 +108,29 @@ def cofactors(rows: Rows) -> tuple[tuple[Vector, Vector, Vector], Number]:
         ),
         a * first[0] + b * first[1] + c * first[2],
     )
+
+
+def is_regular(
+    cofactor: Rows, over_determinant: Number, shortest: Number, cosine: Number, most: float
+) -> Number:
+    """Return whether the legs hold the platform by far.
+
+    Parameters
+    ----------
+    cofactor, over_determinant
+        Of K, and one over its determinant.
+    shortest
+        The least leg length over h.
+    cosine
+        Of the tilt's angle.
+    most
+        Size of the legs' forces for a unit force on the platform.
+    """
+    gain = squared_norm(cofactor) * (over_determinant * over_determinant)
+    # The legs' planes hold the platform with forces that grow like 1 / cos(|w| / 2), whose square
+    # is (1 + C) / 2, and a leg turns as fast as its tip moves over its length.
+    lever = select(less(shortest, 1.0), shortest, 1.0)
+    return gain < most**2 * (lever * lever) * (0.5 + 0.5 * cosine)
 
 
 def row_products(rows: Rows, vector: Three) -> Vector:

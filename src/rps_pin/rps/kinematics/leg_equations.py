@@ -35,7 +35,7 @@ _FEW = 0.25
 _ROOT_3 = math.sqrt(3.0)
 _TINY = 1e-300
 #: u_x + v_y from which the platform counts as turned about an axis in the base plane: rounding.
-_ONE_MODE = 1e-12
+ONE_MODE = 1e-12
 
 
 class AngleSolution(NamedTuple):
@@ -208,7 +208,7 @@ def placement_from_angles(
     centre, u, v = platform_axes(g - w, z, h)
     normal = np.cross(stacked(*u), stacked(*v))
     rotation = np.stack([stacked(*u), stacked(*v), normal], axis=-1)
-    in_plane = np.asarray(u[0] + v[1] >= -_ONE_MODE)
+    in_plane = np.asarray(u[0] + v[1] >= -ONE_MODE)
     tilt = tilt_of_axes(u[0], u[1], u[2], v[1], v[2])
     pose = np.where(in_plane[..., None], stacked(centre[2], *tilt), np.nan)
     return Placement(stacked(*centre), rotation, pose, in_plane)

@@ -33,7 +33,9 @@ ACROSS = np.stack([-RADIAL[:, 1], RADIAL[:, 0], np.zeros(3)], axis=-1)
 ACROSS.setflags(write=False)
 _UP = np.array([0.0, 0.0, 1.0])
 #: A leg shorter than this part of g has no direction.
-_VANISHING = 1e-9
+VANISHING = 1e-9
+#: A limit that no cosine is below.
+ANY_ANGLE = -2.0
 
 
 class Legs(NamedTuple):
@@ -113,7 +115,7 @@ def leg_geometry(radial: Array, height: Array, base_radius: float) -> LegGeometr
     """Return the legs of tips at (rho, z_i) in their planes, shape (..., 3 legs) each, m: Eq. 7."""
     with np.errstate(divide="ignore", invalid="ignore"):
         length, cosine, sine = kernels.leg_geometry(radial, height, base_radius)
-    vanishing: Bools = length < _VANISHING * base_radius
+    vanishing: Bools = length < VANISHING * base_radius
     if vanishing.any():
         cosine, sine = np.where(vanishing, 1.0, cosine), np.where(vanishing, 0.0, sine)
     return LegGeometry(length, cosine, sine, vanishing)
@@ -264,6 +266,17 @@ def violations(
         for leg in range(3)
         if not within(value[leg], lower, upper)
     ]
+
+
+def cosine_of_half(lower: float, upper: float) -> float:
+    """Return the cosine of half of what lies between two angles, or `ANY_ANGLE` of a full turn."""
+    half = (upper - lower) / 2
+    return math.cos(half) if half < math.pi else ANY_ANGLE
+
+
+def cosine_of_cone(limit: float) -> float:
+    """Return the cosine of a spherical joint's limit, or `ANY_ANGLE` where there is none."""
+    return math.cos(limit) if limit < math.pi else ANY_ANGLE
 
 
 def _limits(
