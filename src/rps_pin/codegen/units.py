@@ -155,6 +155,23 @@ def _renamed(functions: list[Kernel | Routine], end: str) -> list[str]:
     ]
 
 
+#: A sine and a cosine of the same value, in two statements one after the other.
+_SINE_AND_COSINE = re.compile(
+    r"const REAL (\w+) = (SIN|COS)\((\w+)\);\s*const REAL (\w+) = (?!\2)(?:SIN|COS)\(\3\);"
+)
+
+
+def _sines_with_cosines(text: str) -> str:
+    """Return a function's text with such pairs as one statement, ``SINCOS(x, sine, cosine);``."""
+
+    def together(pair: re.Match[str]) -> str:
+        first, name, value, second, *_ = pair.groups()
+        sine, cosine = (first, second) if name == "SIN" else (second, first)
+        return f"SINCOS({value}, {sine}, {cosine});"
+
+    return _SINE_AND_COSINE.sub(together, text)
+
+
 @dataclass(frozen=True)
 class Unit:
     """One file of C: kernels and routines, and those of them that are entry points.
@@ -407,13 +424,15 @@ class Unit:
         ``x0[k * x0_entry + s * x0_sample]``. A structure of arrays, of shape (size, n), has
         ``x0_entry = n`` and ``x0_sample = 1``, so that neighbouring threads read neighbouring
         numbers; an array of samples, of shape (n, size), has 1 and size; ``x0_sample = 0`` is the
-        same for all samples. ``status`` may be NULL. Any number of threads and blocks will do.
+        same for all samples. ``status`` may be NULL. Any number of threads and blocks will do. A
+        thread reads all inputs of a sample before it writes: an output may lie where an input of
+        the same sample is. Outputs of a sample whose status is not 0 are NaN.
         """
         self._check_real(real)
         needed = list(self._needed())
         text = ["#define SINGLE"] if real == "float" else []
         text += [prelude("cuda.h"), prelude("scalar.h"), prelude("status.h")]
-        text += _renamed(needed, "real")
+        text += map(_sines_with_cosines, _renamed(needed, "real"))
         return "\n".join([*text, "", *(self._cuda(name) for name in self.entries)])
 
     def _cuda(self, name: str) -> str:
@@ -440,8 +459,11 @@ class Unit:
         ]
         call = [f"{arg}s" for arg, _ in (*inputs, *results)] + (["check"] if checked else [])
         lines.append(f"        {name}_real({', '.join(call)});")
-        lines += [(loop + where + " = {0}s[k];").format(arg, size) for arg, size in results if size]
         bad = " | ".join(f"status_not_finite({arg}s, {size})" for arg, size in every) or "0"
         check = f" | STATUS_OF_CHECK(check, CONST({self.limit!r}))" if checked else ""
-        lines += [f"        if (status) status[s] = {bad}{check};", "    }", "}", ""]
+        lines += [f"        const int found = {bad}{check};"]
+        lines += ["        if (status) status[s] = found;"]
+        result = loop + where + " = found ? CONST(NAN) : {0}s[k];"
+        lines += [result.format(arg, size) for arg, size in results if size]
+        lines += ["    }", "}", ""]
         return "\n".join(lines)

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen.build.builder import CompilerName
+from rps_pin.codegen.cuda.mechanism import CudaMechanism
 from rps_pin.codegen.engine.compiled import CompiledMechanism
 from rps_pin.codegen.engine.generated import GROUPS, GeneratedCode
 from rps_pin.errors import InputError
+from rps_pin.validation import choice
 
 
 def compile_mechanism(
@@ -20,7 +22,8 @@ def compile_mechanism(
     batches: bool = False,
     compiler: CompilerName = "auto",
     device: str = "cpu",
-) -> CompiledMechanism:
+    dtype: str = "float64",
+) -> CompiledMechanism | CudaMechanism:
     """Return a mechanism in generated code, proven against the Pinocchio engine.
 
     Parameters
@@ -48,7 +51,17 @@ def compile_mechanism(
         a second or so, until the code of a better compiler replaces it; `CompiledMechanism.wait`
         waits for that.
     device
-        ``"cpu"`` or ``"cuda"``.
+        ``"cpu"``, or ``"cuda"`` for an NVIDIA card (``pip install rps-pin[cuda]``). There,
+        ``"dynamics"`` (of both kinds) and ``"simulation"`` can be built, by NVRTC, which
+        ``compiler`` does not change; each function is built when it is first called unless
+        ``functions`` are named.
+    dtype
+        ``"float64"``, or for a card ``"float32"``.
+
+    Returns
+    -------
+    CompiledMechanism or CudaMechanism
+        The latter for ``device="cuda"``.
 
     Raises
     ------
@@ -60,8 +73,22 @@ def compile_mechanism(
         If there is no compiler, or it fails; or if the code does not agree with the Pinocchio
         engine to 1e-10.
     """
-    code = GeneratedCode(mechanism, parameters, wrench_frames, compiler, batches)
-    if device != "cpu":
-        raise InputError(f"device = {device!r}: it must be 'cpu' or 'cuda'")
+    choice(device, "device", ("cpu", "cuda"))
+    code = GeneratedCode(mechanism, parameters, wrench_frames, compiler)
+    if device == "cuda":
+        return _on_card(code, functions, compiler, dtype)
+    if dtype != "float64":
+        raise InputError(f"dtype = {dtype!r}: on device 'cpu' it must be 'float64'")
     code.build(*functions)
     return CompiledMechanism(code)
+
+
+def _on_card(
+    code: GeneratedCode, functions: Sequence[str], compiler: str, dtype: str
+) -> CudaMechanism:
+    if compiler != "auto":
+        raise InputError(f"compiler = {compiler!r}: device 'cuda' has its own; leave it out")
+    found = CudaMechanism(code, dtype)
+    if tuple(functions) != tuple(GROUPS):
+        found.build(*functions)
+    return found

@@ -16,15 +16,12 @@ from rps_pin.codegen.export.package import Constant, Function, Order, Package, R
 from rps_pin.codegen.export.vectors import Entry, vectors
 from rps_pin.codegen.expressions.functions import MechanismFunctions
 from rps_pin.codegen.expressions.independent import choose, regular_samples
-from rps_pin.codegen.expressions.mechanism import GROWTH, MechanismExpressions
+from rps_pin.codegen.expressions.mechanism import GROWTH, LIMITS, MechanismExpressions
 from rps_pin.codegen.expressions.routines import routines
 from rps_pin.codegen.units import Kernel, Unit
 from rps_pin.errors import InputError, did_you_mean
 from rps_pin.validation import choice as one_of
 
-#: Largest growth of rounding errors, squared and over that of `GROWTH`: their limit, relative, is
-#: about 1e-11 in double and 1e-4 in single precision.
-_LIMITS: Mapping[str, float] = {"double": 1.0, "float": 1e-4}
 #: Opening rates that `acceleration` accepts, relative to the speed.
 _CONSISTENT: Mapping[str, float] = {"double": 1e-8, "float": 1e-4}
 _EPSILONS: Mapping[str, float] = {"double": 2.0**-52, "float": 2.0**-23}
@@ -68,7 +65,7 @@ def mechanism_package(
     MechanismError
         If a frame is unknown.
     """
-    one_of(real, "real", tuple(_LIMITS))
+    one_of(real, "real", tuple(LIMITS))
     chosen = tuple(dict.fromkeys(functions)) or words.USUAL
     for one in chosen:
         if one not in words.FUNCTIONS:
@@ -85,7 +82,7 @@ def mechanism_package(
     made = MechanismFunctions(x)
     #: Names in the unit, and in `functions` and `routines`.
     sources = {one: one for one in chosen} | _frames(mechanism, frames)
-    unit = _unit(made, called, sources, _LIMITS[real])
+    unit = _unit(made, called, sources, LIMITS[real])
     cases = Cases(mechanism, made, unit.limit)
     entries = []
     for one, source in sources.items():
@@ -205,7 +202,7 @@ def _orders(mechanism: ClosedLoopModel, x: MechanismExpressions) -> list[Order]:
 def _notes(mechanism: ClosedLoopModel, x: MechanismExpressions, real: str) -> list[str]:
     gravity = ", ".join(f"{number:g}" for number in mechanism.model.gravity.linear)
     length = mechanism.characteristic_length
-    error = float(np.sqrt(_LIMITS[real])) * GROWTH * _EPSILONS[real]
+    error = float(np.sqrt(LIMITS[real])) * GROWTH * _EPSILONS[real]
     notes = [
         "Gravity is among the parameters."
         if "gravity" in x.parameters.groups

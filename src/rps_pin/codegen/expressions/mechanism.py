@@ -15,7 +15,7 @@ scaled to one unit, is factorised once by orthogonal reflections (see `eliminati
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -40,8 +40,11 @@ Expression = Any
 GROWTH = 1e5
 #: The same for the spread of the pivots of T' M T, above which a motion may move no mass.
 SPREAD = 1e12
-#: Keeps a quotient of two numbers that vanish at zero.
-_NOTHING = 1e-300
+#: Keeps a quotient of two numbers that vanish at zero; not zero in single precision either.
+_NOTHING = 1e-30
+#: Largest check in double and single precision, squared and over that of `GROWTH`: what rounding
+#: errors may grow to, relative, is about 1e-11 and 1e-4 then.
+LIMITS: Mapping[str, float] = {"double": 1.0, "float": 1e-4}
 
 
 class Forces(NamedTuple):

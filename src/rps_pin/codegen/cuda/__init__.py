@@ -1,0 +1,1 @@
+"""A mechanism in generated CUDA for NVIDIA's cards: source, launches, and proof on the card."""

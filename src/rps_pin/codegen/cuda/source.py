@@ -1,0 +1,58 @@
+"""CUDA text of a mechanism's dynamics and steps, one thread a sample."""
+
+from __future__ import annotations
+
+from rps_pin.codegen.expressions.functions import MechanismFunctions
+from rps_pin.codegen.expressions.mechanism import LIMITS
+from rps_pin.codegen.expressions.routines import routines
+from rps_pin.codegen.units import Kernel, Routine, Unit
+
+#: About the largest number of statements of one function of CUDA. A function that is called, and
+#: not a part of its caller, keeps in local memory what others need; ptxas spills less than that
+#: out of whole functions of up to as many statements.
+CHUNK = 2000
+#: The functions, of which `motion` is many steps in one launch.
+NAMES = ("inverse_dynamics", "forward_dynamics", "step", "motion")
+
+
+def unit(functions: MechanismFunctions, name: str, real: str) -> Unit:
+    """Return the unit of one of `NAMES`, in "double" or "float"; its text is `Unit.cuda`."""
+    limit = LIMITS[real]
+    loops = routines(functions)
+    loops = (*loops, _motion(next(one for one in loops if one.name == "step"), limit))
+    with_loops = {one.name: one for one in loops}
+    needed = [name]
+    for one in needed:
+        calls = with_loops[one].calls if one in with_loops else ()
+        needed += [call for call in calls if call not in needed]
+    kernels = [Kernel(functions[one], CHUNK) for one in needed if one not in with_loops]
+    called = tuple(one for one in loops if one.name in needed)
+    return Unit(f"{name}_unit", tuple(kernels), called, (name,), frozenset({name}), limit)
+
+
+def _motion(step: Routine, limit: float) -> Routine:
+    """Return equal steps under constant forces, until one is flagged.
+
+    Its arguments are those of `step` with ``count`` (1) after ``h``, its results those of `step`;
+    ``work`` is that of all steps.
+    """
+    (_, nq), (_, nv), *_ = step.inputs
+    also = "".join(f"{name}, " for name, _ in step.inputs[4:])
+    body = f"""
+    REAL q_last[{nq}], v_last[{nv}], done[1], c[2];
+    int i, k;
+    for (i = 0; i < {nq}; ++i) q_next[i] = q[i];
+    for (i = 0; i < {nv}; ++i) v_next[i] = v[i];
+    work[0] = check[0] = check[1] = CONST(0);
+    for (k = 0; ANY(LT(CONST(k), count[0])); ++k) {{
+        for (i = 0; i < {nq}; ++i) q_last[i] = q_next[i];
+        for (i = 0; i < {nv}; ++i) v_last[i] = v_next[i];
+        step(q_last, v_last, tau, h, {also}q_next, v_next, done, c);
+        work[0] = work[0] + done[0];
+        check[0] = FMAX(check[0], c[0]);
+        check[1] = FMAX(check[1], c[1]);
+        if (!ANY(AND(LE(check[0], CONST(1)), LE(check[1], CONST({limit!r}))))) break;
+    }}
+"""
+    given = (*step.inputs[:4], ("count", 1), *step.inputs[4:])
+    return Routine("motion", given, step.outputs, body, ("step",))
