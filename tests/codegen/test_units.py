@@ -13,6 +13,7 @@ import pytest
 
 from rps_pin.codegen.units import Kernel, Routine, Unit
 from rps_pin.errors import InputError
+from tests.codegen.device import host_library
 from tests.codegen.machine import STRICT, compiled, every_operation, loaded, random_function
 from tests.worst import worst
 
@@ -135,15 +136,6 @@ def test_tcc_takes_the_text_without_lanes_and_headers(tmp_path: Path) -> None:
 
 # CUDA -----------------------------------------------------------------------------------------
 
-#: What makes a host compiler take the text: one block of one thread.
-HOST = """
-#define __device__
-#define __global__
-#define __noinline__ __attribute__((noinline))
-struct host_index { int x; };
-static const host_index blockIdx = {0}, blockDim = {1}, threadIdx = {0}, gridDim = {1};
-"""
-
 
 def cuda_unit() -> Unit:
     root = root_unit()
@@ -161,13 +153,8 @@ def cuda_unit() -> Unit:
 @pytest.mark.parametrize("real", ["double", "float"])
 def test_cuda_text_on_the_host(real: str, tmp_path: Path) -> None:
     """Structures of arrays, arrays of samples, and inputs that are the same for all."""
-    compiler = shutil.which("g++")
-    if compiler is None:
-        pytest.skip("no g++")
     unit = cuda_unit()
-    flags = ["-Wall", "-Wextra", "-Werror", "-Wno-unused-function", "-std=gnu++17"]
-    text = HOST + unit.cuda(real)
-    library = ctypes.CDLL(str(compiled(text, tmp_path, flags, compiler, ".cpp")))
+    library = host_library(unit.cuda(real), tmp_path)
     dtype, error = (np.float64, 1e-13) if real == "double" else (np.float32, 2e-5)
     rng = np.random.default_rng(7)
     n = 21

@@ -20,7 +20,6 @@ from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.proof import Proof
 from rps_pin.codegen.units import OPEN, SINGULAR
 from rps_pin.errors import ClosureError, InputError, RPSPinError, SingularityError
-from rps_pin.numerics.linear_algebra import condition_number
 from rps_pin.validation import choice, whole_number
 
 #: Groups of functions that are generated for a card.
@@ -147,14 +146,16 @@ class CudaMechanism:
         kept: list[Any] = [None] * 5 if out is None else list(out)
         lacks = self.code.partition.independent.size > len(self.mechanism.actuated_indices)
         kept[3:4] = [kept[3], None] if lacks else []
-        *found, status = self._run("inverse_dynamics", (q, v, a), kept, **options)
+        tau, multipliers, residual, *rest, status = self._run(
+            "inverse_dynamics", (q, v, a), kept, **options
+        )
         unproduced = None
         if lacks:
             rounding = 1e3 * float(np.finfo(self.dtype).eps)
-            unproduced, missing = found[3:]
+            unproduced, missing = rest
             enough = missing > max(least_effort.RESIDUAL, rounding) ** 2
             unproduced *= enough[..., None]
-        return DeviceForces(*found[:3], unproduced, status)
+        return DeviceForces(tau, multipliers, residual, unproduced, status)
 
     def forward_dynamics(
         self, q: Any, v: Any, tau: Any, *, out: DeviceAccelerations | None = None, **options: Any
@@ -312,11 +313,10 @@ class CudaMechanism:
                 gap,
             )
         if status & SINGULAR and finite:
-            condition = condition_number(mechanism.system.scaled(mechanism.jacobian(q)))
-            limit = self.mechanism.max_condition
+            condition, limit = mechanism.condition(q), mechanism.max_condition
             return SingularityError(
                 f"{text}nearly singular: rounding errors grow too far in {self.dtype}; the "
-                f"condition number of J at q is {condition:.3g}",
+                f"condition number of J_p at q is {condition:.3g}",
                 condition,
                 limit,
             )

@@ -19,7 +19,7 @@ _UNITS = 450.0
 #: Condition numbers of J_d above which a state may be flagged.
 _MAY_FLAG = {"float64": 1e3, "float32": 1e2}
 #: Results smaller than this much of a function's largest number are left of sums that cancel.
-_CANCELLED = {"float64": 1e-3, "float32": 1e-1}
+_CANCELLED = 1e-3
 #: Numbers below this count as rounding errors of zero, in SI units.
 _ZERO = 1e-6
 
@@ -55,7 +55,7 @@ def differences(proof: Proof, function: DeviceFunction, to_host: Callable[[Any],
             continue
         expected = _expected(proof, name, sample)
         sizes = [np.abs(one).max(initial=0.0) for one in expected if one is not None]
-        least = max(_ZERO, _CANCELLED[dtype] * float(np.max(sizes, initial=0.0)))
+        least = max(_ZERO, _CANCELLED * float(np.max(sizes, initial=0.0)))
         most = accepted(dtype, sample.condition)
         for (output, _), result, wanted in zip(function.outputs, results, expected, strict=False):
             if wanted is not None:
