@@ -206,6 +206,9 @@ class Proof:
                 continue
             expected = self.expected(name, sample, found)
             sizes = [np.abs(one).max(initial=0.0) for one in expected if one is not None]
+            if name == "forward_dynamics":  # those of the actuators and of the weight cancel
+                unforced = self._m.forward_dynamics(sample.q, sample.v, 0.0 * sample.tau)
+                sizes.append(np.abs(unforced).max(initial=0.0))
             zero = _ZERO * (sample.mass if name in _OF_MASS else 1.0)
             least = max(zero, _CANCELLED * float(np.max(sizes, initial=0.0)))
             for k, (one, of_batch, wanted) in enumerate(zip(found, batch, expected, strict=False)):
