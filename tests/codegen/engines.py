@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rps_pin import ClosedLoopModel
+from rps_pin import ClosedLoopModel, RPSPinError
 from rps_pin.arrays import Array
 from rps_pin.codegen import CompiledMechanism
 from rps_pin.codegen.build import tcc
@@ -56,6 +56,23 @@ def states(
         v = mechanism.velocity(q, u)
         near = pin.integrate(mechanism.model, q, 1e-3 * rng.normal(size=mechanism.model.nv))
         yield State(q, v, mechanism.acceleration(q, v, w), tau, u, w, near)
+
+
+def free_states(mechanism: ClosedLoopModel, count: int = 3, seed: int = 0) -> Iterator[State]:
+    """The same for any mechanism: motions in directions that its closures allow."""
+    rng = np.random.default_rng(seed)
+    na, model = mechanism.actuated_indices.size, mechanism.model
+    rows, columns = mechanism.row_scale, mechanism.velocity_scale
+    for guess in common.guesses(mechanism, 0.1, count, seed):
+        q = mechanism.close(guess, within_limits=False)
+        motions = mechanism.allowed_motions(q)
+        v, a = (motions @ rng.normal(size=(motions.shape[1], 2))).T
+        bias = rows * mechanism.loop_errors(q, v).acceleration
+        scaled = rows[:, None] * mechanism.jacobian(q) * columns
+        a = a - columns * np.linalg.lstsq(scaled, bias, rcond=1e-9)[0]
+        near = pin.integrate(model, q, 1e-3 * rng.normal(size=model.nv))
+        u, w, tau = rng.normal(size=(3, na))
+        yield State(q, v, a, tau, u, w, near)
 
 
 Call = Callable[[Any, State], Any]
@@ -130,6 +147,25 @@ def check(fast: CompiledMechanism, states: Iterator[State], groups: tuple[str, .
     assert not bad, bad
     assert count
     return count
+
+
+def same_outcome(fast: CompiledMechanism, call: Callable[[Any], Any]) -> bool:
+    """Both engines answer the same, which is returned as True, or raise the same."""
+    try:
+        with np.errstate(all="ignore"):
+            wanted = call(fast.mechanism)
+    except RPSPinError as error:
+        with pytest.raises(type(error)) as caught:
+            call(fast)
+        assert str(caught.value) == str(error)
+        return False
+    with np.errstate(all="ignore"):
+        found = call(fast)
+        if np.isfinite(wanted).all():
+            assert difference(found, wanted) <= ACCEPTED
+        else:
+            np.testing.assert_array_equal(np.isfinite(found), np.isfinite(wanted))
+    return True
 
 
 @cache

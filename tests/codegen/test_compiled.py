@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rps_pin import ClosureError, InputError, MechanismError, RPSPinError
-from rps_pin.codegen import CompiledMechanism
+from rps_pin import ClosureError, InputError, MechanismError
 from rps_pin.codegen.engine.proof import ACCEPTED
 from tests.codegen.engines import (
     ALL,
@@ -21,6 +20,7 @@ from tests.codegen.engines import (
     check,
     difference,
     of_file,
+    same_outcome,
     states,
 )
 
@@ -155,24 +155,6 @@ def test_numbers_that_are_not_finite(argument: str, value: float) -> None:
     same_outcome(fast, lambda e: e.project(s.q))
     same_outcome(fast, lambda e: e.loop_gap(s.q))
     same_outcome(fast, lambda e: e.linearize(s.q, s.v, s.tau).A)
-
-
-def same_outcome(fast: CompiledMechanism, call: Callable[[Any], Any]) -> None:
-    """Both engines answer the same, or raise the same."""
-    try:
-        with np.errstate(all="ignore"):
-            wanted = call(fast.mechanism)
-    except RPSPinError as error:
-        with pytest.raises(type(error)) as caught:
-            call(fast)
-        assert str(caught.value) == str(error)
-        return
-    with np.errstate(all="ignore"):
-        found = call(fast)
-        if np.isfinite(wanted).all():
-            assert difference(found, wanted) <= ACCEPTED
-        else:
-            np.testing.assert_array_equal(np.isfinite(found), np.isfinite(wanted))
 
 
 def test_open_configurations() -> None:

@@ -381,7 +381,7 @@ class CompiledMechanism:
         )
         unproduced = None
         if rest:
-            lacking = rest[1][..., 0] > least_effort.RESIDUAL**2
+            lacking = ~(rest[1][..., 0] <= least_effort.RESIDUAL**2)  # NaN without an answer
             if np.any(lacking):
                 unproduced = np.where(lacking[..., None], rest[0], 0.0)
         at = q.copy() if q.__class__ is np.ndarray else np.array(q, dtype=np.float64)
