@@ -11,9 +11,11 @@ import pytest
 
 from rps_pin import ClosureError, InputError, MechanismError
 from rps_pin.codegen.engine.proof import ACCEPTED
+from tests.closed_loop import mechanisms
 from tests.codegen.engines import (
     ALL,
     CALLS,
+    QUICK,
     Call,
     State,
     answered_by_pinocchio,
@@ -102,6 +104,22 @@ def test_other_independent_joints() -> None:
         np.testing.assert_array_equal(call(fast, stacked(some)), wanted)
         nothing = State(*(one[:0] for one in stacked(some)))
         assert call(fast, nothing).shape == (0, *wanted.shape[1:])
+
+
+def test_later_changes_of_the_mechanism_do_not_count() -> None:
+    """Neither in generated code nor in what the Pinocchio engine answers for it."""
+    exact = mechanisms.five_bar(
+        home=mechanisms.five_bar().close(mechanisms.guess(mechanisms.five_bar()))
+    )
+    fast = exact.compile(compiler=QUICK, functions="dynamics")
+    s = next(states(exact))
+    tau, gravity = exact.inverse_dynamics(s.q, s.v, s.a).tau, exact.gravity_forces(s.q)
+    joints = [list(exact.model.names)[2], exact.actuated[0]]
+    others = exact.gravity_forces(s.q, joints)
+    exact.model.gravity.linear = np.zeros(3)
+    assert difference(fast.inverse_dynamics(s.q, s.v, s.a).tau, tau) <= ACCEPTED
+    assert difference(fast.gravity_forces(s.q), gravity) <= ACCEPTED  # built now
+    np.testing.assert_array_equal(fast.gravity_forces(s.q, joints), others)
 
 
 # Arguments ----------------------------------------------------------------------------------------

@@ -37,8 +37,9 @@ from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.simulation import simulate
 from rps_pin.codegen.expressions.functions import UNDER_WRENCHES
 from rps_pin.errors import InputError, SingularityError
-from rps_pin.validation import choice, numbers, positive_number, whole_number
+from rps_pin.validation import choice, numbers, positive_number, real_vector, whole_number
 
+_NO_PARAMETERS = "the mechanism was compiled without parameters; name them in compile"
 #: Answers of the Pinocchio engine for one sample, in the order of a function's outputs.
 Reference = Callable[..., Sequence[Any]]
 
@@ -117,6 +118,21 @@ class CompiledMechanism:
     def nominal_parameters(self) -> Array:
         """The parameters' numbers of the mechanism as it is, shape (np,)."""
         return self.code.nominal.copy()
+
+    def parameter_values(self, changes: Mapping[str, ArrayLike]) -> Array:
+        """Return the parameters' numbers with some changed, shape (np,).
+
+        Parameters
+        ----------
+        changes
+            New numbers: by label, as in `parameters`, or all of a group by its name.
+
+        Raises
+        ------
+        InputError
+            If there is no such label or group, or its numbers do not fit.
+        """
+        return self.code.parameter_values(changes)
 
     @property
     def compilers(self) -> dict[str, str]:
@@ -204,16 +220,18 @@ class CompiledMechanism:
         """Return the closed configurations in which some joints have given values, (..., nq).
 
         As `ClosedLoopModel.complete`; generated code where the values are those of the actuated
-        joints, shape (..., na), and these determine the motion.
+        joints, and these determine the motion. A batch of values is an array (..., na) of the
+        actuated joints'; by name, one value for each joint.
         """
+        ordered: Any = values
         if isinstance(values, Mapping):
-            if any(np.ndim(value) for value in values.values()) or set(values) != set(
-                self.actuated
-            ):
-                return self.reference().complete(values, q_guess, within_limits=within_limits)
-            ordered: ArrayLike = [float(np.asarray(values[name])) for name in self.actuated]
-        else:
-            ordered = values
+            if any(np.ndim(one) for one in values.values()) or set(values) != set(self.actuated):
+                return self._by_one(
+                    lambda m, q: (m.complete(values, q, within_limits=within_limits),),
+                    self.reference()._start if q_guess is None else self._normalised(q_guess),
+                    **options,
+                )
+            ordered = [float(np.asarray(values[name])) for name in self.actuated]
         system, count = self.mechanism.system, len(self.actuated)
         given = numbers(ordered, "values", f"numbers of shape (..., {count})")
         if given.shape[-1:] != (count,):
@@ -608,7 +626,7 @@ class CompiledMechanism:
         options: Any,
     ) -> Array:
         if not self.code.parameters:
-            raise InputError("the mechanism was compiled without parameters; name them in compile")
+            raise InputError(_NO_PARAMETERS)
 
         def answer(m: ClosedLoopModel, *arrays: Any) -> Sequence[Any]:
             getattr(m, answered)(*arrays[:3])  # which says what is wrong, if it is wrong
@@ -656,22 +674,40 @@ class CompiledMechanism:
     def simulate(
         self, q: ArrayLike, v: ArrayLike | None = None, *, duration: float, **options: Any
     ) -> Simulation:
-        """Return the motion from a closed state; see `ClosedLoopModel.simulate`."""
+        """Return the motion from a closed state; see `ClosedLoopModel.simulate`.
+
+        Steps of fixed length that end with a projection are generated code, under constant wrenches
+        or none; the Pinocchio engine takes the others.
+        """
         return simulate(self, q, v, duration=duration, **options)
 
     # Calls ----------------------------------------------------------------------------------------
 
-    def reference(self) -> ClosedLoopModel:
-        """Return a copy of the mechanism for this thread, with scratch memory of its own."""
+    def reference(self, parameters: ArrayLike | None = None) -> ClosedLoopModel:
+        """Return a copy of the mechanism for this thread, with scratch memory of its own.
+
+        With parameters, shape (np,), it has these numbers; its home is not closed for them then.
+        """
         try:
             mechanism: ClosedLoopModel = self._local.mechanism
         except AttributeError:
             mechanism = self._local.mechanism = copy.copy(self.mechanism)
-        return mechanism
+        if parameters is None:
+            return mechanism
+        if not self.parameters:
+            raise InputError(_NO_PARAMETERS)
+        values = real_vector(parameters, len(self.parameters), "parameters")
+        return with_parameters(mechanism, self.code.parameters, values)
 
-    def generated(self, name: str, wrenches: Wrenches | None, *given: ArrayLike) -> tuple[Any, ...]:
-        """Return a function's results and status, for nominal parameters."""
-        return self._generated(wrenches)[name](*given, *self._extra(name, wrenches, None))
+    def generated(
+        self,
+        name: str,
+        wrenches: Wrenches | None,
+        parameters: ArrayLike | None,
+        *given: ArrayLike,
+    ) -> tuple[Any, ...]:
+        """Return a function's results and status."""
+        return self._generated(wrenches)[name](*given, *self._extra(name, wrenches, parameters))
 
     def _run(
         self,
@@ -789,9 +825,7 @@ class CompiledMechanism:
 
         def of_sample(*arrays: Any) -> Sequence[Any]:
             motion, rest = arrays[:count], list(arrays[count:])
-            mechanism = self.reference()
-            if code.parameters:
-                mechanism = with_parameters(mechanism, code.parameters, rest.pop())
+            mechanism = self.reference(rest.pop() if code.parameters else None)
             if not under:
                 return answer(mechanism, *motion)
             frames = code.wrench_frames
@@ -835,7 +869,7 @@ class CompiledMechanism:
         if code.parameters:
             extra.append(code.nominal if parameters is None else parameters)
         elif parameters is not None:
-            raise InputError("the mechanism was compiled without parameters; name them in compile")
+            raise InputError(_NO_PARAMETERS)
         return extra
 
 

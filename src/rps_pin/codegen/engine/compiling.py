@@ -74,7 +74,8 @@ def compile_mechanism(
         engine to 1e-10.
     """
     choice(device, "device", ("cpu", "cuda"))
-    code = GeneratedCode(mechanism, parameters, wrench_frames, compiler)
+    code = GeneratedCode(mechanism, _names(parameters), _names(wrench_frames), compiler)
+    functions = _names(functions)
     if device == "cuda":
         return _on_card(code, functions, compiler, dtype)
     if dtype != "float64":
@@ -92,3 +93,8 @@ def _on_card(
     if tuple(functions) != tuple(GROUPS):
         found.build(*functions)
     return found
+
+
+def _names(given: Sequence[str]) -> tuple[str, ...]:
+    """Return names; one alone may be given as it is."""
+    return (given,) if isinstance(given, str) else tuple(given)

@@ -6,6 +6,7 @@ holds is used without making a single expression.
 
 from __future__ import annotations
 
+import copy
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
@@ -14,6 +15,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.model import ClosedLoopModel
@@ -90,7 +92,7 @@ class GeneratedCode:
         compiler: CompilerName = "auto",
         batches: bool = False,
     ) -> None:
-        self.mechanism = mechanism
+        self.mechanism = copy.deepcopy(mechanism)
         self.parameters, self.wrench_frames = tuple(parameters), tuple(wrench_frames)
         self.compiler, self.batches = compiler, batches
         self._with_lanes: set[str] = set()
@@ -116,12 +118,20 @@ class GeneratedCode:
     @cached_property
     def labels(self) -> tuple[str, ...]:
         """What each parameter is."""
-        return Parameters(self.mechanism.system, self.parameters).labels
+        return self._parameters.labels
 
     @cached_property
     def nominal(self) -> Array:
         """The parameters' numbers of the mechanism, shape (np,)."""
-        return Parameters(self.mechanism.system, self.parameters).nominal
+        return self._parameters.nominal
+
+    @cached_property
+    def _parameters(self) -> Parameters:
+        return Parameters(self.mechanism.system, self.parameters)
+
+    def parameter_values(self, changes: Mapping[str, ArrayLike]) -> Array:
+        """Return the nominal numbers with some changed, by label or group."""
+        return self._parameters.vector(changes)
 
     @cached_property
     def partition(self) -> Partition:

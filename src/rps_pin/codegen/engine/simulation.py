@@ -8,7 +8,7 @@ step that the code flags is taken by the Pinocchio engine.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,14 @@ from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation import simulate as pinocchio_engine
 from rps_pin.closed_loop.simulation.integrators import times
-from rps_pin.closed_loop.simulation.motion import Controller, Drive, Motion, State, closed_start
+from rps_pin.closed_loop.simulation.motion import (
+    Controller,
+    Drive,
+    Motion,
+    State,
+    WrenchesInTime,
+    closed_start,
+)
 from rps_pin.closed_loop.simulation.result import Recorder, Simulation
 from rps_pin.codegen.expressions.routines import BLOCK
 from rps_pin.errors import RPSPinError
@@ -28,14 +35,26 @@ from rps_pin.validation import positive_number, whole_number
 class Compiled(Protocol):
     """What is used of a `CompiledMechanism`."""
 
-    def reference(self) -> ClosedLoopModel:
+    def reference(self, parameters: ArrayLike | None = None) -> ClosedLoopModel:
         """Return the mechanism of the Pinocchio engine."""
 
-    def generated(self, name: str, wrenches: Wrenches | None, *given: ArrayLike) -> tuple[Any, ...]:
+    def generated(
+        self,
+        name: str,
+        wrenches: Wrenches | None,
+        parameters: ArrayLike | None,
+        *given: ArrayLike,
+    ) -> tuple[Any, ...]:
         """Return a function's results and status."""
 
     def forward_dynamics(
-        self, q: ArrayLike, v: ArrayLike, tau: ArrayLike, *, wrenches: Wrenches | None = None
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        *,
+        wrenches: Wrenches | None = None,
+        parameters: ArrayLike | None = None,
     ) -> Array:
         """Return accelerations."""
 
@@ -47,13 +66,16 @@ class Compiled(Protocol):
         tau: ArrayLike,
         *,
         wrenches: Wrenches | None = None,
+        parameters: ArrayLike | None = None,
     ) -> Array:
         """Return the closures' multipliers."""
 
-    def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[Any, Any]:
+    def energy(
+        self, q: ArrayLike, v: ArrayLike, *, parameters: ArrayLike | None = None
+    ) -> tuple[Any, Any]:
         """Return kinetic and potential energy."""
 
-    def loop_gap(self, q: ArrayLike) -> Any:
+    def loop_gap(self, q: ArrayLike, *, parameters: ArrayLike | None = None) -> Any:
         """Return the largest gaps."""
 
 
@@ -64,15 +86,21 @@ def simulate(
     *,
     duration: float,
     step: float = 1e-3,
+    method: Literal["rk4", "adaptive"] = "rk4",
     controller: Controller | None = None,
     tau: ArrayLike | None = None,
-    wrenches: Wrenches | None = None,
+    wrenches: Wrenches | WrenchesInTime | None = None,
+    closing: Literal["projection", "baumgarte"] = "projection",
     record_every: int = 1,
     forces: bool = False,
     progress: Callable[[float], None] | None = None,
-    **others: Any,
+    parameters: ArrayLike | None = None,
+    **tuning: float,
 ) -> Simulation:
-    """Return the motion from a closed state; see `ClosedLoopModel.simulate` for the options."""
+    """Return the motion from a closed state; see `ClosedLoopModel.simulate` for the options.
+
+    `tuning` are those that fixed steps with projection do not need.
+    """
     given: dict[str, Any] = {
         "duration": duration,
         "step": step,
@@ -83,22 +111,28 @@ def simulate(
         "forces": forces,
         "progress": progress,
     }
-    method, closing = others.get("method", "rk4"), others.get("closing", "projection")
-    if (method, closing) != ("rk4", "projection") or callable(wrenches):
-        return pinocchio_engine.simulate(compiled.reference(), q, v, **given, **others)
+    if tuning or (method, closing) != ("rk4", "projection") or callable(wrenches):
+        others: dict[str, Any] = {"method": method, "closing": closing, **tuning}
+        return pinocchio_engine.simulate(compiled.reference(parameters), q, v, **given, **others)
     positive_number(duration, "duration", "s")
     positive_number(step, "step", "s")
     whole_number(record_every, "record_every")
-    return _Run(compiled, q, v, given).simulation()
+    return _Run(compiled, q, v, given, parameters).simulation()
 
 
 class _Run:
     """One simulation: the states of all steps, then everything that is computed from them."""
 
     def __init__(
-        self, compiled: Compiled, q: ArrayLike, v: ArrayLike | None, given: dict[str, Any]
+        self,
+        compiled: Compiled,
+        q: ArrayLike,
+        v: ArrayLike | None,
+        given: dict[str, Any],
+        parameters: ArrayLike | None,
     ) -> None:
-        self._compiled, self._reference, self._given = compiled, compiled.reference(), given
+        self._compiled, self._given, self._parameters = compiled, given, parameters
+        self._reference = compiled.reference(parameters)
         self._wrenches: Wrenches | None = given["wrenches"]
         system = self._reference.system
         self._drive = Drive(system, given["controller"], given["tau"], self._wrenches)
@@ -144,8 +178,7 @@ class _Run:
         """Take a block of steps under constant forces; False if the code flags one of them."""
         k = self._done
         h = np.diff(self._time[k : k + BLOCK + 1])
-        names, state = ("steps", self._wrenches), (self._q[k], self._v[k])
-        q, v, work, status = self._compiled.generated(*names, *state, self._drive.tau, h)
+        q, v, work, status = self._taken("steps", k, h)
         if status:
             return False
         rows = slice(k + 1, k + BLOCK + 1)
@@ -158,17 +191,19 @@ class _Run:
     def _single(self) -> None:
         """Take one step; what the code flags is the Pinocchio engine's matter."""
         k = self._done
-        state, h = (self._q[k], self._v[k]), self._time[k + 1] - self._time[k]
-        q, v, work, status = self._compiled.generated(
-            "step", self._wrenches, *state, self._drive.tau, np.array([h])
-        )
+        q, v, work, status = self._taken("step", k, np.diff(self._time[k : k + 2]))
         done = float(work[0])
         if status:
-            (q, v), done = self._by_pinocchio(state, k)
+            (q, v), done = self._by_pinocchio((self._q[k], self._v[k]), k)
         self._q[k + 1], self._v[k + 1] = q, v
         self._work[k + 1] = self._work[k] + done
         self._command(k + 1)
         self._done += 1
+
+    def _taken(self, name: str, k: int, h: Array) -> tuple[Any, ...]:
+        """Return the results of a routine of steps from row k, and its status."""
+        state = self._q[k], self._v[k], self._drive.tau, h
+        return self._compiled.generated(name, self._wrenches, self._parameters, *state)
 
     def _by_pinocchio(self, state: State, k: int) -> tuple[State, float]:
         motion = Motion(self._reference.system, state, self._drive, 0.0)
@@ -188,8 +223,9 @@ class _Run:
         recorder = Recorder(system.model, system.actuated)
         recorder.watch_all(self._time[:rows], self._q[:rows])
         q, v, tau = self._q[kept], self._v[kept], self._tau[kept]
-        a = compiled.forward_dynamics(q, v, tau, wrenches=self._wrenches)
-        kinetic, potential = compiled.energy(q, v)
+        under: dict[str, Any] = {"wrenches": self._wrenches, "parameters": self._parameters}
+        a = compiled.forward_dynamics(q, v, tau, **under)
+        kinetic, potential = compiled.energy(q, v, parameters=self._parameters)
         columns = {
             "time": self._time[kept],
             "q": q,
@@ -198,11 +234,9 @@ class _Run:
             "tau": tau,
             "kinetic": kinetic,
             "potential": potential,
-            "gap": compiled.loop_gap(q),
+            "gap": compiled.loop_gap(q, parameters=self._parameters),
             "work": self._work[kept],
         }
         if self._given["forces"]:
-            columns["constraint_forces"] = compiled.constraint_forces(
-                q, v, a, tau, wrenches=self._wrenches
-            )
+            columns["constraint_forces"] = compiled.constraint_forces(q, v, a, tau, **under)
         return recorder.whole(columns)
