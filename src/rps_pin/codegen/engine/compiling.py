@@ -74,7 +74,7 @@ def compile_mechanism(
         engine to 1e-10.
     """
     choice(device, "device", ("cpu", "cuda"))
-    code = GeneratedCode(mechanism, _names(parameters), _names(wrench_frames), compiler)
+    code = GeneratedCode(mechanism, _names(parameters), _names(wrench_frames), compiler, batches)
     functions = _names(functions)
     if device == "cuda":
         return _on_card(code, functions, compiler, dtype)
