@@ -82,7 +82,22 @@ class Cases:
         answers = [*self._proof.expected(name, sample, evaluate(given)), *[None] * count][:count]
         expected = [None if one is None else np.ravel(one) for one in answers]
         scales = [self._scale(key, one) for key, one in zip(inputs, given, strict=True)]
-        return Case(tuple(given), tuple(expected), conditions(evaluate, given, scales))
+        found = [float(one.max(initial=0.0)) for one in conditions(evaluate, given, scales)]
+        if name in ("closed", "step"):
+            found[0] += self._of_closing(sample)
+        return Case(tuple(given), tuple(expected), tuple(found))
+
+    def _of_closing(self, sample: Sample) -> float:
+        """Return the change of q by changes of the gaps by their condition numbers."""
+        system, inputs = self._system, ["q", "parameters"][: 1 + bool(sample.parameters.size)]
+        given = self._given("", inputs, sample)
+        scales = [self._scale(key, one) for key, one in zip(inputs, given, strict=True)]
+        (of_gaps,) = conditions(lambda x: self._evaluation("gaps", x), given, scales)
+        dependent = np.setdiff1d(np.arange(system.model.nv), self._independent)
+        jacobian = self._evaluation("jacobian", given)[0].reshape(-1, system.model.nv)
+        inverse = np.linalg.pinv(system.scaled(jacobian)[:, dependent])
+        change = np.abs(inverse) @ (system.row_scale * of_gaps)
+        return float((system.column_scale[dependent] * change).max(initial=0.0))
 
     def _scale(self, argument: str, value: Array) -> Array:
         """Return the sizes of an argument's numbers: angles against the characteristic length."""

@@ -22,8 +22,6 @@ from rps_pin.codegen.units import Kernel, Unit
 from rps_pin.errors import InputError, did_you_mean
 from rps_pin.validation import choice as one_of
 
-#: Opening rates that `acceleration` accepts, relative to the speed.
-_CONSISTENT: Mapping[str, float] = {"double": 1e-8, "float": 1e-4}
 _EPSILONS: Mapping[str, float] = {"double": 2.0**-52, "float": 2.0**-23}
 _UNCHECKED = ("gaps", "jacobian", "generalised_force", "energy")
 
@@ -76,9 +74,7 @@ def mechanism_package(
     called = identifier(name or mechanism.name)
     system = mechanism.system
     partition = choose(system, regular_samples(system, mechanism.home).jacobians)
-    x = MechanismExpressions(
-        system, partition, parameters, wrench_frames, consistent=_CONSISTENT[real]
-    )
+    x = MechanismExpressions(system, partition, parameters, wrench_frames, single=real == "float")
     made = MechanismFunctions(x)
     #: Names in the unit, and in `functions` and `routines`.
     sources = {one: one for one in chosen} | _frames(mechanism, frames)

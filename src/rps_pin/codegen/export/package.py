@@ -26,7 +26,7 @@ class Case(NamedTuple):
     expected: tuple[Array | None, ...]
     """None for a result without a known answer."""
     condition: tuple[float, ...]
-    """Of each result; see `conditions`."""
+    """Of each result: the largest of its entries', see `conditions`."""
 
 
 @dataclass(frozen=True)
@@ -102,14 +102,12 @@ class Package:
         return f"{self.name}_{key}".upper()
 
 
-def conditions(
-    evaluate: Evaluate, given: Sequence[Array], scales: Sequence[Array]
-) -> tuple[float, ...]:
-    """Return the change of each result by a change of all arguments of size 1, at most.
+def conditions(evaluate: Evaluate, given: Sequence[Array], scales: Sequence[Array]) -> list[Array]:
+    """Return the condition numbers of each entry of each result.
 
-    For each result f of arguments x_i of size X_i: max over its entries k of
-    |f_k| + sum over i of |df_k/dx_i| X_i. Rounding of the arguments changes f by at most half the
-    machine's epsilon times this, whatever the algorithm.
+    For an entry f of a result of arguments x_i of size X_i: |f| + sum over i of |df/dx_i| X_i.
+    Rounding of the arguments changes f by at most half the machine's epsilon times this, whatever
+    the algorithm.
 
     Parameters
     ----------
@@ -131,4 +129,4 @@ def conditions(
                 ends.append(evaluate([*given[:i], moved, *given[i + 1 :]]))
             for j, (low, high) in enumerate(zip(*ends, strict=True)):
                 total[j] = total[j] + np.abs(high - low) / (2 * _STEP)
-    return tuple(float(one.max(initial=0.0)) for one in total)
+    return total

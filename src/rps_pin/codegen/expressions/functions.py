@@ -343,20 +343,20 @@ def _unit_lengths(x: MechanismExpressions) -> Made:
 @_function()
 def _closing_step(x: MechanismExpressions) -> Made:
     step = -x.dependent(x.rows.gap)
-    return {"q": x.q}, {"step": step, "squared_gap": _squared_gap(x), "growth": x.growth}
+    return {"q": x.q}, {"step": step, "squared_gap": x.squared_gap, "growth": x.growth}
 
 
 @_function()
 def _least_norm_step(x: MechanismExpressions) -> Made:
     step = _of_least_norm(x, -x.rows.gap)
-    return {"q": x.q}, {"step": step, "squared_gap": _squared_gap(x), "growth": x.growth}
+    return {"q": x.q}, {"step": step, "squared_gap": x.squared_gap, "growth": x.growth}
 
 
 @_function()
 def _projection(x: MechanismExpressions) -> Made:
     both = _of_least_norm(x, -ca.horzcat(x.rows.gap, x.rows.jacobian @ x.v))
     results = {"step": both[:, 0], "projected": x.v + both[:, 1]}
-    return {"q": x.q, "v": x.v}, results | {"squared_gap": _squared_gap(x), "growth": x.growth}
+    return {"q": x.q, "v": x.v}, results | {"squared_gap": x.squared_gap, "growth": x.growth}
 
 
 def _of_least_norm(x: MechanismExpressions, right: Expression) -> Expression:
@@ -385,9 +385,3 @@ def _stage(x: MechanismExpressions) -> Made:
 @_function()
 def _projected_velocity(x: MechanismExpressions) -> Made:
     return {"q": x.q, "v": x.v}, {"projected": _moved(x, x.v[x.independent.tolist()])}
-
-
-def _squared_gap(x: MechanismExpressions) -> Expression:
-    """Sum of the squared gaps in one unit, over the squared characteristic length."""
-    gaps = ca.DM(x.system.row_scale) * ca.densify(x.rows.gap)
-    return ca.sumsqr(gaps) / x.system.equations.length**2

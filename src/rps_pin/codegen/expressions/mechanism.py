@@ -77,8 +77,8 @@ class MechanismExpressions:
         Names of the parameters that stay symbols (see `Parameters`).
     wrench_frames
         Frames at which external wrenches act.
-    consistent
-        Opening rate that `acceleration` accepts, relative to the speed; left out, as `kinematics`.
+    single
+        Whether the code computes in single precision: what it accepts is wider then.
 
     Attributes
     ----------
@@ -94,10 +94,13 @@ class MechanismExpressions:
         partition: Partition,
         parameters: Sequence[str] = (),
         wrench_frames: Sequence[str] = (),
-        consistent: float = 1e-8,
+        single: bool = False,
     ) -> None:
         self.system = system
-        self.consistent = consistent
+        self._single = single
+        #: Opening rate that `acceleration` accepts, relative to the speed; in double precision as
+        #: `kinematics` does.
+        self.consistent = 1e-4 if single else 1e-8
         self.parameters = Parameters(system, parameters)
         self.tree = tree = Tree(self.parameters.model, self.parameters)
         self.rows: ClosureRows = closure_rows(tree, system.equations)
@@ -157,7 +160,15 @@ class MechanismExpressions:
     @cached_property
     def opening(self) -> Expression:
         """Sum of the squared gaps, over that of `OPEN`."""
+        if self._single:  # whose rounding errors are larger than the squares that `rows` sums
+            return self.squared_gap / OPEN**2
         return self.rows.opening / (OPEN * self.system.equations.length) ** 2
+
+    @cached_property
+    def squared_gap(self) -> Expression:
+        """Sum of the squared gaps, over the squared characteristic length; exact for small gaps."""
+        gaps = ca.DM(self.system.row_scale) * ca.densify(self.rows.gap)
+        return ca.sumsqr(gaps) / self.system.equations.length**2
 
     @property
     def check(self) -> Expression:

@@ -17,7 +17,7 @@ from rps_pin.codegen.units import Routine
 BLOCK = 64
 #: Squared gaps, in characteristic lengths: rounding error; and from where one more step of Newton's
 #: method leads to rounding error.
-_CLOSED, _LAST = "PRECISE(1e-28, 1e-11)", "PRECISE(1e-16, 1e-7)"
+_CLOSED, _LAST = "PRECISE(1e-28, 1e-13)", "PRECISE(1e-16, 1e-8)"
 _NEWTON_STEPS = 20
 
 
