@@ -79,13 +79,26 @@ class Cases:
         def evaluate(given: Sequence[Array]) -> list[Array]:
             return self._evaluation(name, given)[:count]
 
-        answers = [*self._proof.expected(name, sample, evaluate(given)), *[None] * count][:count]
+        results = evaluate(given)
+        answers = [*self._proof.expected(name, sample, results), *[None] * count][:count]
         expected = [None if one is None else np.ravel(one) for one in answers]
         scales = [self._scale(key, one) for key, one in zip(inputs, given, strict=True)]
         found = [float(one.max(initial=0.0)) for one in conditions(evaluate, given, scales)]
         if name in ("closed", "step"):
             found[0] += self._of_closing(sample)
+        if name.startswith("forward_dynamics"):
+            share = self._of_inertia(sample)
+            sizes = [float(np.abs(one).max(initial=0.0)) for one in results]
+            found = [one + share * size for one, size in zip(found, sizes, strict=True)]
         return Case(tuple(given), tuple(expected), tuple(found))
+
+    def _of_inertia(self, sample: Sample) -> float:
+        """Return the condition number of the mass matrix, its coordinates scaled to 1."""
+        inputs = ["q", "parameters"][: 1 + bool(sample.parameters.size)]
+        given = self._given("", inputs, sample)
+        mass = self._evaluation("mass_matrix", given)[0].reshape(2 * (self._independent.size,))
+        scale = 1.0 / np.sqrt(mass.diagonal())
+        return float(np.linalg.cond(scale[:, None] * mass * scale)) if mass.size else 0.0
 
     def _of_closing(self, sample: Sample) -> float:
         """Return the change of q by changes of the gaps by their condition numbers."""

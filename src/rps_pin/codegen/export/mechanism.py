@@ -90,6 +90,7 @@ def mechanism_package(
                 one,
                 sentence,
                 {key: own.get(key) or words.ARGUMENTS[key] for key in (*inputs, *results)},
+                _operations(unit, one),
                 cases.of(source, inputs, len(results)),
             )
         )
@@ -139,6 +140,14 @@ def _add_calls(name: str, with_loops: Mapping[str, object], needed: dict[str, st
     for call in getattr(with_loops.get(name), "calls", ()):
         needed.setdefault(call, call)
         _add_calls(call, with_loops, needed)
+
+
+def _operations(unit: Unit, name: str) -> int:
+    """Return about how many operations a result takes; loops run some four times."""
+    one = unit.function(name)
+    if isinstance(one, Kernel):
+        return int(one.function.n_instructions())
+    return 4 * sum(_operations(unit, call) for call in one.calls)
 
 
 def _renamed(function: ca.Function, name: str) -> ca.Function:

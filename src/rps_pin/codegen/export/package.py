@@ -41,6 +41,8 @@ class Function:
         What it computes.
     arguments : mapping
         What each input and output is, with its unit.
+    operations : int
+        About how many operations of arithmetic a result takes.
     cases : sequence of Case
         For the self-test.
     """
@@ -48,6 +50,7 @@ class Function:
     name: str
     sentence: str
     arguments: Mapping[str, str]
+    operations: int
     cases: Sequence[Case]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from importlib import resources
 
@@ -12,9 +13,9 @@ from rps_pin.codegen.export.header import heading
 from rps_pin.codegen.export.package import Function, Package
 from rps_pin.errors import InputError
 
-#: Differences of this many epsilons times the condition number are accepted. One operation makes
-#: half an epsilon; a result is the end of some hundred, whose errors add up like a random walk.
-FACTOR = 32
+#: Differences of at least so many epsilons times the condition number are accepted; and of the
+#: square root of the number of operations, whose errors add up like a random walk.
+_LEAST_FACTOR = 32
 
 
 def self_test(package: Package) -> str:
@@ -32,7 +33,7 @@ def self_test(package: Package) -> str:
         name=package.name,
         real=package.real,
         epsilon="DBL_EPSILON" if package.real == "double" else "FLT_EPSILON",
-        factor=FACTOR,
+        factor=_LEAST_FACTOR,
         not_finite=package.macro("NOT_FINITE"),
         tests=tests,
         calls=calls,
@@ -77,11 +78,12 @@ def _test(package: Package, function: Function) -> str:
     results = [f"{result}_found" for result, _ in outputs]
     given = [f"{name}_given_{argument}[k]" for argument, _ in one.inputs]
     call = f"{package.name}_{name}({', '.join([*given, *results])})"
+    factor = max(_LEAST_FACTOR, math.ceil(math.sqrt(function.operations)))
     text += [f"static void test_{name}(void)", "{"]
     text += [f"    REAL {result}_found[{max(1, size)}];" for result, size in outputs]
     text += [
         "    int k;",
-        f'    begin("{name}", {count});',
+        f'    begin("{name}", {count}, {factor});',
         f"    for (k = 0; k < {count}; ++k) {{",
     ]
     text += ["        int status;", "        START;", f"        status = {call};", "        STOP;"]
