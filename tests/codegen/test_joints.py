@@ -186,3 +186,21 @@ def test_clean_removes_rounding_errors_only() -> None:
     given = [1e-16, -3e-16, 1 - 2e-16, -1 + 4e-16, 2e-15, 0.5, 1 + 3e-15]
     assert clean(given).tolist() == [0, 0, 1, -1, 2e-15, 0.5, 1 + 3e-15]
     assert clean([3e-16, 0.3, 1.0], 0.3).tolist() == [3e-16, 0.3, 1.0]
+
+
+@each("kind", JOINTS)
+def test_difference(kind: str) -> None:
+    """Short ones keep the rounding errors of the coordinates that are subtracted."""
+    model, joint, rng = alone(JOINTS[kind], 3)
+    q_symbol, other_symbol = ca.SX.sym("q", model.nq), ca.SX.sym("other", model.nq)
+    errors = []
+    for step in (0.0, 1e-5, 1e-3, 0.02, 0.2, 1.0, 2.0):
+        q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
+        direction = rng.normal(size=model.nv)
+        other = pin.integrate(model, q, step * direction / np.linalg.norm(direction))
+        expression = joint.difference(q_symbol, other_symbol)
+        found = values(expression, (q_symbol, q), (other_symbol, other)).ravel()
+        errors.append(np.abs(found - pin.difference(model, q, other)).max())
+        back = pin.integrate(model, q, found)
+        errors.append(np.abs(pin.difference(model, back, other)).max())
+    assert worst(errors) < 1e-12

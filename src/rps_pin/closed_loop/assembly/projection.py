@@ -19,8 +19,8 @@ from rps_pin.numerics.linear_algebra import null_space
 from rps_pin.numerics.quadratic_program import by_least_squares
 
 #: The search ends when a step would be below this, in characteristic lengths.
-_SHORTEST = 1e-9
-_STEPS = 500
+NEAREST_STEP = 1e-9
+NEAREST_STEPS = 500
 
 
 def project(system: ConstraintSystem, given: Array, *, within_limits: bool = True) -> Array:
@@ -36,9 +36,9 @@ def project(system: ConstraintSystem, given: Array, *, within_limits: bool = Tru
     none = np.zeros(model.nv, dtype=bool)
     distance, towards = _distance(system, q, given)
     step = towards
-    for _ in range(_STEPS):
+    for _ in range(NEAREST_STEPS):
         step = _step(system, q, towards, within_limits)
-        if np.linalg.norm(step) <= _SHORTEST * equations.length:
+        if np.linalg.norm(step) <= NEAREST_STEP * equations.length:
             return q
         moved = pin.integrate(model, q, length * step * system.column_scale)
         moved = limits.clip(moved) if within_limits else moved
@@ -52,7 +52,7 @@ def project(system: ConstraintSystem, given: Array, *, within_limits: bool = Tru
         else:
             length /= 2
     raise ClosureError(
-        f"the nearest closed configuration was not found in {_STEPS} steps: the last would "
+        f"the nearest closed configuration was not found in {NEAREST_STEPS} steps: the last would "
         f"still move by {float(np.linalg.norm(step)):.3g} m",
         equations.largest_gap(equations.gaps(q)),
     )

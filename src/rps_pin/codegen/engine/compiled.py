@@ -202,12 +202,16 @@ class CompiledMechanism:
         )
 
     def project(self, q_guess: ArrayLike, *, within_limits: bool = True, **options: Any) -> Array:
-        """Return the closed configurations nearest to guesses; by the Pinocchio engine."""
+        """Return the closed configurations nearest to guesses, shape (..., nq).
+
+        As `ClosedLoopModel.project`; where the nearest one is outside the joint limits, the
+        Pinocchio engine answers.
+        """
 
         def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
-            return (m.project(q, within_limits=within_limits),)
+            return (m.project(q, within_limits=within_limits), np.zeros(1))
 
-        return self._by_one(answer, q_guess, **options)
+        return self._closed("nearest", self._normalised(q_guess), answer, within_limits, options)
 
     def complete(
         self,

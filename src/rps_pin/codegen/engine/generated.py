@@ -36,7 +36,7 @@ from rps_pin.errors import InputError, did_you_mean
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "dynamics": ("inverse_dynamics", "forward_dynamics"),
     "kinematics": ("gaps", "jacobian", "motion_basis", "velocity", "acceleration"),
-    "closing": ("closed", "closed_near"),
+    "closing": ("closed", "closed_near", "nearest"),
     "forces": (
         "constraint_forces",
         "generalised_force",

@@ -248,6 +248,7 @@ class Proof:
 
     def _arguments(self, function: CompiledFunction, sample: Sample) -> list[Array]:
         values = sample._asdict()
+        values["given"] = sample.near
         if function.name in ("gaps", "closed", "closed_near"):
             values["q"] = sample.near
         sizes = {one.name: one.shape[0] for one in function.inputs}
@@ -265,6 +266,10 @@ class Proof:
             return m.frame_placement(s.q, frame), self._frame_jacobian(s.q, frame)
         if name.endswith("_by_parameters"):
             return (self._slope(s, name, found[0]) if s is self.samples[0] else None,)
+        if name == "nearest":
+            nearest = m.project(s.near, within_limits=False)
+            away = pin.difference(m.model, nearest, s.near) / m.velocity_scale
+            return found[0] + m.loop_gap(found[0]), np.array([away @ away])
         if name == "closed_near":
             # The answer is any closed configuration.
             return (found[0] + m.loop_gap(found[0]),)

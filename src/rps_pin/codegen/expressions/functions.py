@@ -41,6 +41,8 @@ closing_step                  q               dv of the dependent velocities (nv
 stage                         q, v, tau       a (nv), power of actuators, wrenches, damping and
                                               friction (1), growth (1)
 least_norm_step               q               dv of least norm (nv), squared gap (1), growth (1)
+nearest_step                  q, q'           dv towards q' in the allowed motions (nv), squared
+                                              distance and squared dv in one unit (1), growth (1)
 projection                    q, v            dv of least norm (nv), v less its opening part of
                                               least norm (nv), squared gap (1), growth (1)
 projected_velocity            q, v            v (nv), its dependent entries changed
@@ -350,6 +352,27 @@ def _closing_step(x: MechanismExpressions) -> Made:
 def _least_norm_step(x: MechanismExpressions) -> Made:
     step = _of_least_norm(x, -x.rows.gap)
     return {"q": x.q}, {"step": step, "squared_gap": x.squared_gap, "growth": x.growth}
+
+
+@_function()
+def _nearest_step(x: MechanismExpressions) -> Made:
+    """Towards a configuration: D^2 T (T' T)^-1 T' g in one unit, g the slope of the distance."""
+    given = ca.SX.sym("given", x.tree.model.nq)
+    per_unit = ca.DM(1 / x.system.column_scale)
+    away = per_unit * x.tree.difference(x.q, given)
+    squared = ca.sumsqr(away)
+    slope = -(ca.jacobian(squared / 2, x.q) @ x.tree.tangent(x.q)).T
+    scaled = ca.sparsify(ca.diag(per_unit) @ x.basis)  # D^-1 T
+    step = ca.SX(x.tree.model.nv, 1)
+    if x.independent.size:
+        along = LDL(ca.sparsify(scaled.T @ scaled)).solve(ca.sparsify(x.basis.T @ slope))
+        step = x.basis @ along
+    results = {
+        "step": step,
+        "squared_distance": squared,
+        "squared_step": ca.sumsqr(per_unit * step),
+    }
+    return {"q": x.q, "given": given}, results | {"growth": x.growth}
 
 
 @_function()

@@ -31,6 +31,8 @@ ROUNDING = 1e-15
 _Z = np.array([0.0, 0.0, 1.0])
 #: Squared angles, rad^2, below which sine and cosine are replaced by their series.
 _SMALL = 1e-2
+#: The same for series with three terms.
+_TINY = 1e-4
 
 
 def clean(numbers: Any, unit: float = 1.0) -> Array:
@@ -104,6 +106,15 @@ class Joint:
             i, k = i + part.nq, k + part.nv
         return ca.vertcat(*moved)
 
+    def difference(self, q: Expression, other: Expression) -> Expression:
+        """Return the tangent vector from q to another configuration, as `pinocchio.difference`."""
+        parts, start = [], 0
+        for part in self._parts:
+            here = slice(start, start + part.nq)
+            parts.append(part.family.difference(q[here], other[here]))
+            start += part.nq
+        return ca.vertcat(*parts)
+
     def tangent(self, q: Expression) -> Expression:
         """Return the derivative of `integrate` by dv at dv = 0, (nq, nv): q' = tangent v."""
         blocks, start = [], 0
@@ -119,6 +130,7 @@ class _Family(NamedTuple):
     placement: Callable[[Expression, Array, Array], Placement]
     """Of q and the subspace."""
     integrate: Callable[[Expression, Expression], Expression]
+    difference: Callable[[Expression, Expression], Expression]
     tangent: Callable[[Expression], Expression]
 
 
@@ -162,6 +174,10 @@ def _sum(q: Expression, dv: Expression) -> Expression:
     return q + dv
 
 
+def _minus(q: Expression, other: Expression) -> Expression:
+    return other - q
+
+
 def _identity(q: Expression) -> Expression:
     return ca.SX.eye(q.numel())
 
@@ -173,6 +189,11 @@ def _unbounded(q: Expression, linear: Array, angular: Array) -> Placement:
 def _unbounded_moved(q: Expression, dv: Expression) -> Expression:
     c, s = ca.cos(dv), ca.sin(dv)
     return _near_unit(ca.vertcat(c * q[0] - s * q[1], s * q[0] + c * q[1]))
+
+
+def _unbounded_difference(q: Expression, other: Expression) -> Expression:
+    (c, s), (other_c, other_s) = q.elements(), other.elements()
+    return ca.atan2(c * other_s - s * other_c, c * other_c + s * other_s)
 
 
 def _near_unit(x: Expression) -> Expression:
@@ -203,6 +224,16 @@ def _planar_moved(q: Expression, dv: Expression) -> Expression:
     dx, dy = along * dx - across * dy, across * dx + along * dy
     cw, sw = 1 - w * across, w * along
     return ca.vertcat(x + c * dx - s * dy, y + s * dx + c * dy, c * cw - s * sw, s * cw + c * sw)
+
+
+def _planar_difference(q: Expression, other: Expression) -> Expression:
+    """Undo the arc's chord: (d_1, d_2) = (u_1 e - u_2 z x e) / |u|^2, e = R' (p - p_q)."""
+    w = _unbounded_difference(q[2:], other[2:])
+    ex, ey = (_turn(_Z, q[2], q[3])[:2, :2].T @ (other[:2] - q[:2])).elements()
+    sinc, cosine, _ = _half_angle(w * w)
+    along, across, squared = sinc * cosine, w * sinc * sinc / 2, sinc * sinc
+    dx, dy = (along * ex + across * ey) / squared, (along * ey - across * ex) / squared
+    return ca.vertcat(dx, dy, w)
 
 
 def _planar_tangent(q: Expression) -> Expression:
@@ -240,6 +271,13 @@ def _product(q: Expression, vector: Expression, scalar: Expression) -> Expressio
     return ca.vertcat(w * vector + scalar * u + ca.cross(u, vector), w * scalar - ca.dot(u, vector))
 
 
+def _spherical_difference(q: Expression, other: Expression) -> Expression:
+    """Return the rotation vector of q^-1 other, of at most half a turn."""
+    relative = _product(ca.vertcat(-q[:3], q[3]), other[:3], other[3])
+    relative = ca.if_else(relative[3] < 0, -1, 1) * relative
+    return _angle_by_sine(ca.sumsqr(relative[:3]), relative[3]) * 2 * relative[:3]
+
+
 def _spherical_tangent(q: Expression) -> Expression:
     """Return the matrix of half the product of q and (v, 0)."""
     x, y, z, w = (q / 2).elements()
@@ -264,6 +302,21 @@ def _free_moved(q: Expression, dv: Expression) -> Expression:
     return ca.vertcat(q[:3] + _rotation(q[3:]) @ chord, sign * quaternion)
 
 
+def _free_difference(q: Expression, other: Expression) -> Expression:
+    """Undo the screw's chord: v = e - w x e / 2 + k w x (w x e), e = R' (p - p_q)."""
+    w = _spherical_difference(q[3:], other[3:])
+    e = _rotation(q[3:]).T @ (other[:3] - q[:3])
+    squared = ca.sumsqr(w)
+    sinc, cosine, _ = _half_angle(squared)
+    factor = ca.if_else(
+        squared < _TINY,
+        1 / 12 + squared / 720 + squared * squared / 30240,
+        (1 - cosine / sinc) / ca.fmax(squared, _TINY),
+    )
+    across = ca.cross(w, e)
+    return ca.vertcat(e - across / 2 + factor * ca.cross(w, across), w)
+
+
 def _free_tangent(q: Expression) -> Expression:
     return ca.diagcat(_rotation(q[3:]), _spherical_tangent(q[3:]))
 
@@ -283,6 +336,13 @@ def _half_angle(squared: Expression) -> tuple[Expression, Expression, Expression
     )
 
 
+def _angle_by_sine(squared: Expression, cosine: Expression) -> Expression:
+    """Return t / sin t of sin^2 t and cos t >= 0, smooth at t = 0."""
+    sine = ca.sqrt(ca.fmax(squared, _TINY))
+    series = 1 + squared * (1 / 6 + squared * (3 / 40 + squared * 15 / 336))
+    return ca.if_else(squared < _TINY, series, ca.atan2(sine, cosine) / sine)
+
+
 def _series(x: Expression, ratios: tuple[int, ...]) -> Expression:
     """Return 1 - x/r_1 (1 - x/r_2 (1 - ...))."""
     result = ca.SX(1)
@@ -293,19 +353,19 @@ def _series(x: Expression, ratios: tuple[int, ...]) -> Expression:
 
 # Types --------------------------------------------------------------------------------------------
 
-_ONE = _Family(_screw, _sum, _identity)
+_ONE = _Family(_screw, _sum, _minus, _identity)
 _FAMILIES = {
     **dict.fromkeys(("RX", "RY", "RZ", "RevoluteUnaligned"), _ONE),
     **dict.fromkeys(("PX", "PY", "PZ", "PrismaticUnaligned"), _ONE),
     **dict.fromkeys(("HX", "HY", "HZ", "HelicalUnaligned"), _ONE),
     **dict.fromkeys(
         ("RUBX", "RUBY", "RUBZ", "RevoluteUnboundedUnaligned"),
-        _Family(_unbounded, _unbounded_moved, _unbounded_tangent),
+        _Family(_unbounded, _unbounded_moved, _unbounded_difference, _unbounded_tangent),
     ),
-    "Translation": _Family(_translation, _sum, _identity),
-    "Planar": _Family(_planar, _planar_moved, _planar_tangent),
-    "Spherical": _Family(_spherical, _spherical_moved, _spherical_tangent),
-    "FreeFlyer": _Family(_free, _free_moved, _free_tangent),
+    "Translation": _Family(_translation, _sum, _minus, _identity),
+    "Planar": _Family(_planar, _planar_moved, _planar_difference, _planar_tangent),
+    "Spherical": _Family(_spherical, _spherical_moved, _spherical_difference, _spherical_tangent),
+    "FreeFlyer": _Family(_free, _free_moved, _free_difference, _free_tangent),
 }
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rps_pin.closed_loop.assembly.projection import NEAREST_STEP, NEAREST_STEPS
 from rps_pin.closed_loop.constraints.equations import OPEN
 from rps_pin.codegen.expressions.functions import MechanismFunctions
 from rps_pin.codegen.units import Routine
@@ -22,7 +23,7 @@ _NEWTON_STEPS = 20
 
 
 def routines(functions: MechanismFunctions) -> tuple[Routine, ...]:
-    """Return ``closed``, ``closed_near``, ``step`` and ``steps`` of a mechanism.
+    """Return ``closed``, ``closed_near``, ``nearest``, ``step`` and ``steps``.
 
     ========================  =====================  ============================================
     name                      arguments              results
@@ -30,6 +31,8 @@ def routines(functions: MechanismFunctions) -> tuple[Routine, ...]:
     closed                    q                      q, its independent coordinates as given;
                                                      squared gap of the guess (1) (check)
     closed_near               q                      the same by steps of least norm (check)
+    nearest                   q                      the closed q at the least distance; squared,
+                                                     that distance in one unit (1) (check)
     step                      q, v, tau, h (1)       q, v, work (1) (check)
     steps                     q, v, tau, h (BLOCK)   all q, all v, all work, (BLOCK, ...) each
                                                      (check)
@@ -40,6 +43,7 @@ def routines(functions: MechanismFunctions) -> tuple[Routine, ...]:
     return (
         _newton(functions, "closed", "closing_step"),
         _newton(functions, "closed_near", "least_norm_step"),
+        _nearest(functions),
         _step(functions),
         _steps(functions),
     )
@@ -81,6 +85,45 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
 """
     outputs = (("q_closed", model.nq), ("first", 1), ("check", 2))
     return Routine(name, (("q", model.nq), *extra), outputs, body, (kernel, "integrate"))
+
+
+def _nearest(functions: MechanismFunctions) -> Routine:
+    """As `rps_pin.closed_loop.assembly.projection`, without joint limits."""
+    x = functions.expressions
+    nq, nv, extra = x.tree.model.nq, x.tree.model.nv, _extra(functions, False)
+    shortest = (NEAREST_STEP * x.system.equations.length) ** 2
+    closing = _call("closed_near", ["moved"], extra, "candidate", "first", "c")
+    body = f"""
+    REAL dv[{nv}], next[{nv}], moved[{nq}], candidate[{nq}], first[1], c[2], d[1], s[1], e[1];
+    REAL length = CONST(1), size, growth[1], nearer, moving;
+    int i, k;
+    for (i = 0; i < {nq}; ++i) moved[i] = given[i];
+    {_call("closed_near", ["moved"], extra, "q", "first", "check")}
+    {_call("nearest_step", ["q", "given"], extra, "dv", "distance", "s", "growth")}
+    check[1] = FMAX(check[1], growth[0]);
+    size = s[0];
+    for (k = 0; k < {NEAREST_STEPS}; ++k) {{
+        /* No step is left, or none that is longer than rounding leads nearer. */
+        moving = AND(LT(CONST({shortest!r}), size), LE(CONST(1e-6), length));
+        if (!ANY(moving)) break;
+        for (i = 0; i < {nv}; ++i) next[i] = length * dv[i];
+        {_call("integrate", ["q", "next"], extra, "moved")}
+        {closing}
+        {_call("nearest_step", ["candidate", "given"], extra, "next", "d", "s", "e")}
+        nearer = AND(AND(LT(d[0], distance[0]), LE(c[0], CONST(1))), moving);
+        for (i = 0; i < {nq}; ++i) q[i] = SELECT(nearer, candidate[i], q[i]);
+        for (i = 0; i < {nv}; ++i) dv[i] = SELECT(nearer, next[i], dv[i]);
+        distance[0] = SELECT(nearer, d[0], distance[0]);
+        size = SELECT(nearer, s[0], size);
+        check[1] = SELECT(nearer, FMAX(check[1], e[0]), check[1]);
+        length = SELECT(nearer, FMIN(CONST(1), length + length), length * CONST(0.5));
+    }}
+    check[0] = SELECT(AND(LT(CONST({shortest!r}), size), LE(CONST(1e-6), length)),
+                      CONST(2), check[0]);
+"""
+    outputs = (("q", nq), ("distance", 1), ("check", 2))
+    calls = ("closed_near", "nearest_step", "integrate")
+    return Routine("nearest", (("given", nq), *extra), outputs, body, calls)
 
 
 def _step(functions: MechanismFunctions) -> Routine:

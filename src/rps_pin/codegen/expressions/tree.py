@@ -273,6 +273,13 @@ class Tree:
             moved[coordinates] = joint.integrate(q[coordinates], dv[velocities])
         return moved
 
+    def difference(self, q: Expression, other: Expression) -> Expression:
+        """Return the tangent vector from q to another configuration, (nv, 1), as Pinocchio does."""
+        result = ca.SX(self.model.nv, 1)
+        for joint, coordinates, velocities in self._joints:
+            result[velocities] = joint.difference(q[coordinates], other[coordinates])
+        return result
+
     def tangent(self, q: Expression) -> Expression:
         """Return the derivative of integrate(q, dv) by dv at 0, shape (nq, nv): q' = tangent v."""
         result = ca.SX(self.model.nq, self.model.nv)
