@@ -229,6 +229,21 @@ def test_a_chain_of_60_joints_builds_within_seconds() -> None:
     assert relative(np.triu(inertia), upper) < 1e-13
 
 
+@each("seed", SEEDS)
+def test_lengths_of_quaternions_and_of_cosine_and_sine(seed: int) -> None:
+    """As many as q has more entries than v; no velocity changes them."""
+    c = case(seed)
+    model, lengths = c.model, c.tree.unit_lengths(c.tree.q)
+    assert lengths.shape == (model.nq - model.nv, 1)
+    if model.nq > model.nv:
+        slopes = ca.jacobian(lengths, c.tree.q)
+        found, along = c.values(lengths, slopes @ c.tree.tangent(c.tree.q))
+        assert worst(found, along) < 1e-14
+        of = ca.Function("of", [c.tree.q], [lengths])
+        changed = pin.normalize(model, 2 * c.q) != 2 * c.q
+        np.testing.assert_allclose(of(np.where(changed, 2 * c.q, c.q)), 3.0, rtol=1e-14)
+
+
 def test_massless_links_cost_nothing() -> None:
     """Of a chain of three hinges only the last link of which has mass."""
     model, last = pin.Model(), 0

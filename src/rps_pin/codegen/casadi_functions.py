@@ -123,6 +123,9 @@ class CasadiFunctions:
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self.names]
 
+    def __repr__(self) -> str:
+        return f"<CasADi functions of {self._name or 'a mechanism'}; print them for a list>"
+
     def __str__(self) -> str:
         """Return a table of the functions, and the sizes of their arguments."""
         x = self._functions.expressions
