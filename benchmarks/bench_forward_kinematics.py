@@ -1,13 +1,15 @@
 """Time of the 3-RPS's forward kinematics, and of a loop of SciPy's ``fsolve``, in one run.
 
 Run with ``make bench``. The goals: 125,000 solutions in well under 0.1 s and 200 times faster a
-solution than the loop; all modes of a triple in 100 us; a tracker's call in 30 us.
+solution than the loop; all modes of a triple in 100 us; a tracker's call in 30 us; poses that are
+followed, with the proof of each step, at most 0.1 us each in generated code.
 """
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -15,11 +17,13 @@ from numpy.typing import NDArray
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import fsolve
 
+from rps_pin import RPSRobot
 from rps_pin.rps.kinematics.assembly_modes import assembly_modes
 from rps_pin.rps.kinematics.forward_kinematics import EncoderTracker, forward_kinematics
 from rps_pin.rps.kinematics.leg_equations import solve_angles
 
 Array = NDArray[np.float64]
+Job = Callable[[], Array]
 
 G = H = 0.12
 SIDE = np.linspace(0.2, 0.25, 50)
@@ -70,10 +74,48 @@ def bench_all_modes(benchmark: BenchmarkFixture) -> None:
     assert (modes.exists.sum(axis=-1) >= 8).all()
 
 
-@pytest.mark.benchmark(group="3-RPS direct kinematics, 2,000 poses followed")
-def bench_followed(benchmark: BenchmarkFixture) -> None:
-    lengths = np.random.default_rng(0).uniform(0.2, 0.25, (2000, 3))
-    assert benchmark(forward_kinematics, lengths, [0.22, 0, 0], G, H).reached.all()
+GENERATED, PYTHON = "ours", "Python"
+
+
+@pytest.fixture(scope="module")
+def generated() -> RPSRobot:
+    """The robot in generated code; its numbers are those of G and H."""
+    robot = RPSRobot.from_preset("micro").compile()
+    assert (robot.parameters.base_radius, robot.parameters.platform_radius) == (G, H)
+    return robot
+
+
+def jobs(robot: RPSRobot, lengths: Array, near: Array) -> dict[str, Job]:
+    """Return calls of both engines, whose poses are equal."""
+    work: dict[str, Job] = {
+        GENERATED: lambda: robot.forward_kinematics(lengths, near),
+        PYTHON: lambda: forward_kinematics(lengths, near, G, H).pose,
+    }
+    np.testing.assert_allclose(work[GENERATED](), work[PYTHON](), rtol=0, atol=1e-12)
+    return work
+
+
+@pytest.mark.parametrize("role", [GENERATED, PYTHON])
+@pytest.mark.parametrize("count", [1, 2000, 100_000])
+@pytest.mark.parametrize("start", ["one pose", "poses nearby"])
+def bench_followed(
+    benchmark: BenchmarkFixture, generated: RPSRobot, start: str, count: int, role: str
+) -> None:
+    rng = np.random.default_rng(0)
+    lengths = rng.uniform(0.2, 0.25, (count, 3))
+    middle = np.array([0.22, 0.0, 0.0])
+    near = middle
+    if start == "poses nearby":
+        near = forward_kinematics(lengths, middle, G, H).pose
+        near = near + rng.uniform(-1.0, 1.0, near.shape) * [0.003, 0.02, 0.02]
+    if count == 1:
+        lengths, near = lengths[0], near.reshape(3)
+    work = jobs(generated, lengths, near)
+    benchmark.group = f"3-RPS direct kinematics, {count} followed from {start}"
+    benchmark.extra_info["role"] = role
+    benchmark.pedantic(work[role], rounds=2000 if count == 1 else 15, warmup_rounds=1)
+    if benchmark.stats is not None:
+        benchmark.extra_info["us a pose"] = 1e6 * benchmark.stats.stats.median / count
 
 
 @pytest.mark.benchmark(group="3-RPS direct kinematics, a tracker's call", min_rounds=200)

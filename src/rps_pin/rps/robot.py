@@ -142,7 +142,10 @@ class RPSRobot:
 
     @property
     def engine(self) -> str:
-        """What computes the robot's functions: ``"Python"``, or generated code, and by what."""
+        """What computes kinematics and actuator forces: ``"Python"``, or generated code.
+
+        Then it has the compiler's name and version; see `compile`.
+        """
         code = engine.current()
         return "Python" if code is None else str(code)
 
