@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable
-from functools import cache
 from importlib import metadata
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
-from rps_pin import codegen
 from rps_pin.control.generated.code import GeneratedDynamics, GeneratedTick
 from rps_pin.errors import CompileError, InputError, shown
+from rps_pin.rps.generated.digest import SOURCES, digest_of
 
 if TYPE_CHECKING:
     from rps_pin.codegen.build import Library
@@ -22,12 +19,8 @@ Compiled: TypeAlias = "Literal['auto', True, False] | Library"
 _Code = TypeVar("_Code", GeneratedTick, GeneratedDynamics)
 
 HOW_TO_GET = "pip install 'rps-pin[compile]'"
-#: What generated code is made from, beside the compiler.
-_SOURCES = (
-    *("numerics", "codegen", "rps/kernels", "rps/generated"),
-    *("control/estimator", "control/loop", "control/generated"),
-    *("closed_loop/dynamics/passive_joint_forces.py", "rps/dynamics/force_equations.py"),
-)
+#: What ticks are made from besides.
+_SOURCES = ("control/estimator", "control/loop", "control/generated", "control/laws.py")
 
 
 def generated_tick(
@@ -109,22 +102,9 @@ def _built(name: str, make: Callable[..., Any]) -> Library:
             f"3-RPS control loop, {name}",
             (f"{name}_tick",),
             lambda: tick_texts(name),
-            determined_by=f"{version} {_digest()}",
+            determined_by=f"{version} {digest_of(*SOURCES, *_SOURCES)}",
         )
         return build(source, lambda library: prove(name, library, make))
     except ImportError as error:  # of CasADi only where nothing is kept
         missing = error.name or error
         raise CompileError(f"{missing} is not installed: {HOW_TO_GET}", "") from None
-
-
-@cache
-def _digest() -> str:
-    """Return a digest of the modules that generated code depends on."""
-    package = Path(codegen.__file__).parent.parent
-    found = hashlib.sha256()
-    for source in _SOURCES:
-        place = package / source
-        for path in sorted(place.rglob("*")) if place.is_dir() else [place]:
-            if path.suffix in (".py", ".h", ".c"):
-                found.update(path.read_bytes())
-    return found.hexdigest()

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 from contextlib import suppress
-from functools import cache
 from importlib import metadata
-from pathlib import Path
 
-from rps_pin import codegen
 from rps_pin.codegen.build import Library, Source, build
 from rps_pin.codegen.build.builder import CompilerName, kept
 from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
 from rps_pin.errors import CompileError
+from rps_pin.rps.generated.digest import SOURCES, digest_of
 from rps_pin.rps.generated.proof import prove
 from rps_pin.rps.generated.robot import ARGUMENTS, robot_unit
-
-#: What generated code is made from, beside the compiler.
-_SOURCES = (
-    *("numerics", "codegen", "rps/kernels", "rps/generated", "rps/kinematics", "rps/dynamics"),
-    "closed_loop/dynamics/passive_joint_forces.py",
-)
 
 
 class RobotCode:
@@ -80,18 +71,5 @@ def _source() -> Source:
         tuple(f"{name}_{end}" for name in ARGUMENTS for end in ("one", "many")),
         lambda: robot_unit().library(),
         vectors=True,
-        determined_by=f"{version} {_digest()}",
+        determined_by=f"{version} {digest_of(*SOURCES)}",
     )
-
-
-@cache
-def _digest() -> str:
-    """Return a digest of the modules that the code and its proof depend on."""
-    package = Path(codegen.__file__).parent.parent
-    found = hashlib.sha256()
-    for source in _SOURCES:
-        place = package / source
-        for path in sorted(place.rglob("*")) if place.is_dir() else [place]:
-            if path.suffix in (".py", ".h", ".c"):
-                found.update(path.read_bytes())
-    return found.hexdigest()
