@@ -142,7 +142,8 @@ class _Run:
         self._q, self._v = np.empty((rows, system.model.nq)), np.empty((rows, system.model.nv))
         self._tau, self._work = np.empty((rows, system.actuated.size)), np.zeros(rows)
         self._q[0], self._v[0] = closed_start(system, q, v)
-        self._done = 0  # rows whose state and tau are known, less one
+        self._row = 0  # that the motion has come to
+        self._known = 0  # rows whose state and tau are known
 
     def simulation(self) -> Simulation:
         """Return the whole motion; where it breaks off, the error has what there is of it."""
@@ -150,33 +151,35 @@ class _Run:
             self._advance()
         except BaseException as error:
             if isinstance(error, RPSPinError):
-                text = f"at t = {self._time[self._done]:.6g} s: {error}"
+                text = f"at t = {self._time[self._row]:.6g} s: {error}"
                 error.args = (text, *error.args[1:])
-            vars(error)["partial"] = self._recorded(self._done)
+            vars(error)["partial"] = self._partial()
             raise
         return self._recorded(len(self._time))
 
     def _advance(self) -> None:
         last, progress, shown = len(self._time) - 1, self._given["progress"], 0.0
         self._command(0)
-        while self._done < last:
-            fraction = self._time[self._done] / self._time[-1]
+        while self._row < last:
+            fraction = self._time[self._row] / self._time[-1]
             if progress and fraction >= shown + 0.005:
                 shown = fraction
                 progress(float(fraction))
-            if not self._controlled and last - self._done >= BLOCK and self._block():
+            if not self._controlled and last - self._row >= BLOCK and self._block():
                 continue
             self._single()
         if progress:
             progress(1.0)
 
     def _command(self, row: int) -> None:
+        self._row = row
         self._drive.command(float(self._time[row]), self._q[row], self._v[row])
         self._tau[row] = self._drive.tau
+        self._known = row + 1
 
     def _block(self) -> bool:
         """Take a block of steps under constant forces; False if the code flags one of them."""
-        k = self._done
+        k = self._row
         h = np.diff(self._time[k : k + BLOCK + 1])
         q, v, work, status = self._taken("steps", k, h)
         if status:
@@ -185,12 +188,13 @@ class _Run:
         self._q[rows], self._v[rows] = q.reshape(BLOCK, -1), v.reshape(BLOCK, -1)
         self._work[rows] = self._work[k] + np.cumsum(work)
         self._tau[rows] = self._drive.tau
-        self._done += BLOCK
+        self._row += BLOCK
+        self._known = self._row + 1
         return True
 
     def _single(self) -> None:
         """Take one step; what the code flags is the Pinocchio engine's matter."""
-        k = self._done
+        k = self._row
         q, v, work, status = self._taken("step", k, np.diff(self._time[k : k + 2]))
         done = float(work[0])
         if status:
@@ -198,7 +202,6 @@ class _Run:
         self._q[k + 1], self._v[k + 1] = q, v
         self._work[k + 1] = self._work[k] + done
         self._command(k + 1)
-        self._done += 1
 
     def _taken(self, name: str, k: int, h: Array) -> tuple[Any, ...]:
         """Return the results of a routine of steps from row k, and its status."""
@@ -212,6 +215,13 @@ class _Run:
             a = motion.acceleration(time, *state)
             moved, _, work = pinocchio_engine.fixed_steps(motion)(time, state, following, a)
         return moved, work
+
+    def _partial(self) -> Simulation:
+        """Return what is known where the motion breaks off."""
+        try:
+            return self._recorded(self._known)
+        except RPSPinError:  # the last state has no acceleration
+            return self._recorded(self._known - 1)
 
     def _recorded(self, rows: int) -> Simulation:
         """Return what follows from the first rows' states."""
