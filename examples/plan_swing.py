@@ -23,7 +23,7 @@ ICRA 2021).
 
 Prints IPOPT's statistics, the energy against a minimum-jerk motion of the driven joints, the
 largest gap, and what a simulation under the planned torques reaches, in the Pinocchio engine and
-in generated code. Writes swing.png and swing.svg.
+in generated code. Writes swing.png and swing.svg. Needs the extra `compile`.
 
 Exit status: 0 done; 1 IPOPT found no plan; 2 wrong usage.
 """

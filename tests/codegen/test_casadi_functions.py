@@ -234,6 +234,61 @@ def test_the_energy_changes_by_the_power_of_the_actuators() -> None:
         assert relative(ca.Function("rate", given, [rate])(q, v), power) < 1e-9
 
 
+# Plans --------------------------------------------------------------------------------------------
+
+
+def least_effort(s: State, goal: np.ndarray, variables: list[Any], node: list[Any]) -> np.ndarray:
+    """Return the configurations (n, nq) of least effort between two closed ones, by collocation.
+
+    The variables of a node begin with all coordinates, speeds and accelerations; of these, the
+    independent ones are integrated by the trapezoidal rule. A node gives zeros and the forces.
+    """
+    n, h, own = 9, 0.05, s.functions.independent.tolist()
+    unknown = [ca.MX.sym("x", x.numel(), n) for x in variables]
+    zeros, tau = ca.Function("node", variables, ca.cse(node)).map(n)(*unknown)
+    speeds = [x[own, :] if x.size1() > len(own) else x for x in unknown[1:3]]
+    rates = [(unknown[0][own, :], speeds[0]), (speeds[0], speeds[1])]
+    defects = [x[:, 1:] - x[:, :-1] - h / 2 * (r[:, 1:] + r[:, :-1]) for x, r in rates]
+    ends = ca.vertcat(
+        unknown[0][own, 0] - s.q[own], unknown[0][own, -1] - goal[own], speeds[0][:, [0, -1]][:]
+    )
+    problem = {
+        "x": ca.veccat(*unknown),
+        "f": ca.sumsqr(tau),
+        "g": ca.veccat(*defects, zeros, ends),
+    }
+    options = {"ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-10}, "print_time": False}
+    solver = ca.nlpsol("plan", "ipopt", problem, options)
+    first = np.zeros((n, solver.size1_in(0) // n))
+    guess = np.concatenate([np.tile(s.q, n), first.ravel()[n * s.q.size :]])
+    found = solver(x0=guess, lbg=0, ubg=0)["x"].full().ravel()
+    assert solver.stats()["success"]
+    return found[: n * s.q.size].reshape(n, -1)
+
+
+def test_a_plan_is_the_same_with_and_without_elimination() -> None:
+    """The Delta's, whose platform has a quaternion; closed at every node, and at the goal."""
+    s = state("delta")
+    m, f = s.mechanism, s.functions
+    goal = m.complete(s.q[m.actuated_indices] + [0.3, -0.2, 0.2], s.q)
+    q, v, a = (ca.SX.sym(name, x.size) for name, x in (("q", s.q), ("v", s.v), ("a", s.a)))
+    tau, multipliers = ca.SX.sym("tau", 3), ca.SX.sym("multipliers", m.constraint_size)
+    closed = ca.vertcat(f.gaps(q), f.unit_lengths(q))
+    moving = ca.vertcat(f.jacobian(q) @ v, f.gap_accelerations(q, v, a))
+    error = f.equations_of_motion(q, v, a, tau, multipliers)
+    whole = least_effort(
+        s, goal, [q, v, a, tau, multipliers], [ca.vertcat(closed, moving, error), tau]
+    )
+    u, w = ca.SX.sym("u", 3), ca.SX.sym("w", 3)
+    speed = f.velocity(q, u)
+    force = f.inverse_dynamics(q, speed, f.acceleration(q, speed, w))[0]
+    closing = ca.vertcat(f.closing_step(q)[0][f.dependent.tolist()], f.unit_lengths(q))
+    reduced = least_effort(s, goal, [q, u, w], [closing, force])
+    assert worst(*(m.loop_gap(x) for x in (*whole, *reduced))) < 1e-9
+    assert worst(whole - reduced) < 1e-7
+    assert worst(reduced[-1] - goal) < 1e-8
+
+
 # Kinds of arguments -------------------------------------------------------------------------------
 
 
@@ -355,6 +410,7 @@ def test_lengths_as_parameters() -> None:
 
 def test_fewer_and_more_actuators_than_motions() -> None:
     whole = state("five_bar").mechanism
+    x = [ca.MX.sym(name, whole.model.nv) for name in "qva"]
     for actuated in (["left_joint"], list(whole.model.names)[1:]):
         m = ClosedLoopModel(whole.model, whole.closures, actuated, home=whole.home)
         f = m.to_casadi()
@@ -365,6 +421,9 @@ def test_fewer_and_more_actuators_than_motions() -> None:
             assert relative(found["unproduced"], expected.unproduced) < 1e-10
         forward = m.forward_dynamics(q, v, expected.tau)
         assert relative(f.forward_dynamics(q, v, expected.tau), forward) < 1e-10
+        total = sum(map(ca.sumsqr, f.inverse_dynamics(*x)))
+        second = ca.Function("second", x, [ca.hessian(total, ca.veccat(*x))[0]])(q, v, v)
+        assert np.isfinite(second.full()).all()
 
 
 # Bad input ----------------------------------------------------------------------------------------
