@@ -10,9 +10,9 @@ The machine's own delays (interrupts, other programs, the host) are measured by 
 the same and take about as long as a tick. Compare the other tails with that one, and with p99.9 of
 the quietest tenth of the run.
 
-Peers run a tenth of the ticks, in the same run: the same law written with Pinocchio and NumPy, with
-a quadratic program built in each tick, and with MuJoCo. Their forces must agree to 1e-8 N before
-anything is measured. Linux only (it reads /proc/self/statm).
+Interpreted stages and peers run a tenth of the ticks. Peers are the same law written with Pinocchio
+and NumPy, with a quadratic program built in each tick, and with MuJoCo. Their forces must agree to
+1e-8 N before anything is measured. Linux only (it reads /proc/self/statm).
 """
 
 from __future__ import annotations
@@ -96,15 +96,22 @@ def stages(robot: RPSRobot) -> dict[str, Callable[[int], object]]:
         "a longer sum": lambda i: sum(MORE_WORK),
         "direct kinematics: estimate": lambda i: loop.estimate(length[i]),
         "direct kinematics: estimate, interpreted": lambda i: slow.estimate(length[i]),
-        "state completion": lambda i: robot_state(poses[i], *triples[i][1:], p.platform_radius),
-        "inverse dynamics, state given": lambda i: solve(*states[i]),
         "inverse dynamics, from a pose": lambda i: loop.inverse_dynamics(*targets[i]),
-        "QP: force limits": limited(robot, poses),
+        "inverse dynamics, from a pose, interpreted": lambda i: slow.inverse_dynamics(*targets[i]),
+        "estimate, and forces of an acceleration": lambda i: (
+            loop.estimate(length[i]),
+            loop.forces_for(targets[i][2]),
+        ),
+        "state completion, interpreted": lambda i: robot_state(
+            poses[i], *triples[i][1:], p.platform_radius
+        ),
+        "inverse dynamics, state given, interpreted": lambda i: solve(*states[i]),
+        "QP: force limits, interpreted": limited(robot, poses),
         GENERATED: tick(controller(True, **by_pose)),
         f"{GENERATED}, interpreted": tick(controller(False, **by_pose)),
         "the same in actuator space": tick(controller(True, **by_legs)),
         "the same in actuator space, interpreted": tick(controller(False, **by_legs)),
-        "the same, always saturated: interpreted": tick(controller(True, **weak)),
+        "the same, always saturated, interpreted": tick(controller(True, **weak)),
         "peer, dynamics: plain Pinocchio": lambda i: peer(*states[i]),
         "peer, dynamics: bare Pinocchio calls": bare_calls(robot, states),
         **whole_peers(robot, length, speed, states, targets),
@@ -201,7 +208,7 @@ def measure_all(ticks: int, console: Console) -> dict[str, dict[str, float]]:
     times = np.ones(ticks)  # touched now, so that it does not grow later
     robot, found = RPSRobot.from_preset("micro"), {}
     for name, call in track(stages(robot).items(), console=console, transient=True):
-        count = max(ticks // 10, 1) if name.startswith("peer") else ticks
+        count = max(ticks // 10, 1) if "peer" in name or "interpreted" in name else ticks
         measured(call, min(count, 20_000), times)
         before = resident()
         measured(call, count, times)
@@ -241,7 +248,9 @@ def main() -> None:
     asked = parser.parse_args()
     console = Console(width=110)  # for the table, in a pipe too
     found = measure_all(asked.ticks, console)
-    table = Table("stage", title=f"us a tick, {asked.ticks:,} ticks a stage, peers a tenth")
+    table = Table(
+        "stage", title=f"us a tick, {asked.ticks:,} ticks a stage, a tenth interpreted or of peers"
+    )
     for column in ("median", "p99", "p99.9", "quietest tenth", "maximum", "grew, kB"):
         table.add_column(column, justify="right")
     for name, row in found.items():

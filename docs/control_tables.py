@@ -255,7 +255,7 @@ def latency() -> str:
     ]
     for name, row in measured["stages"].items():
         figures = [row[key] for key in ("median", "p99", "p99.9", "quiet", "maximum")]
-        cells = " | ".join(f"{value:.1f}" for value in figures)
+        cells = " | ".join(f"{value:.2f}" for value in figures)
         lines.append(f"| {name} | {row['ticks']:,} | {cells} | {row['grew_kB']:.0f} kB |")
     tick, machine = (
         measured["stages"][name]
@@ -267,9 +267,9 @@ def latency() -> str:
             *lines,
             "",
             f"us per tick; {measured['machine']}. p99.9 of a tick is {tails[0]} times its median, "
-            f"and {tails[1]} times in the quietest tenth of the run. For a constant sum of equal "
-            f"duration the ratios are {tails[2]} and {tails[3]}: they are due to the machine, a "
-            "virtual one with shared cores.",
+            f"and {tails[1]} times in the quietest tenth of the run; for a constant sum of equal "
+            f"duration {tails[2]} and {tails[3]} times. The machine is a virtual one with shared "
+            "cores; the load says how many programs wanted them.",
         ]
     )
 

@@ -14,6 +14,7 @@ from rps_pin.control.loop.controller import Space
 from rps_pin.rps.dynamics.loads import Payload
 from tests import strategies
 
+pytestmark = pytest.mark.usefixtures("both_engines")
 Array = NDArray[np.float64]
 
 

@@ -13,6 +13,7 @@ from rps_pin.control.loop.pd_control import Compensation
 from rps_pin.rps.kinematics.rates import leg_jacobians
 from tests import strategies
 
+pytestmark = pytest.mark.usefixtures("both_engines")
 Array = NDArray[np.float64]
 LEGS = [1, 3, 5]
 

@@ -20,6 +20,7 @@ from rps_pin.rps.kinematics import rates
 from rps_pin.rps.singularity.measures import singularity_measures
 from tests import strategies
 
+pytestmark = pytest.mark.usefixtures("both_engines")
 Array = NDArray[np.float64]
 PERIOD = 1e-3
 
