@@ -17,8 +17,9 @@ from rps_pin.control.estimator.leg_geometry import legs_to, platform_tips
 from rps_pin.rps import Payload
 from rps_pin.rps.dynamics.joint_reactions import joint_reactions
 from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, symbols
-from rps_pin.rps.generated.forces import TERMS, forces_and_reactions, terms_of
+from rps_pin.rps.generated.forces import TERMS, terms_of
 from rps_pin.rps.generated.layout import Layout
+from rps_pin.rps.generated.reactions import forces_and_reactions
 from rps_pin.rps.kinematics.tracking import follow
 from tests import strategies
 from tests.rps.test_tracking import G, H, start
