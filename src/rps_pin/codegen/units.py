@@ -20,7 +20,7 @@ from rps_pin.errors import InputError, did_you_mean
 
 #: Bits of a sample's status.
 NOT_FINITE, OPEN, SINGULAR = 1, 2, 4
-#: An entry point has at most this many inputs and outputs together (MOST_ARGUMENTS in many.h).
+#: An entry point has at most this many inputs and outputs together (MOST_ARGUMENTS in C too).
 MOST_ARGUMENTS = 64
 #: And at most this many numbers, 8 samples of which lie on the stack.
 MOST_NUMBERS = 50_000
@@ -279,15 +279,17 @@ class Unit:
     @property
     def symbols(self) -> tuple[str, ...]:
         """Return the names of the functions of `library` that Python calls."""
-        return tuple(f"{name}_{end}" for name in self.entries for end in ("one", "many"))
+        return tuple(f"{name}_{end}" for name in self.entries for end in ("call", "many"))
 
     def library(self, *, lanes: bool = True) -> tuple[str, str]:
         """Return the two texts of a shared library, in double precision.
 
-        For an entry NAME the first has ``int NAME_one(double *block)``, which computes one sample
-        from all inputs, one after the other, writes the outputs after them, and returns the status.
-        The second has ``void NAME_many(long n, const double *const *in, const long *stride,
-        double *const *out, int *status)`` for n samples: input i of sample s begins at
+        For an entry NAME the first has ``int NAME_at(double *const *io)``, which computes one
+        sample from arrays of inputs into arrays of outputs and returns the status, and ``void
+        *NAME_call(void *self, void *const *arguments, long count, void *names)``, the code of a
+        builtin function of Python (see `python_calls`). The second has ``void NAME_many(long n,
+        const double *const *in, const long *stride, double *const *out, int *status)`` for n
+        samples: input i of sample s begins at
         ``in[i] + s * stride[i]``, outputs follow each other, and status may be NULL.
 
         Parameters
@@ -298,7 +300,8 @@ class Unit:
             uses functions of glibc's libmvec (sin, cos; from 2.35 on also tanh, atan2).
         """
         needed = list(self._needed())
-        one = [prelude("scalar.h"), prelude("status.h"), *_renamed(needed, "scalar")]
+        one = [prelude("scalar.h"), prelude("status.h"), prelude("python_call.h")]
+        one += _renamed(needed, "scalar")
         one += [self._one(name) for name in self.entries]
         many = [prelude("scalar.h"), prelude("many.h")]
         if lanes:
@@ -323,10 +326,10 @@ class Unit:
         lines.append(f"    int status = {' | '.join(bad) or '0'};")
         if name in self.checked:
             lines.append(f"    status |= STATUS_OF_CHECK(check, {self.limit!r});")
-        places = _places("block", every) or ["block"]
-        lines += ["    return status;", "}", f"int {name}_one(double *block)", "{"]
-        lines += [f"    double *const io[] = {{{', '.join(places)}}};"]
-        return "\n".join([*lines, f"    return {name}_at(io);", "}", ""])
+        call = f"void *{name}_call(void *self, void *const *arguments, long count, void *names)"
+        lines += ["    return status;", "}", f"{call};", call, "{"]
+        lines += [f"    return py_call(self, arguments, count, names, {name}_at);", "}", ""]
+        return "\n".join(lines)
 
     def _group(self, name: str) -> str:
         one = self.function(name)

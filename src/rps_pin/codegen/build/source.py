@@ -15,7 +15,7 @@ from pathlib import Path
 from rps_pin import __version__
 
 #: Counts changes of how libraries are built, called and kept; the cache holds each apart.
-ABI = 1
+ABI = 2
 
 
 @dataclass(frozen=True)

@@ -212,7 +212,7 @@ class GeneratedCode:
         kind = "batches" if lanes else "samples"
         return Source(
             f"{self.mechanism.name or 'mechanism'}, {group}, {kind}",
-            tuple(f"{name}_{end}" for name in self._names(group) for end in ("one", "many")),
+            tuple(f"{name}_{end}" for name in self._names(group) for end in ("call", "many")),
             lambda: self._texts(group, lanes),
             vectors=lanes,
             determined_by=f"{self.identity} {group} {kind}",
@@ -243,7 +243,7 @@ class GeneratedCode:
                 if lanes:
                     self._lanes_in_use.add(group)
                 for name in self._names(group):
-                    self._functions[name].replace(_entry(better, name))
+                    self._functions[name].replace(Entry.of(better, name))
                 self.libraries[group] = better
 
         return replace
@@ -313,12 +313,8 @@ class GeneratedCode:
             given, results = (
                 [Argument(key, tuple(shape)) for key, shape in part] for part in (inputs, outputs)
             )
-            found[name] = CompiledFunction(name, given, results, _entry(library, name))
+            found[name] = CompiledFunction(name, given, results, Entry.of(library, name))
         return found
-
-
-def _entry(library: Library, name: str) -> Entry:
-    return Entry(library.address(f"{name}_one"), library.address(f"{name}_many"), library)
 
 
 def _as_dict(partition: Partition) -> dict[str, Any]:
