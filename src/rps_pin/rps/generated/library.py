@@ -68,7 +68,7 @@ def _source() -> Source:
     version = metadata.version("casadi")
     return Source(
         "3-RPS robot",
-        tuple(f"{name}_{end}" for name in ARGUMENTS for end in ("one", "many")),
+        tuple(f"{name}_{end}" for name in ARGUMENTS for end in ("call", "many")),
         lambda: robot_unit().library(),
         vectors=True,
         determined_by=f"{version} {digest_of(*SOURCES)}",
