@@ -55,7 +55,7 @@ class Case:
         mechanism = self.mechanism
         self.floating = mechanism.model.existJointName("base")
         base = ["base"] if self.floating else []
-        self.independent = [*base, *mechanism.actuated]
+        self.independent = [*mechanism.actuated, *base]
         self.size = mechanism.system.independent(self.independent).size
         self.home = mechanism.home
         self.q, self.v, self.a, self.tau = self.states(1, 0.02, np.random.default_rng(1))[0]

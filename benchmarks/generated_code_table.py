@@ -24,10 +24,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.generated_cases import LOOPS, MECHANISMS, Case, case, chain_case
-from benchmarks.generated_goals import Figures, goals_table, table
+from benchmarks.generated_goals import (
+    BATCH,
+    CHAIN_BATCH,
+    DIRECT,
+    Figures,
+    goals_table,
+    table,
+)
 from benchmarks.generated_peers import forward_peers, inverse_peers, relative
 from benchmarks.mujoco_twin import MujocoTwin
 from benchmarks.timing import medians
+from rps_pin import RPSRobot
 from rps_pin.closed_loop.simulation.stepper import Stepper
 from rps_pin.errors import RPSPinError
 
@@ -75,10 +83,14 @@ def measured(only: list[str] | None = None) -> Figures:
         seconds, fast = built(one)
         figures.add("build (s)", one.name, {OURS: seconds})
         add_single_calls(figures, one, fast, axes)
-        if "four-bar" not in one.name:
-            add_derivatives(figures, one, fast)
-            add_steps(figures, one, fast)
-            add_batch(figures, one, fast)
+        if "four-bar" in one.name:
+            add_batch(figures, one, fast, 8000)
+            continue
+        add_derivatives(figures, one, fast)
+        add_steps(figures, one, fast)
+        add_batch(figures, one, fast, SAMPLES)
+    if not only or "3-RPS" in only:
+        add_direct_kinematics(figures)
     return figures
 
 
@@ -222,21 +234,38 @@ def step_times(engines: dict[str, Callable[[], Motion]]) -> dict[str, float]:
 # Batches ------------------------------------------------------------------------------------------
 
 
-def add_batch(figures: Figures, one: Case, fast: Any) -> None:
-    """Measure inverse and forward dynamics of 10^5 states on one thread."""
+def add_batch(figures: Figures, one: Case, fast: Any, count: int) -> None:
+    """Measure inverse and forward dynamics of many states on one thread."""
     states = one.states(50, 0.02, np.random.default_rng(2))
     q, v, a, tau = (
-        np.ascontiguousarray(np.tile(part, (SAMPLES // len(states), 1)))
+        np.ascontiguousarray(np.tile(part, (count // len(states), 1)))
         for part in map(np.array, zip(*states, strict=True))
     )
     one_by_one = [one.mechanism.inverse_dynamics(*state[:3]).tau for state in states]
     same(fast.inverse_dynamics(q, v, a, threads=1).tau[: len(states)], np.array(one_by_one))
+    same(fast.forward_dynamics(q, v, tau, threads=1)[: len(states)], a[: len(states)])
     calls = {
         "inverse dynamics": lambda: fast.inverse_dynamics(q, v, a, threads=1),
         "forward dynamics": lambda: fast.forward_dynamics(q, v, tau, threads=1),
     }
-    times = {name: time / SAMPLES for name, time in medians(calls, rounds=7).items()}
-    figures.add("batch of 10^5, one thread (us a sample)", one.name, times)
+    times = {name: time / count for name, time in medians(calls, rounds=9).items()}
+    figures.add(BATCH if count == SAMPLES else CHAIN_BATCH, one.name, times)
+
+
+def add_direct_kinematics(figures: Figures) -> None:
+    """Measure the direct kinematics of 10^5 poses of the 3-RPS, followed from one pose."""
+    robot, rng = RPSRobot.from_preset("sokolov"), np.random.default_rng(3)
+    poses = np.array([0.4, 0.0, 0.0]) + rng.uniform(-1, 1, (SAMPLES, 3)) * [0.02, 0.1, 0.1]
+    lengths, near = robot.inverse_kinematics(poses).length, [0.4, 0.0, 0.0]
+    times = {}
+    with tempfile.TemporaryDirectory() as folder, mock.patch.dict(os.environ, RPS_PIN_CACHE=folder):
+        for name in ("NumPy", OURS):
+            if name == OURS:
+                robot.compile(compiler="gcc")
+            same(robot.forward_kinematics(lengths, near), poses)
+            call = {name: lambda: robot.forward_kinematics(lengths, near)}
+            times[name] = medians(call, rounds=9)[name] / SAMPLES
+    figures.add(DIRECT, "3-RPS", {OURS: times[OURS], "NumPy": times["NumPy"]})
 
 
 if __name__ == "__main__":

@@ -9,6 +9,9 @@ import numpy as np
 
 FIRST_LOOPS = 8
 """Costs of fewer loops are mostly those of a call."""
+BATCH = "batch of 10^5, one thread (us a sample)"
+CHAIN_BATCH = "batch of 8000, one thread (us a sample)"
+DIRECT = "direct kinematics, batch of 10^5, one thread (us a pose)"
 
 
 class Figures(dict[str, dict[str, dict[str, float]]]):
@@ -30,7 +33,7 @@ def table(figures: Figures, kind: str) -> str:
     columns = list(dict.fromkeys(name for found in lines.values() for name in found))
     text = [f"| | {' | '.join(columns)} |", "|---" * (len(columns) + 1) + "|"]
     for mechanism, found in lines.items():
-        cells = [_cell(found, column, "(us)" in kind) for column in columns]
+        cells = [_cell(found, column, "(us" in kind and "generated" in found) for column in columns]
         text.append(f"| {mechanism} | {' | '.join(cells)} |")
     return "\n".join(text)
 
@@ -82,10 +85,10 @@ def _at_most(
     ]
 
 
-def growth(figures: Figures, kind: str) -> float:
+def growth(figures: Figures, kind: str, engine: str) -> float:
     """Return the exponent of a figure over the number of loops of chains."""
     chains = {
-        int(name.split()[0]): found["generated"]
+        int(name.split()[0]): found[engine]
         for name, found in figures[kind].items()
         if "four-bar" in name
     }
@@ -124,7 +127,7 @@ GOALS = [
         )
     ),
     *_at_most(
-        "batch of 10^5, one thread (us a sample)",
+        BATCH,
         "inverse dynamics",
         {"3-RPS": 0.05, "Stewart": 0.1},
         "us",
@@ -133,14 +136,21 @@ GOALS = [
     *_at_most(
         "build (s)", "generated", {"3-RPS": 2.0, "Stewart": 5.0, "biped": 30.0}, "s", "build, gcc"
     ),
+    *_at_most(DIRECT, "generated", {"3-RPS": 0.1}, "us", "direct kinematics in a batch, a pose"),
     *(
         Goal(
-            f"exponent over loops: {kind}",
+            f"exponent over loops: {what}",
             1.1,
-            lambda figures, kind=kind: growth(figures, kind),
+            lambda figures, kind=kind, engine=engine: growth(figures, kind, engine),
             f"{FIRST_LOOPS} to 64 four-bars",
         )
-        for kind in ("inverse dynamics (us)", "forward dynamics (us)", "build (s)")
+        for what, kind, engine in (
+            ("call of inverse dynamics", "inverse dynamics (us)", "generated"),
+            ("call of forward dynamics", "forward dynamics (us)", "generated"),
+            ("inverse dynamics in a batch", CHAIN_BATCH, "inverse dynamics"),
+            ("forward dynamics in a batch", CHAIN_BATCH, "forward dynamics"),
+            ("build", "build (s)", "generated"),
+        )
     ),
 ]
 
