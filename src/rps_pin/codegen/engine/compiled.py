@@ -11,6 +11,7 @@ import copy
 import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -37,7 +38,14 @@ from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.simulation import simulate
 from rps_pin.codegen.expressions.functions import UNDER_WRENCHES
 from rps_pin.errors import InputError, SingularityError
-from rps_pin.validation import choice, numbers, positive_number, real_vector, whole_number
+from rps_pin.validation import (
+    choice,
+    numbers,
+    positive_number,
+    read_only,
+    real_vector,
+    whole_number,
+)
 
 _NO_PARAMETERS = "the mechanism was compiled without parameters; name them in compile"
 #: Answers of the Pinocchio engine for one sample, in the order of a function's outputs.
@@ -463,6 +471,10 @@ class CompiledMechanism:
         **options: Any,
     ) -> Array:
         """Return accelerations under actuator forces, (..., nv); see `ClosedLoopModel`."""
+        if self._plain and not (wrenches or options):
+            a, status = self._calls["forward_dynamics"](q, v, tau)
+            if status.__class__ is int and not status:
+                return a  # type: ignore[no-any-return]
 
         def answer(m: ClosedLoopModel, q: Array, v: Array, tau: Array, w: Any) -> Sequence[Any]:
             return (m.forward_dynamics(q, v, tau, wrenches=w),)
@@ -659,6 +671,10 @@ class CompiledMechanism:
         Of order 4, as `Stepper.advance` takes it; the dependent joints are closed, the independent
         ones stay.
         """
+        if duration.__class__ is float and self._plain and not (wrenches or options):
+            *state, status = self._calls["step"](q, v, tau, _length(duration))
+            if status.__class__ is int and not status:
+                return state[0], state[1]
 
         def answer(
             m: ClosedLoopModel, q: Array, v: Array, tau: Array, h: Array, w: Any
@@ -895,6 +911,12 @@ def _checked(errors: Errors, threads: int) -> None:
         choice(errors, "errors", ("raise", "mask"))
     if threads != 1:
         whole_number(threads, "threads")
+
+
+@lru_cache(maxsize=8)
+def _length(duration: float) -> Array:
+    """Return a step's length as a function takes it, (1,); InputError if it is not positive."""
+    return read_only(np.array([positive_number(duration, "duration", "s")]))
 
 
 def _stacked(wrenches: Sequence[ArrayLike]) -> Array:
