@@ -25,7 +25,12 @@ from rps_pin.codegen.calls import Argument, CompiledFunction, Entry
 from rps_pin.codegen.engine.identity import digest
 from rps_pin.codegen.engine.proof import Proof
 from rps_pin.codegen.expressions.functions import MechanismFunctions, is_matrix
-from rps_pin.codegen.expressions.independent import Partition, choose, regular_samples
+from rps_pin.codegen.expressions.independent import (
+    Partition,
+    choose,
+    choose_shared,
+    regular_samples,
+)
 from rps_pin.codegen.expressions.mechanism import MechanismExpressions
 from rps_pin.codegen.expressions.parameters import Parameters
 from rps_pin.codegen.expressions.routines import routines
@@ -107,8 +112,12 @@ class GeneratedCode:
     def functions(self) -> MechanismFunctions:
         """The functions' expressions."""
         system = self.mechanism.system
+        samples = regular_samples(system, self.mechanism.home)
+        shared = choose_shared(system, samples.jacobians)
         return MechanismFunctions(
-            MechanismExpressions(system, self.partition, self.parameters, self.wrench_frames)
+            MechanismExpressions(
+                system, self.partition, self.parameters, self.wrench_frames, shared=shared
+            )
         )
 
     def with_wrenches(self, frames: Sequence[str]) -> GeneratedCode:

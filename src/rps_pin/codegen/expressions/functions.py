@@ -215,12 +215,17 @@ def _inverse_dynamics(x: MechanismExpressions) -> Made:
 
 @_function(wrenches=True)
 def _forward_dynamics(x: MechanismExpressions) -> Made:
+    return _accelerated(x.cheapest)
+
+
+def _accelerated(x: MechanismExpressions) -> Made:
     check = ca.vertcat(x.opening, x.growth + x.inertia_check)
     return {"q": x.q, "v": x.v, "tau": x.tau}, {"a": x.acceleration, "check": check}
 
 
 @_function(wrenches=True)
 def _constraint_forces(x: MechanismExpressions) -> Made:
+    x = x.cheapest
     rest = x.required(x.a)
     rest[x.system.actuated.tolist()] -= x.tau
     rest -= x.least_force(x.reduced(rest)[0])  # what closures cannot carry
@@ -289,7 +294,7 @@ def _by(slopes: InverseSlopes | ForwardSlopes) -> dict[str, Expression]:
 @_function(wrenches=True)
 def _forward_dynamics_derivatives(x: MechanismExpressions) -> Made:
     slopes = Slopes(x)
-    given, results = _MAKERS["forward_dynamics"](x)
+    given, results = _accelerated(x)
     rest = x.required(x.a)
     rest[x.system.actuated.tolist()] -= x.tau
     found = slopes.at(x.reduced(rest)[1], _by(slopes.forward()))
@@ -314,7 +319,7 @@ def _inverse_dynamics_by_parameters(x: MechanismExpressions) -> Made:
 @_function(wrenches=True)
 def _forward_dynamics_by_parameters(x: MechanismExpressions) -> Made:
     slopes = Slopes(x)
-    given, results = _MAKERS["forward_dynamics"](x)
+    given, results = _accelerated(x)
     rest = x.required(x.a)
     rest[x.system.actuated.tolist()] -= x.tau
     change = -x.inertia.solve(slopes.by_parameters()[1])
@@ -350,6 +355,7 @@ def _closing_step(x: MechanismExpressions) -> Made:
 
 @_function()
 def _least_norm_step(x: MechanismExpressions) -> Made:
+    x = x.cheapest
     step = _of_least_norm(x, -x.rows.gap)
     return {"q": x.q}, {"step": step, "squared_gap": x.squared_gap, "growth": x.growth}
 
@@ -357,6 +363,7 @@ def _least_norm_step(x: MechanismExpressions) -> Made:
 @_function()
 def _nearest_step(x: MechanismExpressions) -> Made:
     """Towards a configuration: D^2 T (T' T)^-1 T' g in one unit, g the slope of the distance."""
+    x = x.cheapest
     given = ca.SX.sym("given", x.tree.model.nq)
     per_unit = ca.DM(1 / x.system.column_scale)
     away = per_unit * x.tree.difference(x.q, given)
@@ -377,6 +384,7 @@ def _nearest_step(x: MechanismExpressions) -> Made:
 
 @_function()
 def _projection(x: MechanismExpressions) -> Made:
+    x = x.cheapest
     both = _of_least_norm(x, -ca.horzcat(x.rows.gap, x.rows.jacobian @ x.v))
     results = {"step": both[:, 0], "projected": x.v + both[:, 1]}
     return {"q": x.q, "v": x.v}, results | {"squared_gap": x.squared_gap, "growth": x.growth}
@@ -398,6 +406,7 @@ def _of_least_norm(x: MechanismExpressions, right: Expression) -> Expression:
 
 @_function(wrenches=True)
 def _stage(x: MechanismExpressions) -> Made:
+    x = x.cheapest
     acting = x.external_forces - x.passive_forces + x.springs
     acting[x.system.actuated.tolist()] += x.tau
     growth = x.growth + x.inertia_check
@@ -407,4 +416,5 @@ def _stage(x: MechanismExpressions) -> Made:
 
 @_function()
 def _projected_velocity(x: MechanismExpressions) -> Made:
+    x = x.cheapest
     return {"q": x.q, "v": x.v}, {"projected": _moved(x, x.v[x.independent.tolist()])}

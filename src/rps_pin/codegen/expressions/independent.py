@@ -41,6 +41,8 @@ _NEAR_SINGULAR = 0.1
 _ACCEPTED = 1e5
 #: Condition of J_d up to which a set with more actuated velocities goes before a better one.
 _GOOD = 1e4
+#: Part of the longest row of the motions' bases from which on a velocity is taken as shared.
+_GOOD_PART = 0.05
 #: An actuated velocity goes before others whose part of the motions is at most 1 / this larger.
 _PREFERENCES = (1e-3, 1e-1, 1.0)
 
@@ -277,6 +279,47 @@ def choose(system: ConstraintSystem, jacobians: Array, pattern: Bools | None = N
             break
     assert best is not None
     return best
+
+
+def choose_shared(system: ConstraintSystem, jacobians: Array) -> Partition:
+    """Return independent velocities without which the closures have least in common.
+
+    Those of joints in many closures, as a platform's, go before others: the rest of each closure
+    then follows on its own, with few operations. For what does not depend on the choice: the
+    acceleration, and projections.
+
+    Parameters
+    ----------
+    system, jacobians
+        As for `choose`.
+    """
+    jacobians, idle = _without_noise(jacobians, None)
+    found = rank(singular_values(jacobians[0]))
+    moved = np.abs(jacobians).max(axis=0) > RANK_TOLERANCE
+    closures = [system.equations.rows(closure.name) for closure in system.equations.closures]
+    shared = np.sum([moved[rows].any(axis=0) for rows in closures], axis=0)
+    left = np.array([_motions(jacobian, found) for jacobian in jacobians])
+    chosen: list[int] = []
+    for step in range(left.shape[2]):
+        length = np.linalg.norm(left, axis=2)
+        least = length.min(axis=0)
+        least[chosen] = -1.0
+        at = int(idle[step]) if step < idle.size else _first(shared, least)
+        along = left[:, at] / length[:, at, None]
+        left -= np.einsum("kjm,km->kj", left, along)[:, :, None] * along[:, None]
+        chosen.append(at)
+    independent = np.sort(np.array(chosen, dtype=np.intp))
+    dependent = np.setdiff1d(np.arange(system.model.nv), independent)
+    worst = max(_condition(jacobian[:, dependent]) for jacobian in jacobians)
+    is_actuated = np.array_equal(independent, system.actuated)
+    redundant = system.equations.size - found
+    return Partition(independent, dependent, idle, found, redundant, is_actuated, float(worst))
+
+
+def _first(shared: Array, least: Array) -> int:
+    """Return the velocity in most closures, of those with a good part in the motions left."""
+    good = np.flatnonzero(least >= _GOOD_PART * least.max())
+    return int(max(good, key=lambda j: (shared[j], least[j])))
 
 
 def _without_noise(jacobians: Array, pattern: Bools | None) -> tuple[Array, Indices]:

@@ -15,6 +15,7 @@ scaled to one unit, is factorised once by orthogonal reflections (see `eliminati
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -40,6 +41,8 @@ Expression = Any
 GROWTH = 1e5
 #: The same for the spread of the pivots of T' M T, above which a motion may move no mass.
 SPREAD = 1e12
+#: Condition of J_d at samples up to which other independent velocities are as good.
+_WELL_CONDITIONED = 1e3
 #: Keeps a quotient of two numbers that vanish at zero; not zero in single precision either.
 _NOTHING = 1e-30
 #: Largest check in double and single precision, squared and over that of `GROWTH`: what rounding
@@ -79,6 +82,8 @@ class MechanismExpressions:
         Frames at which external wrenches act.
     single
         Whether the code computes in single precision: what it accepts is wider then.
+    shared
+        Another choice of velocities, for what does not depend on it; see `choose_shared`.
 
     Attributes
     ----------
@@ -95,8 +100,10 @@ class MechanismExpressions:
         parameters: Sequence[str] = (),
         wrench_frames: Sequence[str] = (),
         single: bool = False,
+        shared: Partition | None = None,
     ) -> None:
         self.system = system
+        self._shared = shared
         self._single = single
         #: Opening rate that `acceleration` accepts, relative to the speed; in double precision as
         #: `kinematics` does.
@@ -109,6 +116,22 @@ class MechanismExpressions:
         self.tau = ca.SX.sym("tau", system.actuated.size)
         self.wrench_frames = tuple(wrench_frames)
         self.wrenches = ca.SX.sym("wrenches", 6 * len(self.wrench_frames))
+
+    @cached_property
+    def cheapest(self) -> MechanismExpressions:
+        """These expressions with the independent velocities that take fewer operations.
+
+        For what does not depend on the choice: the acceleration, and projections.
+        """
+        if self._shared is None or not self._shared.condition <= _WELL_CONDITIONED:
+            return self
+        other = copy.copy(self)
+        for name in [
+            name for name, of in vars(type(self)).items() if isinstance(of, cached_property)
+        ]:
+            vars(other).pop(name, None)
+        other.partition = self._shared
+        return min(self, other, key=lambda one: _operations(one.basis, one.drift))
 
     # Closures -------------------------------------------------------------------------------------
 
@@ -315,6 +338,13 @@ class MechanismExpressions:
         inverse = self.inertia.inverse_diagonal.elements()
         largest = sum((ca.fabs(1 / d) for d in inverse), ca.SX(0))
         return largest * sum((ca.fabs(d) for d in inverse), ca.SX(0)) / SPREAD
+
+
+def _operations(*results: Expression) -> int:
+    """Return how many instructions a function with these results has."""
+    whole = ca.cse([ca.densify(result) for result in results])
+    symbols = ca.symvar(ca.veccat(*whole))
+    return int(ca.Function("f", symbols, whole).n_instructions())
 
 
 def _rows_times(factors: Array, rows: Expression) -> Expression:
