@@ -393,13 +393,13 @@ class CompiledMechanism:
         def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
             result = m.inverse_dynamics(q, v, a, wrenches=w)
             lacking = result.unproduced is not None
-            found: list[Any] = [result.tau, result.constraint_forces]
-            found += [np.array([result.residual])]
-            if self._underactuated:
-                found += [result.unproduced if lacking else np.zeros(m.model.nv)]
-                found += [np.array([float(lacking)])]
-            return found
+            found = [result.tau, result.constraint_forces, np.array([result.residual])]
+            unproduced = result.unproduced if lacking else np.zeros(m.model.nv)
+            return [*found, unproduced, np.array([float(lacking)])]
 
+        # Generated code has no such force where there are enough actuators; at singular poses of
+        # more motions the Pinocchio engine has.
+        singular = () if self._underactuated else (self.model.nv, 1)
         tau, multipliers, residual, *rest = self._run(
             "inverse_dynamics",
             (q, v, a),
@@ -408,6 +408,7 @@ class CompiledMechanism:
             parameters=parameters,
             errors=errors,
             threads=threads,
+            more=singular,
         )
         unproduced = None
         if rest:
@@ -740,10 +741,12 @@ class CompiledMechanism:
         errors: Errors = "raise",
         threads: int = 1,
         refused: Callable[[Array], Any] | None = None,
+        more: Sequence[int] = (),
     ) -> Sequence[Any]:
         """Return a function's results, those of flagged samples by the Pinocchio engine.
 
-        `refused` tells of the first result which samples are flagged too.
+        `refused` tells of the first result which samples are flagged too. `more` are the sizes of
+        results that only the Pinocchio engine has: they are returned where a sample is flagged.
         """
         _checked(errors, threads)
         if self._plain and not wrenches and parameters is None:
@@ -756,6 +759,8 @@ class CompiledMechanism:
             status = int(status) if found[0].ndim == 1 else status
         if status.__class__ is int and not status:
             return found  # type: ignore[no-any-return]
+        if more and np.any(status):
+            found = [*found, *(np.zeros((*np.shape(status), size)) for size in more)]
         return self._settled(name, found, status, given, answer, wrenches, parameters, errors)
 
     def _one(
