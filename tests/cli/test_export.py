@@ -53,6 +53,22 @@ def test_options_come_together_as_json(tmp_path: Path) -> None:
     assert "const float wrenches[6], const float parameters[3]" in header
 
 
+def test_a_3_rps_has_its_kinematics_and_computed_torque(tmp_path: Path) -> None:
+    options = ["export", "c", "--robot", "micro", "-o", str(tmp_path)]
+    run = rps_pin(*options, "--functions", "computed_torque", "--functions", "gravity_forces")
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.startswith("3-RPS micro: 2 functions in C99, double precision")
+    header = (tmp_path / "micro.h").read_text("utf-8")
+    assert "int micro_computed_torque(const double length[3], const double speed[3]" in header
+    for more in (["four_bar"], ["--parameters", "gravity"]):
+        found = rps_pin(*options, *more)
+        assert found.returncode == 2
+        assert "Invalid value" in found.stderr
+    found = rps_pin(*options, "--functions", "direct_kinematic")
+    assert found.returncode == 1
+    assert "did you mean direct_kinematics?" in found.stderr
+
+
 def test_a_name_that_c_does_not_take_gives_way_to_the_file_s(tmp_path: Path) -> None:
     run = rps_pin("export", "c", "rps", "-o", str(tmp_path), "--functions", "gaps")
     assert run.returncode == 0, run.stderr

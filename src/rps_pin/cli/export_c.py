@@ -10,6 +10,7 @@ import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
+from rps_pin.cli.completion import names_or_files, preset_names
 from rps_pin.errors import RPSPinError
 
 
@@ -21,10 +22,22 @@ class Real(StrEnum):
 
 
 def export_c_command(
-    file: options.FileArgument,
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Folder for the files; it is made.")
     ],
+    file: options.OptionalFileArgument = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot",
+            "-r",
+            metavar="PRESET|FILE",
+            help="Instead of a mechanism: a 3-RPS by preset or parameter file, with its kinematics "
+            "and computed torque.",
+            show_default=False,
+            autocompletion=names_or_files(preset_names),
+        ),
+    ] = None,
     name: Annotated[
         str | None,
         typer.Option(
@@ -77,6 +90,8 @@ def export_c_command(
 
     - `rps-pin export c delta --output delta_c`
 
+    - `rps-pin export c --robot micro --output micro_c`
+
     - `rps-pin export c mine.yaml -o mine_c --real float --parameters payload:tool`
     """
     try:
@@ -88,21 +103,42 @@ def export_c_command(
             f"code is generated with {error.name}: pip install 'rps-pin[compile]'"
         ) from None
 
-    mechanism, path = options.load_mechanism(file)
-    called = identifier(mechanism.name, path.stem) if name is None else identifier(name)
-    package = mechanism_package(
-        mechanism,
-        name=called,
-        real=real.value,
-        functions=functions or (),
-        frames=frames or (),
-        parameters=parameters or (),
-        wrench_frames=wrench_frames or (),
-    )
+    if (file is None) == (robot is None):
+        raise typer.BadParameter("one of FILE|NAME and --robot is to be given")
+    if file is not None:
+        mechanism, path = options.load_mechanism(file)
+        title = mechanism.name
+        package = mechanism_package(
+            mechanism,
+            name=identifier(title, path.stem) if name is None else identifier(name),
+            real=real.value,
+            functions=functions or (),
+            frames=frames or (),
+            parameters=parameters or (),
+            wrench_frames=wrench_frames or (),
+        )
+    else:
+        if parameters or wrench_frames:
+            raise typer.BadParameter(
+                "--parameters and --wrench-frames are a mechanism's: rps-pin export c rps"
+            )
+        from rps_pin.rps.generated.export import robot_package
+
+        machine = common.load_robot(str(robot))
+        title = f"3-RPS {machine.parameters.name}"
+        package = robot_package(
+            machine,
+            name=identifier(machine.parameters.name, Path(str(robot)).stem)
+            if name is None
+            else identifier(name),
+            real=real.value,
+            functions=functions or (),
+            frames=frames or (),
+        )
     texts = c_files(package)
     files = write_c_files(texts, output, overwrite=overwrite)
     summary = {
-        "mechanism": mechanism.name,
+        "mechanism": title,
         "name": package.name,
         "real": package.real,
         "functions": [one.name for one in package.functions],
@@ -113,8 +149,9 @@ def export_c_command(
         common.print_json(summary | {"files": files})
         return
     console = common.text_console(soft_wrap=True)
+    precision = "single" if package.real == "float" else "double"
     console.print(
-        f"{mechanism.name}: {len(package.functions)} functions in C99, {package.real} precision, "
+        f"{title}: {len(package.functions)} functions in C99, {precision} precision, "
         f"each with {len(package.functions[0].cases)} states in its self-test",
         markup=False,
     )

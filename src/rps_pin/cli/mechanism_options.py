@@ -13,16 +13,15 @@ from rps_pin.cli.completion import MECHANISMS, mechanism_names, names_or_files
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 
-FileArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="FILE|NAME",
-        help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), or the name of one "
-        "that comes with the package, such as **delta**.",
-        show_default=False,
-        autocompletion=names_or_files(mechanism_names),
-    ),
-]
+_FILE = typer.Argument(
+    metavar="FILE|NAME",
+    help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), or the name of one "
+    "that comes with the package, such as **delta**.",
+    show_default=False,
+    autocompletion=names_or_files(mechanism_names),
+)
+FileArgument = Annotated[Path, _FILE]
+OptionalFileArgument = Annotated[Path | None, _FILE]
 
 
 #: Values by joint name, each as ``--tau crank=1.5``; see `by_joint`.

@@ -46,8 +46,9 @@ _BODY = f"""
 """
 
 
-def follow_kernels() -> tuple[Kernel, ...]:
-    """Return the kernels that `FOLLOW` calls."""
+def follow_kernels(single: bool = False) -> tuple[Kernel, ...]:
+    """Return the kernels that `FOLLOW` calls, in double or single precision."""
+    last_step = (continuation.LAST_STEP_SINGLE,) if single else ()
     begin, goal, progress = symbols("begin", 3), symbols("goal", 3), symbols("progress", 3)
     direction, d, at = symbols("direction", 6), symbols("d", 3), symbols("at", 6)
     (g, h), (limit,), (det,) = symbols("radii", 2), symbols("limit", 1), symbols("det", 1)
@@ -58,7 +59,7 @@ def follow_kernels() -> tuple[Kernel, ...]:
     step = continuation.newton_step(d, direction, g, h)
     _, first_det, condition, first_kantorovich, _, _ = step
     trusted = continuation.to_be_trusted(condition, first_kantorovich, limit)
-    refined, condition_there, last, good = continuation.refined(d, at, g, h, limit, det)
+    refined, condition_there, last, good = continuation.refined(d, at, g, h, limit, det, *last_step)
     after, went = continuation.after_step(direction, progress, to, (solved, at, there, kantorovich))
     return (
         kernel(

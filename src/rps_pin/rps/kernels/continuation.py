@@ -38,8 +38,9 @@ Progress = tuple[Number, Number, Number]
 
 #: Largest beta L eta of a step: half of what the theorem asks for.
 TRUST = 0.25
-#: Half a Newton step, rad, after which another would only move rounding errors.
-_LAST_STEP = 1e-9
+#: Half a Newton step, rad, after which another would only move rounding errors; and in single
+#: precision.
+_LAST_STEP, LAST_STEP_SINGLE = 1e-9, 1e-5
 #: Newton steps after which one that has not converged is given up.
 MOST_NEWTON = 12
 _SINGULAR = 1e-300
@@ -105,7 +106,13 @@ def newton_and_chord(d: Three, direction: Direction, g: Number, h: Number, step:
 
 
 def refined(
-    d: Three, at: Direction, g: Number, h: Number, limit: Number, det: Number
+    d: Three,
+    at: Direction,
+    g: Number,
+    h: Number,
+    limit: Number,
+    det: Number,
+    last_step: float = _LAST_STEP,
 ) -> tuple[Direction, Number, Number, Number]:
     """Return directions after a Newton step, condition, whether it was the last, and was good.
 
@@ -113,7 +120,7 @@ def refined(
     """
     t, det_there, there, _, _, _ = newton_step(d, at, g, h)
     # The remaining error is the step's square: below rounding.
-    last = less(eq.largest(t), _LAST_STEP)
+    last = less(eq.largest(t), last_step)
     good = both(there <= limit, less(0.0, det * det_there))
     return turned_legs(at, t), there, last, good
 
