@@ -750,7 +750,8 @@ class CompiledMechanism:
         """
         _checked(errors, threads)
         if self._plain and not wrenches and parameters is None:
-            *found, status = self._calls[name](*given, threads=threads)
+            call = self._calls[name]  # a builtin function, which leaves keywords to Python
+            *found, status = call(*given) if threads == 1 else call(*given, threads=threads)
         else:
             extra = self._extra(name, wrenches, parameters)
             *found, status = self._generated(wrenches)[name](*given, *extra, threads=threads)

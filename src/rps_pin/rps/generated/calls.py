@@ -122,7 +122,7 @@ class RobotCalls:
         if errors not in ("raise", "mask") or not (code.lanes or _are_single(given)):
             return answer(*given, errors)
         try:
-            *found, status = code.functions[name].call(*given, *numbers, threads=self.threads)
+            *found, status = code.functions[name](*given, *numbers, threads=self.threads)
         except InputError:
             return answer(*given, errors)
         if status.__class__ is int:
