@@ -152,13 +152,13 @@ class RPSRobot:
     def compile(self, *, compiler: CompilerName = "auto", threads: int = 1) -> RPSRobot:
         """Build generated code, if it is not built yet, and return this robot, which uses it.
 
-        `inverse_kinematics`, `forward_kinematics` and `actuator_forces` then take a microsecond or
-        two a call, and in batches 10 to 50 times less than before. Their arguments, answers and
-        errors stay: what generated code leaves open (a pose near a limit, a singularity, lengths
-        that are not followed to their end in a few steps), Python's functions answer. One library
-        serves all robots: after this call all robots of this process use it, and those of later
-        processes find it in the cache by themselves (see `engine`), without building anything.
-        ``RPS_PIN_COMPILE=0`` in the environment switches that off.
+        `inverse_kinematics`, `forward_kinematics` and `actuator_forces` then take about two
+        microseconds a call, and in batches 5 to 30 times less than before. Arguments, answers (to
+        rounding) and errors stay: what generated code leaves open, such as a pose near a limit,
+        Python's functions answer, and errors are theirs. One library serves all robots: after this
+        call all robots of this process use it, and those of later processes find it in the cache by
+        themselves (see `engine`), without building anything. ``RPS_PIN_COMPILE=0`` in the
+        environment switches that off.
 
         `inverse_dynamics` without a wrench uses `mechanism.compile()` from this call on: it is
         built for this robot.

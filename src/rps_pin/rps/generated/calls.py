@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 #: Arrays of samples, and which samples are answered.
 Found = tuple[Sequence[Array], Bools | np.bool_]
-#: Python's function, of the samples' arrays and `errors`.
+#: What answers samples that generated code leaves open, of their arrays and `errors`.
 Answer = Callable[..., Found]
 _NO_WRENCH = np.zeros(6)
 
@@ -74,13 +74,21 @@ class RobotCalls:
 
     def forward_kinematics(self, length: ArrayLike, near: ArrayLike, errors: Errors) -> Array:
         """Return poses of leg lengths; see `RPSRobot.forward_kinematics`."""
+        numbers = (self._direct,)
 
-        def answer(length: ArrayLike, near: ArrayLike, errors: Errors) -> Found:
+        def python(length: ArrayLike, near: ArrayLike, errors: Errors) -> Found:
             found = forward_kinematics(length, near, *self._radii, errors=errors)
-            return (found.pose,), found.reached
+            return (found.pose, np.where(found.reached, 1.0, 0.0)[..., None]), found.reached
 
-        given, numbers = (length, near), (self._direct,)
-        (pose,), good = self._settled("forward_kinematics", given, numbers, answer, errors)
+        def in_many_steps(length: ArrayLike, near: ArrayLike, errors: Errors) -> Found:
+            if errors != "mask":
+                found, reached = python(length, near, errors)
+                return found[:1], reached
+            (pose, at_end), _ = self._settled("followed", (length, near), numbers, python, errors)
+            return (pose,), at_end[..., 0] == 1.0
+
+        given, name = (length, near), "forward_kinematics"
+        (pose,), good = self._settled(name, given, numbers, in_many_steps, errors)
         return _masked(pose, good, errors)
 
     def actuator_forces(
@@ -134,7 +142,7 @@ class RobotCalls:
 def _filled(
     found: Sequence[Array], good: Bools, given: Sequence[ArrayLike], answer: Answer, errors: Errors
 ) -> Found:
-    """Return results of all samples, those left open from Python's function."""
+    """Return results of all samples, those left open from `answer`."""
     left = ~good
     if left.all():
         return answer(*given, errors)

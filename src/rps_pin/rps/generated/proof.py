@@ -101,7 +101,7 @@ def prove(functions: Mapping[str, Any], compiler: str) -> dict[str, float]:
     found = _Comparison(compiler)
     for case in cases():
         _inverse(found, functions["inverse_kinematics"], case)
-        _direct(found, functions["forward_kinematics"], case)
+        _direct(found, functions, case)
         _forces(found, functions["actuator_forces"], case)
     return found.worst
 
@@ -129,22 +129,30 @@ def _inverse(found: _Comparison, function: Any, case: Case) -> None:
         found.equal(name, angle[answered], expected[1], 1.0)
 
 
-def _direct(found: _Comparison, function: Any, case: Case) -> None:
-    name, p = "forward_kinematics", case.parameters
+def _direct(found: _Comparison, functions: Mapping[str, Any], case: Case) -> None:
+    """Compare `forward_kinematics`, and `followed`, which also tells lines that are not."""
+    p, used = case.parameters, case.followed
     radii, free = (p.base_radius, p.platform_radius), p.without_limits()
-    used = case.followed
     length, near, plain = case.length[used], case.near[used], case.plain[used]
     right = forward_kinematics(length, near, *radii, errors="mask")
     numbers = np.array([*radii, CONDITION_LIMIT])
     size = np.array([p.platform_radius, 1.0, 1.0])
-    for (pose,), answered, some in _called(function, (length, near), (numbers,)):
-        found.answers(name, answered, right.reached[some], plain[some])
-        sharp = answered & (right.condition[some] <= _POSE_COMPARED)
-        found.equal(name, pose[sharp], right.pose[some][sharp], size)
-        again = inverse_kinematics(free, pose[answered], errors="mask").length
-        wanted = length[some][answered]
-        longest: Array = wanted.max(axis=-1, keepdims=True)
-        found.equal(name, again, wanted, longest)
+    for name in ("forward_kinematics", "followed"):
+        for results, settled, some in _called(functions[name], (length, near), (numbers,)):
+            pose = results[0]
+            answered = settled & (results[1][:, 0] == 1.0) if len(results) > 1 else settled
+            found.answers(name, answered, right.reached[some], plain[some])
+            if (settled & ~answered & right.reached[some]).any():
+                raise CompileError(
+                    f"proof of {name}: a line is not followed that Python's function follows",
+                    found.compiler,
+                )
+            sharp = answered & (right.condition[some] <= _POSE_COMPARED)
+            found.equal(name, pose[sharp], right.pose[some][sharp], size)
+            again = inverse_kinematics(free, pose[answered], errors="mask").length
+            wanted = length[some][answered]
+            longest: Array = wanted.max(axis=-1, keepdims=True)
+            found.equal(name, again, wanted, longest)
 
 
 def _forces(found: _Comparison, function: Any, case: Case) -> None:

@@ -2,7 +2,7 @@
 
 Each ends with an output `check` (2), of which the first is above 1 where the answer needs a closer
 look: a leg beyond its limits or near them, without length, near a singularity, or leg lengths that
-were not followed to their end. There `rps_pin.rps.kinematics` and `rps_pin.rps.dynamics` answer.
+were not followed to an end. There `rps_pin.rps.kinematics` and `rps_pin.rps.dynamics` answer.
 
 Numbers of the robot are inputs: one library serves all robots.
 """
@@ -14,19 +14,21 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from rps_pin.codegen.units import Kernel, Routine, Unit
-from rps_pin.numerics.elementary import Number, atan2, both, least
+from rps_pin.numerics.elementary import Number, atan2, both, least, select_all
 from rps_pin.rps.dynamics.force_equations import ForceTerms
 from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, kernel, symbols
 from rps_pin.rps.generated.forces import TERMS, actuator_forces, is_regular, leg_block, terms_of
 from rps_pin.rps.generated.layout import Layout
 from rps_pin.rps.kernels import continuation, legs, limits, placement, tips
 from rps_pin.rps.kernels.tilt_functions import TiltFunctions, tilt_functions
+from rps_pin.rps.kinematics.forward_kinematics import MOST_STEPS
 from rps_pin.rps.kinematics.leg_equations import ONE_MODE
 from rps_pin.rps.kinematics.legs import VANISHING, cosine_of_cone, cosine_of_half
 from rps_pin.rps.parameters import RPSParameters
 
-#: Steps in which leg lengths are followed here; those that take more are left to Python.
-MOST_STEPS = 60
+#: Steps in which most leg lengths are followed; the few that take more are followed again, apart
+#: from the others, so that these need not wait for them.
+FEW_STEPS = 20
 #: A length that no leg has: generated code takes finite numbers.
 _FAR = 1e50
 #: Radii, and what limits are made of: see `limits_of`.
@@ -37,6 +39,7 @@ LIMITS = Layout(
 ARGUMENTS: Mapping[str, tuple[Mapping[str, int], Mapping[str, int]]] = {
     "inverse_kinematics": ({"pose": 3, "numbers": LIMITS.size}, {"length": 3, "angle": 3}),
     "forward_kinematics": ({"length": 3, "near": 3, "numbers": 3}, {"pose": 3}),
+    "followed": ({"length": 3, "near": 3, "numbers": 3}, {"pose": 3, "reached": 1}),
     "actuator_forces": (
         {
             **{"pose": 3, "rate": 3, "acceleration": 3, "wrench": 6},
@@ -183,45 +186,67 @@ def start_kernel() -> Kernel:
 
 
 def end_kernel() -> Kernel:
-    """Return the pose at the end, and whether it is one."""
-    length, numbers = symbols("length", 3), symbols("numbers", 3)
+    """Return the pose at the end, or the last one reached, and which of both it is."""
+    length, begin, numbers = symbols("length", 3), symbols("begin", 3), symbols("numbers", 3)
     direction, progress, good = symbols("direction", 6), symbols("progress", 3), symbols("good", 1)
     g, h, _ = numbers
-    rho = (
-        g - length[0] * direction[0],
-        g - length[1] * direction[1],
-        g - length[2] * direction[2],
-    )
-    height = (length[0] * direction[3], length[1] * direction[4], length[2] * direction[5])
+    done = progress[0]
+    part = [one + done * (other - one) for one, other in zip(begin, length, strict=True)]
+    there = select_all(done >= 1.0, length, (part[0], part[1], part[2]))
+    rho = (g - there[0] * direction[0], g - there[1] * direction[1], g - there[2] * direction[2])
+    height = (there[0] * direction[3], there[1] * direction[4], there[2] * direction[5])
     _, u, v = placement.platform_axes(rho, height, h)
-    reached = both(good[0], progress[0] >= 1.0)
-    reached = both(reached, both(u[0] + v[1] >= -ONE_MODE, least(*length) > 0.0))
+    good_pose = both(good[0], both(u[0] + v[1] >= -ONE_MODE, least(*length) > 0.0))
     return kernel(
         "direct_end",
         {
             "length": length,
+            "begin": begin,
             "numbers": numbers,
             "direction": direction,
             "progress": progress,
             "good": good,
         },
-        {"pose": placement.pose_of_legs(length, direction, g, h), "check": _check(reached)},
+        {
+            "pose": placement.pose_of_legs(there, direction, g, h),
+            "reached": (done >= 1.0,),
+            "check": _check(good_pose),
+        },
     )
 
 
+def _direct(most: int) -> str:
+    """Return the C that follows lengths in so many steps."""
+    return f"""
+    REAL begin[3], start[6], good[1], direction[6], progress[3], most[1];
+    most[0] = CONST({most});
+    direct_start(near, numbers, begin, start, good);
+    {FOLLOW.name}(begin, start, length, numbers, numbers + 2, most, direction, progress);
+    direct_end(length, begin, numbers, direction, progress, good, pose, reached, check);
+"""
+
+
+_OF_DIRECT = (("length", 3), ("near", 3), ("numbers", 3))
+_CALLED = ("direct_start", FOLLOW.name, "direct_end")
 #: The pose of leg lengths that continues another; numbers are g, h and the limit of the condition.
 DIRECT = Routine(
     "forward_kinematics",
-    (("length", 3), ("near", 3), ("numbers", 3)),
+    _OF_DIRECT,
     (("pose", 3), ("check", 2)),
     f"""
-    REAL begin[3], start[6], good[1], direction[6], progress[3], most[1];
-    most[0] = CONST({MOST_STEPS});
-    direct_start(near, numbers, begin, start, good);
-    {FOLLOW.name}(begin, start, length, numbers, numbers + 2, most, direction, progress);
-    direct_end(length, numbers, direction, progress, good, pose, check);
+    REAL reached[1];
+    {_direct(FEW_STEPS).strip()}
+    check[0] = SELECT(reached[0], check[0], CONST(2.0));
 """,
-    ("direct_start", FOLLOW.name, "direct_end"),
+    _CALLED,
+)
+#: The same in many steps; and whether the lengths are reached, or the pose is the last before that.
+FOLLOWED = Routine(
+    "followed",
+    _OF_DIRECT,
+    (("pose", 3), ("reached", 1), ("check", 2)),
+    _direct(MOST_STEPS),
+    _CALLED,
 )
 
 
@@ -229,4 +254,4 @@ def robot_unit() -> Unit:
     """Return all functions as one unit."""
     kernels = (inverse_kernel(), forces_kernel(), *follow_kernels(), start_kernel(), end_kernel())
     entries = tuple(ARGUMENTS)
-    return Unit("rps", kernels, (FOLLOW, DIRECT), entries, frozenset(entries))
+    return Unit("rps", kernels, (FOLLOW, DIRECT, FOLLOWED), entries, frozenset(entries))

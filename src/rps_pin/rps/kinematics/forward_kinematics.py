@@ -32,7 +32,7 @@ from rps_pin.validation import one_shape, positive_number, real_vector, whole_nu
 CONDITION_LIMIT = 1e6
 #: Steps tried before a line counts as ending in a singularity: towards one, each step covers about
 #: a tenth of what is left.
-_MOST_STEPS = 1000
+MOST_STEPS = 1000
 _SQRT3 = math.sqrt(3.0)
 
 
@@ -306,7 +306,7 @@ def follow_many(
         condition = np.array(newton_step(begin, tuple(direction), *radii)[2])
         done, share = np.zeros_like(condition), np.ones_like(condition)
         going = np.flatnonzero(condition <= limit)
-        for _ in range(_MOST_STEPS):
+        for _ in range(MOST_STEPS):
             if not len(going):
                 break
             found, progress = follow_legs(
