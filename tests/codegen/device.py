@@ -38,6 +38,8 @@ def host_library(text: str, folder: Path, flags: Sequence[str] = ()) -> ctypes.C
 class DeviceArray(np.ndarray[Any, Any]):
     """An array on the card: no array of NumPy's own type passes for it."""
 
+    __cuda_array_interface__: Any = {}
+
 
 class CompileException(Exception):  # noqa: N818
     """What NVRTC refuses."""

@@ -61,8 +61,9 @@ class DeviceFunction:
     """An entry point of a unit on the device.
 
     ``outputs, status = f(inputs)`` with inputs of shape (size,), the same for all samples, or
-    (n, size), in any memory layout; numbers of `_SCALARS` have shape () or (n,). What is no array
-    of CuPy is copied to the device. Outputs have shape (n, size), or (size,) if no input has
+    (n, size), in any memory layout; numbers of `_SCALARS` have shape () or (n,). Arrays on the
+    device of other libraries (``__cuda_array_interface__``) are taken as they are, everything else
+    is copied to it. Outputs have shape (n, size), or (size,) if no input has
     samples; their entries lie apart and neighbouring samples side by side, as is fastest.
 
     Parameters
@@ -136,7 +137,9 @@ class DeviceFunction:
         self._kernel((blocks,), (THREADS,), (*arguments, status))
 
     def _given(self, value: Any, name: str, size: int) -> Any:
-        if not isinstance(value, self._cupy.ndarray):
+        if hasattr(value, "__cuda_array_interface__"):
+            value = self._cupy.asarray(value)
+        else:
             value = self._cupy.asarray(numbers(value, name, _shape(name, size)), dtype=self.dtype)
         self._check_type(value, name)
         alone: tuple[int, ...] = () if name in _SCALARS else (size,)

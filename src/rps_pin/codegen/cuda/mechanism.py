@@ -69,10 +69,10 @@ class CudaMechanism:
     """Generated CUDA of a mechanism; made by ``ClosedLoopModel.compile(device="cuda")``.
 
     Methods have the names and arguments of `ClosedLoopModel` for n samples at once. Array arguments
-    have shape (n, size), or (size,) for the same numbers in all samples. What is no array of CuPy
-    is copied to the card at each call. Any memory layout will do; the fastest, in which results
-    come too, has neighbouring samples side by side: `array` makes it, and ``x.T`` is an x of shape
-    (size, n) in it, without a copy.
+    have shape (n, size), or (size,) for the same numbers in all samples. Arrays on the card of
+    other libraries are taken as CuPy's; what is not on the card is copied to it at each call. Any
+    memory layout will do; the fastest, in which results come too, has neighbouring samples side by
+    side: `array` makes it, and ``x.T`` is an x of shape (size, n) in it, without a copy.
 
     All methods take four options:
 
@@ -280,10 +280,10 @@ class CudaMechanism:
 
     def _refuse(self, name: str, q: Any, status: Any, parameters: Any) -> None:
         """Raise if there are samples without an answer; what the first one lacks."""
+        if not bool(status.any()):
+            return
         flags = np.atleast_1d(self._cupy.asnumpy(status))
         failed = np.flatnonzero(flags)
-        if not failed.size:
-            return
         first = int(failed[0])
         named = ", ".join(map(str, failed[:5])) + (", ..." if failed.size > 5 else "")
         text = f"{name}: {failed.size} of {flags.size} samples have no answer ({named}). Sample "
