@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import mkdtemp
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def host_library(text: str, folder: Path, flags: Sequence[str] = ()) -> ctypes.C
 class DeviceArray(np.ndarray[Any, Any]):
     """An array on the card: no array of NumPy's own type passes for it."""
 
-    __cuda_array_interface__: Any = {}
+    __cuda_array_interface__: ClassVar[dict[str, Any]] = {}
 
 
 class CompileException(Exception):  # noqa: N818

@@ -7,10 +7,10 @@ from rps_pin.codegen.expressions.mechanism import LIMITS
 from rps_pin.codegen.expressions.routines import routines
 from rps_pin.codegen.units import Kernel, Routine, Unit
 
-#: About the largest number of statements of one function of CUDA. A function that is called, and
-#: not a part of its caller, keeps in local memory what others need; ptxas spills less than that
-#: out of whole functions of up to as many statements.
-CHUNK = 2000
+#: About the largest number of statements of one function of CUDA. Values that cross from one
+#: function to the next lie in local memory, and ptxas spills less than that out of one function;
+#: its time stays in proportion to the size so far.
+CHUNK = 8000
 #: The functions, of which `motion` is many steps in one launch.
 NAMES = ("inverse_dynamics", "forward_dynamics", "step", "motion")
 
