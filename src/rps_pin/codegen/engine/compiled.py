@@ -389,6 +389,12 @@ class CompiledMechanism:
         threads: int = 1,
     ) -> GeneratedForces:
         """Return the forces of motions; see `ClosedLoopModel.inverse_dynamics`."""
+        usual = threads == 1 and errors == "raise" and not self._underactuated
+        if usual and self._plain and not wrenches and parameters is None:
+            tau, multipliers, residual, status = self._calls["inverse_dynamics"](q, v, a)
+            if status.__class__ is int and not status:
+                where = self, np.array(q, dtype=np.float64), None
+                return GeneratedForces(tau, multipliers, residual, None, where)
 
         def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
             result = m.inverse_dynamics(q, v, a, wrenches=w)
