@@ -42,7 +42,7 @@ def load_mechanism(file: Path) -> tuple[ClosedLoopModel, Path]:
         If there is no mechanism of that name (lists those there are), or the suffix is of neither
         kind; says what a URDF lacks.
     """
-    if not (file.suffix or file.exists()):
+    if not (file.suffix or file.is_file()):
         names = mechanism_names()
         if str(file) not in names:
             raise InputError(
