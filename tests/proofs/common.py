@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
+import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin import ClosedLoopModel
+from rps_pin.codegen.build import tcc
 from tests.reference import jets
 from tests.reference.newton_euler import Jet
 
@@ -22,6 +26,25 @@ URDF = Path(__file__).resolve().parents[2] / "urdf"
 def loaded(name: str) -> ClosedLoopModel:
     """The mechanism of a file in urdf/."""
     return ClosedLoopModel.load(URDF / f"{name}.yaml")
+
+
+#: The engines that a proof goes through.
+ENGINES = ("pinocchio", "generated")
+both_engines = pytest.mark.parametrize("engine", ENGINES)
+
+
+@cache
+def through(engine: str, mechanism: ClosedLoopModel) -> Any:
+    """The mechanism, or the same in generated code; quickly built, and compared at each build."""
+    if engine == "pinocchio":
+        return mechanism
+    return mechanism.compile(compiler="tcc" if tcc.is_here() else "auto", functions="dynamics")
+
+
+@cache
+def loaded_in(engine: str, name: str) -> Any:
+    """The mechanism of a file in urdf/, in an engine; once for all tests of a process."""
+    return through(engine, loaded(name))
 
 
 def swing(centre: ArrayLike, reach: ArrayLike, rates: ArrayLike, count: int = 12) -> Iterator[Jet]:

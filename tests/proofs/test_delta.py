@@ -15,6 +15,7 @@ ARMS = [f"arm_{i}_joint" for i in (1, 2, 3)]
 CENTRE, REACH, RATES = [0.01, -0.02, -0.55], [0.12, 0.1, 0.08], [6.0, 5.0, 7.0]
 
 every_delta = pytest.mark.parametrize("name", ["delta", "delta_rods"])
+both_engines = common.both_engines
 
 
 def state(mechanism: ClosedLoopModel, position: Jet) -> common.State:
@@ -23,9 +24,10 @@ def state(mechanism: ClosedLoopModel, position: Jet) -> common.State:
     return common.state(mechanism, own, ("platform_joint", position, jets.constant(np.eye(3))))
 
 
+@both_engines
 @every_delta
-def test_closes_from_rough_guesses(name: str) -> None:
-    mechanism = common.loaded(name)
+def test_closes_from_rough_guesses(name: str, engine: str) -> None:
+    mechanism = common.loaded_in(engine, name)
     lengths = [getattr(closure, "distance", None) or 0.0 for closure in mechanism.closures]
     for guess in common.guesses(mechanism, 0.15, 10):
         q = mechanism.close(guess)
@@ -33,10 +35,11 @@ def test_closes_from_rough_guesses(name: str) -> None:
         assert np.abs(common.distances(mechanism, q) - lengths).max() <= 1e-12
 
 
+@both_engines
 @every_delta
-def test_direct_kinematics_is_where_three_spheres_meet(name: str) -> None:
+def test_direct_kinematics_is_where_three_spheres_meet(name: str, engine: str) -> None:
     """And the platform only translates."""
-    mechanism = common.loaded(name)
+    mechanism = common.loaded_in(engine, name)
     rng = np.random.default_rng(1)
     for _ in range(10):
         arms = rng.uniform(-0.3, 0.8, size=3)
@@ -49,9 +52,10 @@ def test_direct_kinematics_is_where_three_spheres_meet(name: str) -> None:
         np.testing.assert_allclose(platform.rotation, np.eye(3), rtol=0, atol=1e-10)
 
 
+@both_engines
 @every_delta
-def test_dynamics_along_a_motion(name: str) -> None:
-    mechanism = common.loaded(name)
+def test_dynamics_along_a_motion(name: str, engine: str) -> None:
+    mechanism = common.loaded_in(engine, name)
     for curve in common.swing(CENTRE, REACH, RATES):
         q, v, a = state(mechanism, curve)
         common.check_motion(mechanism, q, v, a)
@@ -59,9 +63,10 @@ def test_dynamics_along_a_motion(name: str) -> None:
         common.check_forces(mechanism, q, v, a, delta.torques(*motion, rods=name == "delta_rods"))
 
 
-def test_rods_pull_as_lagrange_says() -> None:
+@both_engines
+def test_rods_pull_as_lagrange_says(engine: str) -> None:
     """The multipliers are the rods' tensions; those of a pair add up to that of one rod between."""
-    mechanism = common.loaded("delta")
+    mechanism = common.loaded_in(engine, "delta")
     for curve in common.swing(CENTRE, REACH, RATES):
         q, v, a = state(mechanism, curve)
         found = mechanism.inverse_dynamics(q, v, a)
@@ -80,9 +85,10 @@ def test_rods_pull_as_lagrange_says() -> None:
             assert sum(pair) == pytest.approx(-push[i], abs=1e-9 * np.abs(push).max())
 
 
-def test_the_jacobian_of_the_platform() -> None:
+@both_engines
+def test_the_jacobian_of_the_platform(engine: str) -> None:
     """dP/d(arms), whose inverse the closed form gives; no rotation."""
-    mechanism = common.loaded("delta")
+    mechanism = common.loaded_in(engine, "delta")
     for curve in common.swing(CENTRE, REACH, RATES):
         q, _, _ = state(mechanism, curve)
         still = np.zeros(3)

@@ -95,17 +95,19 @@ def check_legs(q: Array, tau: Array, forces: Array) -> None:
     np.testing.assert_allclose(tau, needed, rtol=0, atol=1e-9 * max(1.0, np.abs(tau).max()))
 
 
-def test_closes_from_rough_guesses() -> None:
-    mechanism = quadruped()
+@common.both_engines
+def test_closes_from_rough_guesses(engine: str) -> None:
+    mechanism = common.through(engine, quadruped())
     for guess in common.guesses(mechanism, 0.15, 8):
         q = mechanism.close(guess)
         assert mechanism.loop_gap(q) <= 1e-12
         assert common.distances(mechanism, q).max() <= 1e-12
 
 
-def test_body_can_move_six_ways() -> None:
+@common.both_engines
+def test_body_can_move_six_ways(engine: str) -> None:
     """And every motion of the body moves the legs as the inverse of each leg's Jacobian says."""
-    mechanism, (q, _, _) = quadruped(), still()
+    mechanism, (q, _, _) = common.through(engine, quadruped()), still()
     robot, _ = standing()
     data = robot.createData()
     basis = mechanism.motion_basis(q, ["root_joint"])
@@ -131,8 +133,9 @@ def least_norm(q: Array) -> Array:
     return np.linalg.pinv(motions[6:].T) @ (motions.T @ weight)
 
 
-def test_stands_by_the_least_norm_torques() -> None:
-    mechanism = quadruped()
+@common.both_engines
+def test_stands_by_the_least_norm_torques(engine: str) -> None:
+    mechanism = common.through(engine, quadruped())
     for guess in common.guesses(mechanism, 0.05, 5):
         q = mechanism.close(guess)
         tau = least_norm(q)
@@ -144,9 +147,10 @@ def test_stands_by_the_least_norm_torques() -> None:
         check_legs(q, tau, forces)
 
 
-def test_sinks_without_torques() -> None:
+@common.both_engines
+def test_sinks_without_torques(engine: str) -> None:
     """The legs give way; the body goes down, slower than it would fall, and the feet stay."""
-    mechanism, (q, v, _) = quadruped(), still()
+    mechanism, (q, v, _) = common.through(engine, quadruped()), still()
     pull = mechanism.forward_dynamics(q, v, np.zeros(12))
     assert -GRAVITY < pull[2] < -0.5
     np.testing.assert_allclose(mechanism.loop_errors(q, v, pull).acceleration, 0.0, atol=1e-10)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from functools import cache
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -33,6 +34,7 @@ from tests.closed_loop.random_mechanisms import (
     mechanical_energy,
     worst_error,
 )
+from tests.proofs import common
 
 Array = NDArray[np.float64]
 
@@ -53,13 +55,33 @@ def drawn(seed: int, planar: bool) -> Case:
 everywhere = pytest.mark.parametrize("planar", [False, True], ids=["spatial", "planar"])
 
 
+#: A few are built in generated code, too: of each set of options one.
+few = pytest.mark.parametrize("seed", range(8))
+
+
 @everywhere
 @given(seeds)
 def test_kkt_conditions(planar: bool, seed: int) -> None:
     """S' tau + J' lambda = F, J v = 0 and J a + J' v = 0, J and its derivative by differences."""
     c = drawn(seed, planar)
+    check_kkt_conditions(c, c.mechanism)
+
+
+@everywhere
+@few
+def test_kkt_conditions_in_generated_code(planar: bool, seed: int) -> None:
+    c = drawn(seed, planar)
+    check_kkt_conditions(c, generated(c))
+
+
+def generated(c: Case) -> Any:
+    """Its mechanism in generated code."""
+    return common.through("generated", c.mechanism)
+
+
+def check_kkt_conditions(c: Case, engine: Any) -> None:
     mechanism, model = c.mechanism, c.mechanism.model
-    found = mechanism.inverse_dynamics(c.q, c.v, c.a, wrenches=c.wrenches)
+    found = engine.inverse_dynamics(c.q, c.v, c.a, wrenches=c.wrenches)
     jacobian = gap_slope(mechanism, c.q)
     rest = force_of_bodies(c, c.v, c.a)
     size = max(np.abs(rest).max(), np.abs(found.constraint_forces).max())
@@ -90,8 +112,19 @@ def test_closures_do_no_work_and_the_rest_changes_the_energy(planar: bool, seed:
     The rate by differences along a motion that has q, v and a at its beginning.
     """
     c = drawn(seed, planar)
+    check_power(c, c.mechanism)
+
+
+@everywhere
+@few
+def test_power_in_generated_code(planar: bool, seed: int) -> None:
+    c = drawn(seed, planar)
+    check_power(c, generated(c))
+
+
+def check_power(c: Case, engine: Any) -> None:
     mechanism, model = c.mechanism, c.mechanism.model
-    found = mechanism.inverse_dynamics(c.q, c.v, c.a, wrenches=c.wrenches)
+    found = engine.inverse_dynamics(c.q, c.v, c.a, wrenches=c.wrenches)
     forces = mechanism.jacobian(c.q).T @ found.constraint_forces
     size = np.abs(found.constraint_forces).max() * max(1, np.abs(c.v).max())
     assert abs(forces @ c.v) <= 1e-9 * max(1, size)
@@ -115,7 +148,17 @@ def test_closures_do_no_work_and_the_rest_changes_the_energy(planar: bool, seed:
 @given(seeds)
 def test_inverse_and_forward_dynamics_undo_each_other(planar: bool, seed: int) -> None:
     c = drawn(seed, planar)
-    mechanism = c.mechanism
+    check_there_and_back(c, c.mechanism, seed)
+
+
+@everywhere
+@few
+def test_there_and_back_in_generated_code(planar: bool, seed: int) -> None:
+    c = drawn(seed, planar)
+    check_there_and_back(c, generated(c), seed)
+
+
+def check_there_and_back(c: Case, mechanism: Any, seed: int) -> None:
     tau = mechanism.inverse_dynamics(c.q, c.v, c.a, wrenches=c.wrenches).tau
     there = mechanism.forward_dynamics(c.q, c.v, tau, wrenches=c.wrenches)
     assert worst_error(there, c.a) < 1e-9

@@ -83,10 +83,11 @@ def moments(values: Sequence[float], rate: float = 0.0, pull: float = 0.0) -> li
     return [Jet(np.array([x]), np.array([rate]), np.array([pull])) for x in values]
 
 
+@common.both_engines
 @every_variant
-def test_closes_from_rough_guesses(make: Callable[[], ClosedLoopModel]) -> None:
+def test_closes_from_rough_guesses(make: Callable[[], ClosedLoopModel], engine: str) -> None:
     """Near a closed configuration, but off by tenths of radians and decimetres."""
-    mechanism, rng = make(), np.random.default_rng(0)
+    mechanism, rng = common.through(engine, make()), np.random.default_rng(0)
     q, _, _ = state(mechanism, moments([0.5])[0])
     for _ in range(30):
         closed = mechanism.close(q + rng.normal(scale=0.3, size=q.size))
@@ -95,9 +96,10 @@ def test_closes_from_rough_guesses(make: Callable[[], ClosedLoopModel]) -> None:
         np.testing.assert_allclose(piston[1:], [0.0, slider_crank.HEIGHT], rtol=0, atol=1e-12)
 
 
+@common.both_engines
 @every_variant
-def test_stroke_over_a_whole_turn(make: Callable[[], ClosedLoopModel]) -> None:
-    mechanism = make()
+def test_stroke_over_a_whole_turn(make: Callable[[], ClosedLoopModel], engine: str) -> None:
+    mechanism = common.through(engine, make())
     q, _, _ = state(mechanism, moments([-3.0])[0])
     for curve in moments(np.linspace(-3.0, 3.0, 61)):
         q = mechanism.complete({"crank_joint": curve.value[0]}, q)
@@ -106,9 +108,10 @@ def test_stroke_over_a_whole_turn(make: Callable[[], ClosedLoopModel]) -> None:
         np.testing.assert_allclose(piston, expected, rtol=0, atol=1e-12)
 
 
+@common.both_engines
 @every_variant
-def test_dynamics_along_a_motion(make: Callable[[], ClosedLoopModel]) -> None:
-    mechanism = make()
+def test_dynamics_along_a_motion(make: Callable[[], ClosedLoopModel], engine: str) -> None:
+    mechanism = common.through(engine, make())
     for curve in common.swing(0.4, 3.0, 4.0, count=25):
         q, v, a = state(mechanism, curve)
         common.check_motion(mechanism, q, v, a)
@@ -118,9 +121,10 @@ def test_dynamics_along_a_motion(make: Callable[[], ClosedLoopModel]) -> None:
         common.check_forces(mechanism, q, v, a, expected)
 
 
-def test_the_guide_pushes_as_lagrange_says() -> None:
+@common.both_engines
+def test_the_guide_pushes_as_lagrange_says(engine: str) -> None:
     """On the piston, upwards; frame a of the closure is the guide, and feels the opposite."""
-    mechanism = on_line()
+    mechanism = common.through(engine, on_line())
     absolute = np.array([[1.0, 0], [1, 1]])
     for curve in common.swing(0.4, 3.0, 4.0):
         q, v, a = state(mechanism, curve)

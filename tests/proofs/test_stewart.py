@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -16,9 +18,9 @@ Array = NDArray[np.float64]
 DRIVES = [f"leg_{i}_rod_joint" for i in range(1, 7)]
 
 
-@pytest.fixture(scope="module")
-def mechanism() -> ClosedLoopModel:
-    return common.loaded("stewart")
+@pytest.fixture(scope="module", params=common.ENGINES)
+def mechanism(request: pytest.FixtureRequest) -> Any:
+    return common.loaded_in(request.param, "stewart")
 
 
 def turned(curve: Array) -> Array:
@@ -127,5 +129,5 @@ def test_mujoco_has_the_same_reduced_mass_matrix_and_bias(mechanism: ClosedLoopM
         np.testing.assert_allclose(found, bias, rtol=0, atol=1e-9 * np.abs(tau).max())
 
 
-def test_describes_a_mobility_of_six(mechanism: ClosedLoopModel) -> None:
-    common.check_description(mechanism, rows=18, rank=18, mobility=6)
+def test_describes_a_mobility_of_six() -> None:
+    common.check_description(common.loaded("stewart"), rows=18, rank=18, mobility=6)

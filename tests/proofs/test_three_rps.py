@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -18,9 +19,9 @@ Array = NDArray[np.float64]
 ROBOT = RPSRobot.from_preset("sokolov")
 
 
-@pytest.fixture(scope="module")
-def mechanism() -> ClosedLoopModel:
-    return common.loaded("rps")
+@pytest.fixture(scope="module", params=common.ENGINES)
+def mechanism(request: pytest.FixtureRequest) -> Any:
+    return common.loaded_in(request.param, "rps")
 
 
 def motions(count: int = 15) -> Iterator[tuple[Array, Array, Array]]:
@@ -29,7 +30,8 @@ def motions(count: int = 15) -> Iterator[tuple[Array, Array, Array]]:
         yield curve.value, curve.first, curve.second
 
 
-def test_is_the_mechanism_of_the_preset(mechanism: ClosedLoopModel) -> None:
+def test_is_the_mechanism_of_the_preset() -> None:
+    mechanism = common.loaded("rps")
     other = ROBOT.mechanism
     assert mechanism.model == other.model
     assert mechanism.closures == other.closures
@@ -74,5 +76,5 @@ def test_dynamics_along_a_motion(mechanism: ClosedLoopModel) -> None:
         np.testing.assert_allclose(found, expected.reactions, rtol=0, atol=1e-9 * size)
 
 
-def test_describes_a_mobility_of_three(mechanism: ClosedLoopModel) -> None:
-    common.check_description(mechanism, rows=9, rank=9, mobility=3)
+def test_describes_a_mobility_of_three() -> None:
+    common.check_description(common.loaded("rps"), rows=9, rank=9, mobility=3)

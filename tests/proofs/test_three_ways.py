@@ -15,6 +15,7 @@ from rps_pin.paper.lagrange import lagrange_forces
 from rps_pin.paper.virtual_work import virtual_work_forces
 from rps_pin.rps.motion.time_optimal import time_optimal
 from rps_pin.rps.motion.trajectory_file import load_trajectory
+from tests.proofs import common
 from tests.reference import newton_euler as ne
 from tests.strategies import Motion, random_motions, random_parameters
 from tests.worst import worst
@@ -38,18 +39,23 @@ HELICES = {
 }
 
 
-def by_constraints(robot: RPSRobot, motion: Motion) -> tuple[Array, Array]:
+def by_constraints(robot: RPSRobot, motion: Motion, engine: str) -> tuple[Array, Array]:
     """Forces (n, 3) by constraint models, and the condition numbers (n,)."""
+    if engine == "generated":
+        whole = common.through(engine, robot.mechanism).inverse_dynamics(*robot.state(*motion))
+        return whole.tau, whole.condition
     solved = [robot.inverse_dynamics(*x) for x in zip(*robot.state(*motion), strict=True)]
     return np.array([one.tau for one in solved]), np.array([one.condition for one in solved])
 
 
-def disagreements(robot: RPSRobot, motion: Motion) -> tuple[dict[str, float], int]:
+def disagreements(
+    robot: RPSRobot, motion: Motion, engine: str = "pinocchio"
+) -> tuple[dict[str, float], int]:
     """Largest difference between any two ways over the state's force; how many states are left out.
 
     Left out are states near singularities.
     """
-    tau, condition = by_constraints(robot, motion)
+    tau, condition = by_constraints(robot, motion, engine)
     kept = condition <= WELL_CONDITIONED
     chosen = tuple(x[kept] for x in motion)
     p = robot.parameters
@@ -90,13 +96,14 @@ def test_three_ways_agree_on_2500_states_of_50_random_robots(
     assert len(largest) == 6
 
 
+@common.both_engines
 @pytest.mark.parametrize("branch", ["+", "-"])
 @pytest.mark.parametrize("name", HELICES)
-def test_three_ways_agree_along_helices(name: str, branch: str) -> None:
+def test_three_ways_agree_along_helices(name: str, branch: str, engine: str) -> None:
     preset, radius, pitch, height = HELICES[name]
     robot = RPSRobot.from_preset(preset)
     path = helix(robot, radius=radius, pitch=pitch, height=height, branch=branch)
-    apart, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)))
+    apart, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)), engine)
     print({key: f"{value:.1e}" for key, value in apart.items()}, f"skipped: {skipped}")
     assert skipped <= 5
     assert {key: value for key, value in apart.items() if not value < AGREEMENT} == {}
@@ -111,7 +118,7 @@ def test_three_ways_agree_along_every_trajectory_the_documentation_shows(
     path = load_trajectory(file, robot)
     if fastest:
         path = time_optimal(robot, path)
-    apart, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)))
+    apart, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)), engine)
     assert skipped == 0
     assert {key: value for key, value in apart.items() if not value < AGREEMENT} == {}
 

@@ -138,9 +138,10 @@ def bar_needs(q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
     return force, moment, q[14:17] + R @ COM
 
 
-def test_closes_from_rough_guesses() -> None:
+@common.both_engines
+def test_closes_from_rough_guesses(engine: str) -> None:
     """Both hands are where the bar's ends are, each found by its arm alone."""
-    mechanism = two_arms()
+    mechanism = common.through(engine, two_arms())
     for guess in common.guesses(mechanism, 0.3, 8):
         q = mechanism.close(guess)
         assert mechanism.loop_gap(q) <= 1e-12
@@ -169,10 +170,12 @@ def test_bar_moves_as_either_arm_moves_it() -> None:
     assert mechanism.allowed_motions(q).shape == (20, 8)
 
 
+@common.both_engines
 @pytest.mark.parametrize("speed", [0.0, 1.0])
-def test_forward_dynamics_of_the_least_norm_torques(speed: float) -> None:
+def test_forward_dynamics_of_the_least_norm_torques(speed: float, engine: str) -> None:
     """Static and moving; and whatever the torques, the bodies balance in the motion they give."""
-    mechanism, rng = two_arms(), np.random.default_rng(7)
+    mechanism = common.through(engine, two_arms())
+    rng = np.random.default_rng(7)
     for seed in range(5):
         q, v, a = closed_state(seed, speed)
         tau = least_norm(q, v, a)
@@ -184,9 +187,11 @@ def test_forward_dynamics_of_the_least_norm_torques(speed: float) -> None:
         check_balance(q, v, moved, other, mechanism.constraint_forces(q, v, moved, other))
 
 
-def test_six_ways_to_squeeze_the_bar() -> None:
+@common.both_engines
+def test_six_ways_to_squeeze_the_bar(engine: str) -> None:
     """14 - 8 torques do no work: the arms press against each other, and nothing moves."""
-    mechanism, rng = two_arms(), np.random.default_rng(8)
+    mechanism = common.through(engine, two_arms())
+    rng = np.random.default_rng(8)
     q, v, a = closed_state(3)
     motions, _ = reduced_equations(q, v, a)
     squeezes = null_space(motions[:14].T, rcond=1e-10)

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.closures import Closure
+from rps_pin.closed_loop.constraints.equations import LoopErrors
 from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.dynamics.derivatives import (
     ForwardDynamicsDerivatives,
@@ -27,17 +28,19 @@ from rps_pin.closed_loop.dynamics.derivatives import (
     Linearisation,
     linearisation,
 )
+from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.stepper import Stepper
 from rps_pin.codegen.engine.applied import with_parameters
 from rps_pin.codegen.engine.batches import Errors, by_samples, settled
-from rps_pin.codegen.engine.forces import GeneratedForces
+from rps_pin.codegen.engine.forces import GeneratedForces, each
 from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.simulation import simulate
 from rps_pin.codegen.expressions.functions import UNDER_WRENCHES
 from rps_pin.errors import InputError, SingularityError
+from rps_pin.numerics.linear_algebra import condition_number
 from rps_pin.validation import (
     choice,
     numbers,
@@ -106,6 +109,21 @@ class CompiledMechanism:
     def name(self) -> str:
         """The mechanism's name."""
         return self.mechanism.name
+
+    @property
+    def effects(self) -> JointEffects | None:
+        """Damping, friction and springs of the joints."""
+        return self.mechanism.effects
+
+    @property
+    def characteristic_length(self) -> float:
+        """Length that makes angles and lengths comparable, m."""
+        return self.mechanism.characteristic_length
+
+    @property
+    def max_condition(self) -> float:
+        """Condition number above which `SingularityError` is raised."""
+        return self.mechanism.max_condition
 
     @property
     def home(self) -> Array:
@@ -179,6 +197,27 @@ class CompiledMechanism:
             return equations.largest_gap(gaps)
         flat = gaps.reshape(-1, gaps.shape[-1])
         return np.array([equations.largest_gap(row) for row in flat]).reshape(gaps.shape[:-1])
+
+    def loop_errors(
+        self,
+        q: ArrayLike,
+        v: ArrayLike | None = None,
+        a: ArrayLike | None = None,
+        **options: Any,
+    ) -> LoopErrors:
+        """Return gaps, their rates and accelerations, (..., nc) each; by the Pinocchio engine."""
+
+        def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array) -> Sequence[Any]:
+            return m.loop_errors(q, v, a)
+
+        still = np.zeros(self.model.nv)
+        given = (q, still if v is None else v, still if a is None else a)
+        shapes = [(self.constraint_size,)] * 3
+        return LoopErrors(*self._by_samples(answer, given, shapes, **options))
+
+    def condition(self, q: ArrayLike, **options: Any) -> Any:
+        """Return condition numbers of J_p, float or (...); see `ClosedLoopModel.condition`."""
+        return each(condition_number, self.passive_jacobian(q, **options), float)
 
     def jacobian(self, q: ArrayLike, **options: Any) -> Array:
         """Return J, shape (..., nc, nv); see `ClosedLoopModel.jacobian`."""
@@ -424,11 +463,11 @@ class CompiledMechanism:
         at = q.copy() if q.__class__ is np.ndarray else np.array(q, dtype=np.float64)
         return GeneratedForces(tau, multipliers, residual, unproduced, (self, at, parameters))
 
-    def passive_jacobian(self, q: Array, parameters: ArrayLike | None = None) -> Array:
+    def passive_jacobian(self, q: ArrayLike, **options: Any) -> Array:
         """Return J_p, all entries in one unit, shape (..., nc, np)."""
         system = self.mechanism.system
         rows, columns = system.factorisation.scales
-        jacobian = self.jacobian(q, parameters=parameters)[..., system.passive]
+        jacobian = self.jacobian(q, **options)[..., system.passive]
         return np.asarray(rows * jacobian * columns)
 
     def generalised_force(
@@ -528,6 +567,52 @@ class CompiledMechanism:
         if both.ndim == 1:
             return float(both[0]), float(both[1])
         return both[..., 0], both[..., 1]
+
+    # Wrenches, by the Pinocchio engine ------------------------------------------------------------
+
+    def closure_wrenches(
+        self, q: ArrayLike, constraint_forces: ArrayLike, **options: Any
+    ) -> dict[str, Array]:
+        """Return the wrench in each closure of frames, (..., 6), by name.
+
+        See `ClosedLoopModel.closure_wrenches`; by the Pinocchio engine, sample by sample.
+        """
+        closures = self.mechanism.system.equations.closed_frames
+        names = [closed.closure.name for closed in closures]
+
+        def answer(m: ClosedLoopModel, q: Array, multipliers: Array) -> Sequence[Any]:
+            found = m.closure_wrenches(q, multipliers)
+            return [found[name] for name in names]
+
+        shapes = [(6,)] * len(names)
+        found = self._by_samples(answer, (q, constraint_forces), shapes, **options)
+        return dict(zip(names, found, strict=True))
+
+    def joint_wrenches(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        constraint_forces: ArrayLike,
+        *,
+        axes: Literal["world", "joint"] = "joint",
+        **options: Any,
+    ) -> dict[str, Array]:
+        """Return the wrench that each joint of the tree carries, (..., 6), by name.
+
+        See `ClosedLoopModel.joint_wrenches`; by the Pinocchio engine, sample by sample.
+        """
+        choice(axes, "axes", ("world", "joint"))
+        names = list(self.model.names)[1:]
+
+        def answer(m: ClosedLoopModel, *given: Any) -> Sequence[Any]:
+            *motion, wrenches = given
+            found = m.joint_wrenches(*motion, wrenches=wrenches, axes=axes)
+            return [found[name] for name in names]
+
+        given, shapes = (q, v, a, constraint_forces), [(6,)] * len(names)
+        found = self._by_samples(answer, given, shapes, True, **options)
+        return dict(zip(names, found, strict=True))
 
     # Derivatives ----------------------------------------------------------------------------------
 

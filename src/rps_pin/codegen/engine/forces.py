@@ -16,7 +16,7 @@ from rps_pin.numerics.linear_algebra import condition_number
 class HasPassiveJacobian(Protocol):
     """A `CompiledMechanism`."""
 
-    def passive_jacobian(self, q: Array, parameters: ArrayLike | None = None) -> Array:
+    def passive_jacobian(self, q: ArrayLike, **options: Any) -> Array:
         """Return J_p."""
 
 
@@ -52,7 +52,7 @@ class GeneratedForces:
 
     def _passive_jacobian(self) -> Array:
         mechanism, q, parameters = self._at
-        return mechanism.passive_jacobian(q, parameters)
+        return mechanism.passive_jacobian(q, parameters=parameters)
 
     @property
     def condition(self) -> Any:
@@ -60,12 +60,12 @@ class GeneratedForces:
 
         Computed when asked for.
         """
-        return _each(condition_number, self._passive_jacobian(), float)
+        return each(condition_number, self._passive_jacobian(), float)
 
     @property
     def orientation(self) -> Any:
         """Sign of det J_p, or 0, int or (...); see `InverseDynamics`. Computed when asked for."""
-        return _each(orientation, self._passive_jacobian(), int)
+        return each(orientation, self._passive_jacobian(), int)
 
     def __repr__(self) -> str:
         return (
@@ -75,7 +75,7 @@ class GeneratedForces:
         )
 
 
-def _each(of: Callable[[Array], Any], matrices: Array, kind: type) -> Any:
+def each(of: Callable[[Array], Any], matrices: Array, kind: type) -> Any:
     """Return a number of each matrix, (..., rows, columns)."""
     if matrices.ndim == 2:
         return of(matrices)
