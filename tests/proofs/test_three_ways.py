@@ -118,7 +118,7 @@ def test_three_ways_agree_along_every_trajectory_the_documentation_shows(
     path = load_trajectory(file, robot)
     if fastest:
         path = time_optimal(robot, path)
-    apart, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)), engine)
+    apart, skipped = disagreements(robot, path.sample(np.linspace(0, path.duration, 500)))
     assert skipped == 0
     assert {key: value for key, value in apart.items() if not value < AGREEMENT} == {}
 
