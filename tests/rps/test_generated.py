@@ -427,17 +427,62 @@ def changed(function: Any, change: Callable[[tuple[Any, ...]], tuple[Any, ...]])
     )()
 
 
-@pytest.mark.parametrize("name", ["inverse_kinematics", "forward_kinematics", "actuator_forces"])
+def wrong(results: Any) -> Any:
+    return (results[0] * (1 + 1e-9), *results[1:])
+
+
+def not_a_number(results: Any) -> Any:
+    return (results[0] * np.nan, *results[1:])
+
+
+def nothing_settled(results: Any) -> Any:
+    return (*results[:-1], results[-1] * 0 + 2)
+
+
+def all_answered(results: Any) -> Any:
+    """What inverse kinematics and `followed` say of a sample is their last result."""
+    *found, last, status = results
+    return (*found, last * 0 + 1 if last.shape[-1] == 1 else last, status * 0)
+
+
+def all_refused(results: Any) -> Any:
+    *found, last, status = results
+    return (*found, last * 0, status)
+
+
+ALL = ("inverse_kinematics", "forward_kinematics", "followed", "actuator_forces")
+
+
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "words", "names"),
     [
-        (lambda r: (r[0] * (1 + 1e-9), *r[1:]), "but Python's function gives"),
-        (lambda r: (r[0] * np.nan, *r[1:]), "but Python's function gives nan|found nan|gives"),
-        (lambda r: (*r[:-1], r[-1] * 0 + 2), "of plain poses are answered; at least 90%"),
-        (lambda r: (*r[:-1], r[-1] * 0), "samples are answered that Python's function refuses"),
+        (wrong, "but Python's function gives", ALL),
+        (not_a_number, "nan, but Python's function gives", ALL),
+        (nothing_settled, "of plain poses are answered; at least 90%", ALL),
+        (all_answered, "samples are answered that Python's function refuses", ALL),
+        (all_refused, "of plain poses are answered", ("inverse_kinematics", "followed")),
     ],
 )
-def test_the_proof_refuses(name: str, change: Callable[[Any], Any], words: str, code: Any) -> None:
-    functions = code.functions | {name: changed(code.functions[name], change)}
-    with pytest.raises(CompileError, match=f"proof of {name}: .*({words})"):
-        proof.prove(functions, "gcc")
+def test_the_proof_refuses(
+    change: Callable[[Any], Any], words: str, names: tuple[str, ...], code: Any
+) -> None:
+    for name in names:
+        functions = code.functions | {name: changed(code.functions[name], change)}
+        with pytest.raises(CompileError, match=f"proof of {name}: .*{words}"):
+            proof.prove(functions, "gcc")
+
+
+def test_the_proof_refuses_a_refusal(code: Any) -> None:
+    """Of one sample in a hundred."""
+
+    def change(results: Any) -> Any:
+        *found, last, status = results
+        if last.ndim > 1:
+            last[::100] = 0.0
+        return (*found, last, status)
+
+    for name in ("inverse_kinematics", "followed"):
+        functions = code.functions | {name: changed(code.functions[name], change)}
+        words = f"proof of {name}: .* samples are refused that Python's function answers"
+        with pytest.raises(CompileError, match=words):
+            proof.prove(functions, "gcc")

@@ -66,11 +66,16 @@ class RobotCalls:
 
         def answer(pose: ArrayLike, errors: Errors) -> Found:
             legs = inverse_kinematics(self._parameters, pose, errors=errors)
-            return legs[:2], legs.reachable
+            return (legs.length, legs.angle, _as_numbers(legs.reachable)), legs.reachable
 
         given, numbers = (pose,), (self._limits,)
-        (length, angle), good = self._settled("inverse_kinematics", given, numbers, answer, errors)
-        return Legs(length, angle, np.asarray(good)[()])
+        (length, angle, kept), _ = self._settled(
+            "inverse_kinematics", given, numbers, answer, errors
+        )
+        reachable: Any = kept[0] == 1.0 if kept.ndim == 1 else kept[..., 0] == 1.0
+        if errors == "raise" and not reachable.all():
+            (length, angle, _), reachable = answer(pose, errors)  # it raises
+        return Legs(length, angle, reachable)
 
     def forward_kinematics(self, length: ArrayLike, near: ArrayLike, errors: Errors) -> Array:
         """Return poses of leg lengths; see `RPSRobot.forward_kinematics`."""
@@ -78,7 +83,7 @@ class RobotCalls:
 
         def python(length: ArrayLike, near: ArrayLike, errors: Errors) -> Found:
             found = forward_kinematics(length, near, *self._radii, errors=errors)
-            return (found.pose, np.where(found.reached, 1.0, 0.0)[..., None]), found.reached
+            return (found.pose, _as_numbers(found.reached)), found.reached
 
         def in_many_steps(length: ArrayLike, near: ArrayLike, errors: Errors) -> Found:
             if errors != "mask":
@@ -158,6 +163,11 @@ def _filled(
         whole[left] = part
     good[left] = fine
     return found, good
+
+
+def _as_numbers(condition: Bools) -> Array:
+    """Return truth values (...) as numbers (..., 1)."""
+    return np.asarray(condition, dtype=np.float64)[..., None]
 
 
 def _masked(array: Array, good: Bools | np.bool_, errors: Errors) -> Array:

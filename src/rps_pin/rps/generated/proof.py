@@ -68,7 +68,7 @@ class _Comparison:
         if not (difference <= TOLERANCE).all():
             at = np.unravel_index(int(np.argmax(~(difference <= TOLERANCE))), difference.shape)
             raise CompileError(
-                f"proof of {name}: {found[at]!r}, but Python's function gives {right[at]!r}; they "
+                f"proof of {name}: {found[at]!s}, but Python's function gives {right[at]!s}; they "
                 f"may differ by {TOLERANCE} of {float(np.broadcast_to(size, found.shape)[at]):.3g}",
                 self.compiler,
             )
@@ -86,6 +86,15 @@ class _Comparison:
             raise CompileError(
                 f"proof of {name}: {part:.1%} of plain poses are answered; at least "
                 f"{_LEAST_PART:.0%} must be",
+                self.compiler,
+            )
+
+    def refusals(self, name: str, refused: Bools, answered: Bools) -> None:
+        """Refuse refusals where Python's function has an answer."""
+        if (refused & answered).any():
+            raise CompileError(
+                f"proof of {name}: {int((refused & answered).sum())} samples are refused that "
+                "Python's function answers",
                 self.compiler,
             )
 
@@ -122,11 +131,13 @@ def _inverse(found: _Comparison, function: Any, case: Case) -> None:
     name, numbers = "inverse_kinematics", np.array(limits_of(case.parameters))
     right = inverse_kinematics(case.parameters, case.pose, errors="mask")
     size = right.length.max(axis=-1, keepdims=True)
-    for (length, angle), answered, some in _called(function, (case.pose,), (numbers,)):
+    for (length, angle, kept), settled, some in _called(function, (case.pose,), (numbers,)):
+        answered = settled & (kept[:, 0] == 1.0)
         found.answers(name, answered, right.reachable[some], case.plain[some])
-        expected = right.length[some][answered], right.angle[some][answered]
-        found.equal(name, length[answered], expected[0], size[some][answered])
-        found.equal(name, angle[answered], expected[1], 1.0)
+        found.refusals(name, settled & ~answered, right.reachable[some])
+        expected = right.length[some][settled], right.angle[some][settled]
+        found.equal(name, length[settled], expected[0], size[some][settled])
+        found.equal(name, angle[settled], expected[1], 1.0)
 
 
 def _direct(found: _Comparison, functions: Mapping[str, Any], case: Case) -> None:
@@ -142,11 +153,7 @@ def _direct(found: _Comparison, functions: Mapping[str, Any], case: Case) -> Non
             pose = results[0]
             answered = settled & (results[1][:, 0] == 1.0) if len(results) > 1 else settled
             found.answers(name, answered, right.reached[some], plain[some])
-            if (settled & ~answered & right.reached[some]).any():
-                raise CompileError(
-                    f"proof of {name}: a line is not followed that Python's function follows",
-                    found.compiler,
-                )
+            found.refusals(name, settled & ~answered, right.reached[some])
             sharp = answered & (right.condition[some] <= _POSE_COMPARED)
             found.equal(name, pose[sharp], right.pose[some][sharp], size)
             again = inverse_kinematics(free, pose[answered], errors="mask").length

@@ -1,8 +1,9 @@
 """A 3-RPS robot's functions as expressions and C: inverse and direct kinematics, forces.
 
 Each ends with an output `check` (2), of which the first is above 1 where the answer needs a closer
-look: a leg beyond its limits or near them, without length, near a singularity, or leg lengths that
-were not followed to an end. There `rps_pin.rps.kinematics` and `rps_pin.rps.dynamics` answer.
+look: a leg near its limits or without length, a singularity nearby, leg lengths that are not
+followed to their end; for forces, also a leg beyond its limits. There `rps_pin.rps.kinematics` and
+`rps_pin.rps.dynamics` answer.
 
 Numbers of the robot are inputs: one library serves all robots.
 """
@@ -14,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from rps_pin.codegen.units import Kernel, Routine, Unit
-from rps_pin.numerics.elementary import Number, atan2, both, least, select_all
+from rps_pin.numerics.elementary import Number, atan2, both, greatest, least, select_all
 from rps_pin.rps.dynamics.force_equations import ForceTerms
 from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, kernel, symbols
 from rps_pin.rps.generated.forces import TERMS, actuator_forces, is_regular, leg_block, terms_of
@@ -29,6 +30,8 @@ from rps_pin.rps.parameters import RPSParameters
 #: Steps in which most leg lengths are followed; the few that take more are followed again, apart
 #: from the others, so that these need not wait for them.
 FEW_STEPS = 20
+#: Margin, of cosines or of lengths over lengths, below which a limit is broken, rounding or not.
+_BEYOND = 1e-9
 #: A length that no leg has: generated code takes finite numbers.
 _FAR = 1e50
 #: Radii, and what limits are made of: see `limits_of`.
@@ -37,7 +40,10 @@ LIMITS = Layout(
 )
 #: Inputs and outputs of each function, without `check`, and their sizes.
 ARGUMENTS: Mapping[str, tuple[Mapping[str, int], Mapping[str, int]]] = {
-    "inverse_kinematics": ({"pose": 3, "numbers": LIMITS.size}, {"length": 3, "angle": 3}),
+    "inverse_kinematics": (
+        {"pose": 3, "numbers": LIMITS.size},
+        {"length": 3, "angle": 3, "reachable": 1},
+    ),
     "forward_kinematics": ({"length": 3, "near": 3, "numbers": 3}, {"pose": 3}),
     "followed": ({"length": 3, "near": 3, "numbers": 3}, {"pose": 3, "reached": 1}),
     "actuator_forces": (
@@ -95,19 +101,24 @@ def _legs_of(pose: Sequence[Number], g: Number, h: Number) -> _Legs:
     return _Legs(tilt, length, cosine, sine)
 
 
-def _keeps_limits(pose: Sequence[Number], of: _Legs, groups: dict[str, Any]) -> Number:
-    """Return whether all margins are positive, and every leg has a length."""
+def _keeps_limits(
+    pose: Sequence[Number], of: _Legs, groups: dict[str, Any]
+) -> tuple[Number, Number]:
+    """Return whether the legs surely keep their limits, and whether one surely breaks one."""
     _, x, y = pose
     e, t = tips.at_legs((0.0, x, y)), tips.at_legs((0.0, y, -x))
     cones = []
     for i in range(3):
         out, _, up = legs.rest_axis(e[i], t[i], of.tilt, *groups["rest"])
         cones.append(legs.cone_cosine(of.cosine[i], of.sine[i], out, up))
-    kept = limits.length_margin(of.length, *groups["lengths"]) >= 0.0
-    inside = limits.angle_margin(of.cosine, of.sine, groups["middle"], groups["half_angle"])
-    kept = both(kept, inside >= 0.0)
-    kept = both(kept, limits.cone_margin((cones[0], cones[1], cones[2]), groups["cone"]) >= 0.0)
-    return both(kept, _has_length(of, groups["radii"][0]))
+    margins = (
+        limits.length_margin(of.length, *groups["lengths"]) / (1.0 + greatest(*of.length)),
+        limits.angle_margin(of.cosine, of.sine, groups["middle"], groups["half_angle"]),
+        limits.cone_margin((cones[0], cones[1], cones[2]), groups["cone"]),
+    )
+    smallest = least(*margins)
+    has_length = _has_length(of, groups["radii"][0])
+    return both(smallest >= 0.0, has_length), both(smallest < -_BEYOND, has_length)
 
 
 def _has_length(of: _Legs, g: Number) -> Number:
@@ -120,18 +131,20 @@ def _check(good: Number) -> tuple[Number, Number]:
 
 
 def inverse_kernel() -> Kernel:
-    """Return leg lengths and angles of a pose."""
+    """Return leg lengths and angles of a pose, and whether they keep their limits."""
     pose, numbers = symbols("pose", 3), symbols("numbers", LIMITS.size)
     groups = LIMITS.split(numbers)
     of = _legs_of(pose, *groups["radii"])
     angle = tuple(atan2(s, c) for s, c in zip(of.sine, of.cosine, strict=True))
+    kept, broken = _keeps_limits(pose, of, groups)
     return kernel(
         "inverse_kinematics",
         {"pose": pose, "numbers": numbers},
         {
             "length": of.length,
             "angle": angle,
-            "check": _check(_keeps_limits(pose, of, groups)),
+            "reachable": (kept,),
+            "check": _check(kept + broken),
         },
     )
 
@@ -146,7 +159,7 @@ def forces_kernel() -> Kernel:
     of = _legs_of(pose, g, h)
     block = leg_block((pose[1], pose[2], of.tilt), of.length, (*of.cosine, *of.sine))
     force = actuator_forces(terms_of(TERMS.split(terms)), block, rate, acceleration, wrench)
-    good = both(is_regular(block, h), _keeps_limits(pose, of, groups))
+    good = both(is_regular(block, h), _keeps_limits(pose, of, groups)[0])
     return kernel(
         "actuator_forces",
         {
