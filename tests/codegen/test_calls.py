@@ -96,6 +96,10 @@ def test_one_sample(product: CompiledFunction) -> None:
     assert worst(again - right(A, x + 1, y)) < 1e-15
     assert again is not z
     assert worst(z - right(A, x, y)) < 1e-15, "results are the caller's"
+    found = product.one(A, x, y)
+    assert (found is None) == (not product._builtins)
+    if found is not None:
+        assert (found[0].tolist(), found[1].tolist(), found[2]) == (z.tolist(), total.tolist(), 0)
 
 
 @pytest.mark.parametrize(
@@ -253,7 +257,7 @@ def test_code_is_replaced_while_it_runs(release: bool, tmp_path: Path) -> None:
     assert seen <= {3.0, 6.0}
     f.replace(entries[1])
     assert f.entry is entries[1]
-    assert f(A, x, y)[0][0] == 6.0
+    assert f(A, x, y)[0][0] == f.one(A, x, y)[0][0] == 6.0
     with pytest.raises(InputError, match="no function sum_call"):
         Entry.of(entries[0].owner, "sum")
 
@@ -268,7 +272,7 @@ class Numbers(np.ndarray):
 def handed_on(function: CompiledFunction, *inputs: Any, **options: Any) -> bool:
     """Return whether the machine code leaves a call to Python, with just the same arguments."""
     seen: list[tuple[Any, ...]] = []
-    method = function._builtin._method
+    method = function._builtins[0]._method
     general = method.general
     method.general = lambda *given, **named: seen.append((given, named)) or "answer"
     try:
@@ -303,7 +307,10 @@ def test_what_the_machine_code_refuses(builtin: CompiledFunction) -> None:
         assert handed_on(builtin, other, x, y), other
     for inputs in ((), (A,), (A, x), (A, x, y, y), (x, A, y)):
         assert handed_on(builtin, *inputs)
+        assert builtin.one(*inputs) is None
     assert handed_on(builtin, A, x, y, threads=1)
+    assert builtin.one(A, x, y, threads=1) is None
+    assert builtin.one(A, x.tolist(), y) is None
     with pytest.raises(TypeError, match="sources"):
         builtin.call(A, x, y, sources=1)
 
@@ -366,7 +373,7 @@ def test_an_output_that_cannot_be_made(tmp_path: Path) -> None:
     """What was made before it is dropped, and NumPy's error is raised."""
     function = loaded(product_unit(1.0), tmp_path)["product"]
     A, x, y = drawn(2, 3), drawn(3), drawn(2)
-    shapes = function._builtin._method.kept[1]
+    shapes = function._builtins[0]._method.kept[1]
     assert list(shapes) == [2, 2, 3, 1, 3, 1, 2, 1, 2, 1, 1]
     shapes[-1] = 2**58
     gc.collect()

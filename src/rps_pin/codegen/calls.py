@@ -95,13 +95,18 @@ class CompiledFunction:
         #: Called before a batch of at least `LARGE_BATCH` samples.
         self.before_batch: Callable[[], None] = lambda: None
         self._sizes = tuple(math.prod(one.shape) for one in (*self.inputs, *self.outputs))
-        #: The same as calling this object, 0.05 microseconds faster.
+        #: The same as calling this object, 0.1 microseconds faster where no keyword is given.
         self.call: Callable[..., tuple[Any, ...]] = self._general
-        self._builtin: BuiltinFunction | None = None
+        #: The same for float64 arrays of one sample, contiguous and aligned; None for all others.
+        self.one: Callable[..., tuple[Any, ...] | None] = _nothing
+        self._builtins: tuple[BuiltinFunction, ...] = ()
         if addresses() is not None:
             given, results = ([one.shape for one in part] for part in (self.inputs, self.outputs))
-            self._builtin = BuiltinFunction(name, given, results, self._general, release)
-            self.call = self._builtin.call
+            self._builtins = tuple(
+                BuiltinFunction(name, given, results, general, release)
+                for general in (self._general, _nothing)
+            )
+            self.call, self.one = (builtin.call for builtin in self._builtins)
         self.replace(entry)
 
     def replace(self, entry: Entry) -> None:
@@ -113,8 +118,8 @@ class CompiledFunction:
         many.entry = entry  # type: ignore[attr-defined]
         # Each is one assignment; a call reads one of them once, and holds what it reads.
         self.entry, self._many = entry, many
-        if self._builtin is not None:
-            self._builtin.replace(entry.call, entry.owner)
+        for builtin in self._builtins:
+            builtin.replace(entry.call, entry.owner)
 
     def __call__(self, *inputs: ArrayLike, threads: int = 1) -> tuple[Any, ...]:
         """Return the outputs and the status.
@@ -206,6 +211,10 @@ class CompiledFunction:
             raise InputError(
                 f"the leading dimensions of the inputs of {self.name} do not go together: {given}"
             ) from None
+
+
+def _nothing(*_inputs: Any, **_options: Any) -> None:
+    """Answer what `CompiledFunction.one` does not."""
 
 
 def _address(array: NDArray[Any]) -> int:

@@ -79,8 +79,9 @@ class CompiledMechanism:
         self._codes: dict[tuple[str, ...], GeneratedCode] = {code.wrench_frames: code}
         self._lock, self._local = threading.Lock(), threading.local()
         self._plain = not (code.parameters or code.wrench_frames)
-        self._calls = _Calls(code)
+        self._calls, self._single = _Calls(code), _Single(code)
         actuated = code.mechanism.system.actuated.size
+        self._is_actuated = code.partition.is_actuated
         self._underactuated = actuated < code.partition.independent.size
 
     # Structure ------------------------------------------------------------------------------------
@@ -428,12 +429,12 @@ class CompiledMechanism:
         threads: int = 1,
     ) -> GeneratedForces:
         """Return the forces of motions; see `ClosedLoopModel.inverse_dynamics`."""
-        usual = threads == 1 and errors == "raise" and not self._underactuated
-        if usual and self._plain and not wrenches and parameters is None:
-            tau, multipliers, residual, status = self._calls["inverse_dynamics"](q, v, a)
-            if status.__class__ is int and not status:
-                where = self, np.array(q, dtype=np.float64), None
-                return GeneratedForces(tau, multipliers, residual, None, where)
+        usual = wrenches is None and parameters is None and errors == "raise" and threads == 1
+        if usual and not self._underactuated:
+            single = self._single.inverse_dynamics(q, v, a)
+            if single and not single[-1]:
+                here: Any = self, q.copy(), None  # type: ignore[union-attr]
+                return GeneratedForces(single[0], single[1], single[2], None, here)
 
         def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
             result = m.inverse_dynamics(q, v, a, wrenches=w)
@@ -626,6 +627,10 @@ class CompiledMechanism:
         **options: Any,
     ) -> InverseDynamicsDerivatives:
         """Return derivatives of actuator forces, (..., rows, columns); see `ClosedLoopModel`."""
+        if wrenches is None and not options and self._is_actuated:
+            single = self._single.inverse_dynamics_derivatives(q, v, a)
+            if single and not single[-1]:
+                return InverseDynamicsDerivatives._make(single[:-1])
 
         def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
             return m.inverse_dynamics_derivatives(q, v, a, wrenches=w)
@@ -651,6 +656,10 @@ class CompiledMechanism:
         **options: Any,
     ) -> ForwardDynamicsDerivatives:
         """Return derivatives of the acceleration, (..., rows, columns); see `ClosedLoopModel`."""
+        if wrenches is None and independent is None and not options and self._is_actuated:
+            single = self._single.forward_dynamics_derivatives(q, v, tau)
+            if single and not single[-1]:
+                return ForwardDynamicsDerivatives._make(single[:-1])
 
         def answer(m: ClosedLoopModel, q: Array, v: Array, tau: Array, w: Any) -> Sequence[Any]:
             return m.forward_dynamics_derivatives(q, v, tau, independent, wrenches=w)
@@ -864,6 +873,10 @@ class CompiledMechanism:
         **options: Any,
     ) -> Array:
         """Return the only result of a function."""
+        if wrenches is None and not options:
+            single = getattr(self._single, name)(*given)
+            if single and not single[-1]:
+                return single[0]  # type: ignore[no-any-return]
         return np.asarray(self._run(name, given, answer, wrenches, **options)[0])
 
     def _independently(
@@ -1000,6 +1013,22 @@ class _Calls(dict[str, Callable[..., Any]]):
     def __missing__(self, name: str) -> Callable[..., Any]:
         self[name] = call = self._code[name].call
         return call
+
+
+class _Single:
+    """`CompiledFunction.one` of functions by name, each looked up once.
+
+    They return nothing for other arguments than float64 arrays of one sample, and so for mechanisms
+    with parameters or wrenches, whose functions have more arguments.
+    """
+
+    def __init__(self, code: GeneratedCode) -> None:
+        self._code = code
+
+    def __getattr__(self, name: str) -> Any:
+        one = self._code[name].one
+        setattr(self, name, one)
+        return one
 
 
 def _checked(errors: Errors, threads: int) -> None:
