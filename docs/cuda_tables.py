@@ -1,9 +1,9 @@
 """Write the tables of CUDA in docs/generated_code.md.
 
-Run it from the checkout, with nvcc on the path, in an environment with the development dependencies
-(a minute); the rates need an NVIDIA card and CuPy besides (two minutes more):
+Run it from the checkout in an environment with the development dependencies, with nvcc on the path
+(a minute), or with the tables that benchmarks/cuda_rates.py printed where a card is:
 
-    .venv/bin/python docs/cuda_tables.py
+    .venv/bin/python docs/cuda_tables.py [RATES.md]
 """
 
 from __future__ import annotations
@@ -16,25 +16,17 @@ from marked import replaced
 
 ROOT = Path(__file__).parent.parent
 PAGE = ROOT / "docs" / "generated_code.md"
-NO_CARD = "Not measured: no card was at hand."
 
 
 def main() -> None:
-    """Write registers and spills, and the rates if there is a card."""
-    text = replaced(PAGE.read_text("utf-8"), "registers", _output("--registers"))
-    PAGE.write_text(replaced(text, "rates", _output() if _has_card() else NO_CARD), "utf-8")
-
-
-def _output(*options: str) -> str:
-    command = [sys.executable, "-m", "benchmarks.cuda_rates", *options]
-    return subprocess.run(
-        command, cwd=ROOT, check=True, capture_output=True, text=True
-    ).stdout.strip()
-
-
-def _has_card() -> bool:
-    command = [sys.executable, "-c", "from rps_pin.codegen.cuda.device import load_cupy as f; f()"]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, check=False).returncode == 0
+    """Write registers and spills, or rates."""
+    if len(sys.argv) > 1:
+        name, part = "rates", Path(sys.argv[1]).read_text("utf-8")
+    else:
+        command = [sys.executable, "-m", "benchmarks.cuda_case", "--registers"]
+        done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+        name, part = "registers", done.stdout
+    PAGE.write_text(replaced(PAGE.read_text("utf-8"), name, part.strip()), "utf-8")
 
 
 if __name__ == "__main__":

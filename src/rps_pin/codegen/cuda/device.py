@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rps_pin.codegen.units import Unit
 from rps_pin.errors import CompileError, InputError
 from rps_pin.validation import numbers
 
@@ -70,10 +69,14 @@ class DeviceFunction:
     ----------
     cupy
         The module.
-    unit, name
-        The unit, and its entry point.
+    name
+        Of the entry point.
     dtype
         "float64" or "float32".
+    text
+        The text of a unit with this entry point, see `Unit.cuda`.
+    inputs, outputs
+        Their names and sizes.
 
     Raises
     ------
@@ -81,11 +84,18 @@ class DeviceFunction:
         If NVRTC refuses the text.
     """
 
-    def __init__(self, cupy: Any, unit: Unit, name: str, dtype: str) -> None:
+    def __init__(
+        self,
+        cupy: Any,
+        name: str,
+        dtype: str,
+        text: str,
+        inputs: Sequence[tuple[str, int]],
+        outputs: Sequence[tuple[str, int]],
+    ) -> None:
         self.name, self.dtype, self._cupy = name, np.dtype(dtype), cupy
-        self.inputs = unit.function(name).inputs
-        self.outputs = unit.handed_out(name)
-        module = cupy.RawModule(code=unit.cuda(REALS[dtype]), options=OPTIONS, backend="nvrtc")
+        self.inputs, self.outputs = tuple(inputs), tuple(outputs)
+        module = cupy.RawModule(code=text, options=OPTIONS, backend="nvrtc")
         try:
             self._kernel = module.get_function(f"{name}_cuda")
         except cupy.cuda.compiler.CompileException as error:

@@ -244,8 +244,16 @@ class CudaMechanism:
         key = code.wrench_frames, name
         with self._lock:
             if key not in self._functions:
-                made = unit(code.functions, name, REALS[self.dtype])
-                function = DeviceFunction(self._cupy, made, name, self.dtype)
+                real = REALS[self.dtype]
+                made = unit(code.functions, name, real)
+                function = DeviceFunction(
+                    self._cupy,
+                    name,
+                    self.dtype,
+                    made.cuda(real),
+                    made.function(name).inputs,
+                    made.handed_out(name),
+                )
                 difference = differences(self._proof(code), function, self._cupy.asnumpy)
                 self.differences[name] = max(difference, self.differences.get(name, 0.0))
                 self._functions[key] = function
