@@ -36,7 +36,7 @@ from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts
 from rps_pin.closed_loop.io.urdf import model_from_urdf
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
-from rps_pin.errors import ClosureError
+from rps_pin.errors import ClosureError, CompileError
 from rps_pin.validation import choice, real_vector
 
 _REFERENCES = {
@@ -883,15 +883,25 @@ class ClosedLoopModel:
 
         Needs ``pip install rps-pin[compile]``. See `rps_pin.codegen.compile_mechanism` for the
         options, and `rps_pin.codegen.CompiledMechanism` for the result.
+
+        Raises
+        ------
+        CompileError
+            If CasADi is not installed; see there for others.
         """
-        return import_module("rps_pin.codegen").compile_mechanism(self, **options)
+        return _of_codegen("compile_mechanism")(self, **options)
 
     def to_casadi(self, **options: Any) -> Any:
         """Return the mechanism's quantities as CasADi functions; see `rps_pin.codegen.to_casadi`.
 
         Needs ``pip install rps-pin[compile]``.
+
+        Raises
+        ------
+        CompileError
+            If CasADi is not installed; see there for others.
         """
-        return import_module("rps_pin.codegen").to_casadi(self, **options)
+        return _of_codegen("to_casadi")(self, **options)
 
     # Arguments and lazily made parts --------------------------------------------------------------
 
@@ -917,3 +927,15 @@ class ClosedLoopModel:
     @cached_property
     def _derivatives(self) -> derivatives.DynamicsDerivatives:
         return derivatives.DynamicsDerivatives(self.system)
+
+
+def _of_codegen(name: str) -> Any:
+    """Return a function of `rps_pin.codegen`, which an extra has to be installed for."""
+    try:
+        return getattr(import_module("rps_pin.codegen"), name)
+    except ModuleNotFoundError as error:
+        raise CompileError(
+            f"code is generated with {error.name}, which is not installed: "
+            "pip install 'rps-pin[compile]'",
+            "",
+        ) from None

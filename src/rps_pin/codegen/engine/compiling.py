@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rps_pin.closed_loop.constraints.equations import refuse_twice
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen.build.builder import CompilerName
 from rps_pin.codegen.cuda.mechanism import CudaMechanism
 from rps_pin.codegen.engine.compiled import CompiledMechanism
 from rps_pin.codegen.engine.generated import GROUPS, GeneratedCode
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, shown
 from rps_pin.validation import choice
 
 
@@ -74,8 +75,12 @@ def compile_mechanism(
         engine to 1e-10.
     """
     choice(device, "device", ("cpu", "cuda"))
-    code = GeneratedCode(mechanism, _names(parameters), _names(wrench_frames), compiler, batches)
-    functions = _names(functions)
+    groups, frames = _names(parameters, "parameters"), _names(wrench_frames, "wrench_frames")
+    refuse_twice("wrench frame", frames)
+    for frame in frames:
+        mechanism.system.frame(frame)
+    functions = _names(functions, "functions")
+    code = GeneratedCode(mechanism, groups, frames, compiler, batches)
     if device == "cuda":
         return _on_card(code, functions, compiler, dtype)
     if dtype != "float64":
@@ -95,6 +100,9 @@ def _on_card(
     return found
 
 
-def _names(given: Sequence[str]) -> tuple[str, ...]:
+def _names(given: Sequence[str], name: str) -> tuple[str, ...]:
     """Return names; one alone may be given as it is."""
-    return (given,) if isinstance(given, str) else tuple(given)
+    names = (given,) if isinstance(given, str) else given
+    if not isinstance(names, Sequence) or not all(isinstance(one, str) for one in names):
+        raise InputError(f"{name} = {shown(given)}: it must be a sequence of names")
+    return tuple(names)

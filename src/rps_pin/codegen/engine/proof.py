@@ -240,8 +240,8 @@ class Proof:
             at = np.unravel_index(int(np.argmax(error)), error.shape)
             raise CompileError(
                 f"generated code of {function.name} does not agree with the Pinocchio engine: "
-                f"{function.outputs[k].name}{list(map(int, at))} = {found[at]!r}, not "
-                f"{wanted[at]!r}: {relative:.3g} relative, at most {accepted:g} is accepted",
+                f"{function.outputs[k].name}{list(map(int, at))} = {float(found[at])!r}, not "
+                f"{float(wanted[at])!r}: {relative:.3g} relative, at most {accepted:g} is accepted",
                 "",
             )
         return relative
