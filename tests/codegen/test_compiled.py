@@ -374,7 +374,7 @@ def test_one_object_serves_any_number_of_threads() -> None:
     fast = of_file("rps")
     some = list(states(fast.mechanism, 8))
     wanted = [fast.forward_dynamics(s.q, s.v, s.tau) for s in some]
-    projected = [fast.mechanism.project(s.near) for s in some]
+    projected = [fast.project(s.near) for s in some]
 
     def work(index: int) -> None:
         for k in range(60):
