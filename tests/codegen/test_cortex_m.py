@@ -58,7 +58,7 @@ def test_a_cortex_m4_computes_in_single_precision(tmp_path: Path) -> None:
 
     file = tmp_path / "four_bar_test.c"
     text = file.read_text("utf-8")
-    file.write_text(text.replace("now.factor * EPSILON", "0 * EPSILON"))
+    file.write_text(text.replace("now.factor * (double)EPSILON", "0"))
     with pytest.raises(AssertionError, match=r"FAILED inverse_dynamics"):
         counts(tmp_path, "cortex-m4")
 
