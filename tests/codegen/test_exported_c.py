@@ -125,7 +125,7 @@ def test_fewer_and_more_actuators_than_motions(tmp_path, count) -> None:
     package = mechanism_package(mechanism, name="other", functions=functions)
     write_c_files(c_files(package), tmp_path)
     assert len(shares(tested(tmp_path, "other", "gcc"))) == 3
-    with pytest.raises(InputError, match=f"the {count} actuated velocities must be the 2"):
+    with pytest.raises(InputError, match=f"{count} actuated velocities must be the 2"):
         mechanism_package(mechanism, functions=["inverse_dynamics_derivatives"])
 
 

@@ -76,7 +76,7 @@ def mechanism_package(
     partition = choose(system, regular_samples(system, mechanism.home).jacobians)
     if "inverse_dynamics_derivatives" in chosen and not partition.is_actuated:
         raise InputError(
-            f"inverse_dynamics_derivatives of {mechanism.name}: the {system.actuated.size} actuated "
+            f"inverse_dynamics_derivatives of {mechanism.name}: {system.actuated.size} actuated "
             f"velocities must be the {partition.mobility} independent ones"
         )
     x = MechanismExpressions(system, partition, parameters, wrench_frames, single=real == "float")
