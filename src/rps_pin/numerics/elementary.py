@@ -35,7 +35,7 @@ sqrt, cos, sin, tanh = _function("sqrt"), _function("cos"), _function("sin"), _f
 
 def atan2(y: Number, x: Number) -> Number:
     """Return the angle of (x, y) from the x axis, -pi to pi; of complex numbers to first order."""
-    if type(y) is float and type(x) is float:
+    if type(y) is type(x) is float:
         return math.atan2(y, x)
     if not (isinstance(y, (float, *_NUMERIC)) and isinstance(x, (float, *_NUMERIC))):
         return _casadi().atan2(y, x)
@@ -47,7 +47,7 @@ def atan2(y: Number, x: Number) -> Number:
 
 def less(a: Number, b: Number) -> Number:
     """Return whether a < b, of the real parts."""
-    if type(a) is float and type(b) is float:
+    if type(a) is type(b) is float:
         return a < b
     if _is_complex(a) or _is_complex(b):
         return np.real(a) < np.real(b)
@@ -56,8 +56,10 @@ def less(a: Number, b: Number) -> Number:
 
 def select(condition: Number, yes: Number, no: Number) -> Number:
     """Return one of two numbers; both are evaluated."""
-    if condition is True or condition is False:  # of floats: the fast path
-        return yes if condition else no
+    if condition is True:  # of floats: the fast path
+        return yes
+    if condition is False:
+        return no
     if isinstance(condition, (np.ndarray, np.bool_)):
         return np.where(condition, yes, no)
     return _casadi().if_else(condition, yes, no)
@@ -65,8 +67,10 @@ def select(condition: Number, yes: Number, no: Number) -> Number:
 
 def both(one: Number, other: Number) -> Number:
     """Return whether two conditions hold."""
-    if one is True or one is False:
-        return other if one else False
+    if one is True:
+        return other
+    if one is False:
+        return False
     if isinstance(one, (np.ndarray, np.bool_)):
         return one & other
     return _casadi().logic_and(one, other)
@@ -74,7 +78,7 @@ def both(one: Number, other: Number) -> Number:
 
 def greatest(a: Number, b: Number, c: Number) -> Number:
     """Return the greatest of three numbers."""
-    if type(a) is float and type(b) is float and type(c) is float:
+    if type(a) is type(b) is type(c) is float:
         return max(a, b, c)
     if is_real_array(a):
         return np.maximum(np.maximum(a, b), c)
@@ -95,8 +99,10 @@ def clamp(x: Number, lower: Number, upper: Number) -> Number:
 
 def select_all(condition: Number, yes: tuple[Number, ...], no: tuple[Number, ...]) -> Any:
     """Return one of two tuples of numbers: `select` of each."""
-    if condition is True or condition is False:
-        return yes if condition else no
+    if condition is True:
+        return yes
+    if condition is False:
+        return no
     return tuple(select(condition, one, other) for one, other in zip(yes, no, strict=True))
 
 

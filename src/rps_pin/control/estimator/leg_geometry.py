@@ -24,6 +24,10 @@ LARGEST_LENGTH = 1e6
 _LARGEST_TILT_SQUARED = (2 * math.pi * (1 - 1e-6)) ** 2
 
 
+#: A pose with its tilt functions, and its tips: rho and z_i, m.
+PlatformTips = tuple[Triple, TiltFunctions, Three, Three]
+
+
 class LegGeometry(NamedTuple):
     """A pose and its legs."""
 
@@ -37,17 +41,6 @@ class LegGeometry(NamedTuple):
     """Cosines, then sines of phi."""
     tilt: TiltFunctions
     """Coefficients of the rotation and their derivatives."""
-
-
-class PlatformTips(NamedTuple):
-    """A pose and its tips."""
-
-    pose: Triple
-    tilt: TiltFunctions
-    radial: Three
-    """rho, m."""
-    height: Three
-    """z_i, m."""
 
 
 def in_range(pose: Triple, g: Number, h: Number) -> Number:
@@ -69,7 +62,7 @@ def platform_tips(pose: Triple, h: Number) -> PlatformTips:
     z, x, y = pose
     tilt = tilt_functions(x * x + y * y)
     radial, height = tips(z, x, y, tilt, h)
-    return PlatformTips(pose, tilt, at_legs(radial), at_legs(height))
+    return pose, tilt, at_legs(radial), at_legs(height)
 
 
 def legs_have_length(platform: PlatformTips, g: Number) -> Number:

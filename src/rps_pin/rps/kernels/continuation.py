@@ -48,6 +48,18 @@ _SINGULAR = 1e-300
 
 def newton_step(d: Three, direction: Direction, g: Number, h: Number) -> Step:
     """Return half a Newton step of Eq. 8 in each angle, rad, and the numbers that judge it."""
+    t, det, condition, singular, beta, adjugate, half = _newton(d, direction, g, h)
+    kantorovich = beta * 2.0 * eq.largest(t) * eq.curvature_bound(d, g)
+    return t, det, condition, select(singular, math.inf, kantorovich), adjugate, half
+
+
+def _newton(
+    d: Three, direction: Direction, g: Number, h: Number
+) -> tuple[Ring, Number, Number, Number, Number, Matrix, Number]:
+    """Return half a Newton step, determinant, condition, whether J is singular, |J^-1|, and so on.
+
+    Then the adjugate, and -1/2 over the determinant.
+    """
     c1, c2, c3, s1, s2, s3 = direction
     w, z = (d[0] * c1, d[1] * c2, d[2] * c3), (d[0] * s1, d[1] * s2, d[2] * s3)
     f = eq.residuals(w, z, g, eq.constants(d, g, h))
@@ -56,17 +68,9 @@ def newton_step(d: Three, direction: Direction, g: Number, h: Number) -> Step:
     singular = less(abs(det), _SINGULAR)
     half = -0.5 / select(singular, 1.0, det)
     adjugate = eq.adjugate(by_angle)
-    t = eq.matrix_times(adjugate, f, half)
     beta = 2.0 * abs(half) * eq.matrix_norm(adjugate)
-    kantorovich = beta * 2.0 * eq.largest(t) * eq.curvature_bound(d, g)
-    return (
-        t,
-        det,
-        select(singular, math.inf, eq.jacobian_norm(by_angle) * beta),
-        select(singular, math.inf, kantorovich),
-        adjugate,
-        half,
-    )
+    condition = select(singular, math.inf, eq.jacobian_norm(by_angle) * beta)
+    return eq.matrix_times(adjugate, f, half), det, condition, singular, beta, adjugate, half
 
 
 def chord_step(
@@ -118,7 +122,7 @@ def refined(
 
     `det` is the determinant at the line's step's beginning, whose sign must not change.
     """
-    t, det_there, there, _, _, _ = newton_step(d, at, g, h)
+    t, det_there, there, _, _, _, _ = _newton(d, at, g, h)
     # The remaining error is the step's square: below rounding.
     last = less(eq.largest(t), last_step)
     good = both(there <= limit, less(0.0, det * det_there))
@@ -131,16 +135,15 @@ def solve_step(
     """Return whether lengths are solved, directions, condition, and beta L eta at the beginning."""
     step = newton_step(d, direction, g, h)
     _, det, condition, kantorovich, _, _ = step
-    solved = trusted = to_be_trusted(condition, kantorovich, limit)
+    trusted = to_be_trusted(condition, kantorovich, limit)
     if never(trusted):
         return trusted, direction, condition, kantorovich
     at = newton_and_chord(d, direction, g, h, step)
     for _ in range(MOST_NEWTON):
         at, condition, last, good = refined(d, at, g, h, limit, det)
-        solved = both(trusted, both(last, good))
         if always(select(trusted, last, True)):
             break
-    return solved, at, condition, kantorovich
+    return both(trusted, both(last, good)), at, condition, kantorovich
 
 
 def to_be_trusted(condition: Number, kantorovich: Number, limit: Number) -> Number:
