@@ -32,10 +32,10 @@ Array = NDArray[np.float64]
 def followed() -> CompiledFunction:
     """The routine, in machine code."""
     unit = Unit("follow_unit", follow_kernels(), (FOLLOW,), ("follow",))
-    names = ("follow_one", "follow_many")
+    names = ("follow_call", "follow_many")
     source = Source("test of following", names, unit.library(), vectors=True)
     library: Library = build(source, lambda _: {}, "gcc")
-    entry = Entry(*(library.address(name) for name in names), library)
+    entry = Entry.of(library, "follow")
     arguments = [
         [Argument(name, (size,)) for name, size in part] for part in (FOLLOW.inputs, FOLLOW.outputs)
     ]
