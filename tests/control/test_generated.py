@@ -292,14 +292,21 @@ def test_the_engine_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Own(ComputedTorque):
-    @property
-    def _generated_law(self) -> str:
-        return ""
+    """A law of somebody's own."""
+
+    def _law(self, *arguments: Any) -> Any:
+        force = super()._law(*arguments)
+        return force and tuple(0.5 * one for one in force)
 
 
 def test_another_law_is_interpreted() -> None:
     own = Own(robots()[0], [0.223, 0, 0], Gains(100.0, 10.0))
     assert own.engine == "interpreted: this law has no generated code"
+    theirs = ComputedTorque(robots()[0], [0.223, 0, 0], Gains(100.0, 10.0))
+    length = robots()[0].inverse_kinematics([0.223, 0, 0]).length
+    for one in (own, theirs):
+        assert one.tick(length) == Status.OK
+    np.testing.assert_allclose(own.forces, 0.5 * theirs.forces, rtol=1e-12)
 
 
 def test_it_can_be_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,7 +46,8 @@ class ComputedTorque(Controller):
 
     @property
     def _generated_law(self) -> str:
-        return f"computed_torque_{self.space}"
+        # A class of its own may have another law.
+        return f"computed_torque_{self.space}" if type(self) is ComputedTorque else ""
 
     def _law(self, state: StateEstimate, setpoint: Setpoint) -> Triple | None:
         return computed_torque(

@@ -75,7 +75,8 @@ class PDControl(Controller):
 
     @property
     def _generated_law(self) -> str:
-        return f"pd_control_{self.space}_{self.compensation}"
+        # A class of its own may have another law.
+        return f"pd_control_{self.space}_{self.compensation}" if type(self) is PDControl else ""
 
     def _law(self, state: StateEstimate, setpoint: Setpoint) -> Triple | None:
         laws = self._in_task_space, self.compensation
