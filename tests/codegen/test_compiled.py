@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from rps_pin import ClosureError, InputError, MechanismError
+from rps_pin.codegen import CompiledMechanism
+from rps_pin.codegen.build import compilers, tcc
 from rps_pin.codegen.engine.proof import ACCEPTED
 from tests.closed_loop import mechanisms
 from tests.codegen.engines import (
@@ -388,3 +390,53 @@ def test_one_object_serves_any_number_of_threads() -> None:
 
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(work, range(8)))
+
+
+# Compilers ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_lanes_of_other_compilers(compiler: str) -> None:
+    """A whole batch in vector registers: 13 samples are one group of lanes and a remainder."""
+    if not list(compilers.find(compiler)):
+        pytest.skip(f"{compiler} is not here")
+    exact = of_file("five_bar").mechanism
+    groups = ("dynamics", "kinematics", "closing", "forces")
+    fast = exact.compile(compiler=compiler, batches=True, functions=groups)
+    assert all(compiler in words for words in fast.compilers.values())
+    some = list(states(exact, 13))
+    batch = stacked(some)
+    for group in groups:
+        for name, call in CALLS[group].items():
+            wanted = np.array([call(exact, s) for s in some])
+            found = call(fast, batch)
+            found = np.moveaxis(found, 0, -1) if name == "energy" else found
+            assert difference(found, wanted) <= ACCEPTED, name
+    q = batch.q.copy()
+    q[5] += 0.01
+    found = fast.forward_dynamics(q, batch.v, batch.tau, errors="mask")
+    np.testing.assert_array_equal(np.isnan(found).any(axis=1), np.arange(13) == 5)
+    assert difference(np.delete(found, 5, 0), np.delete(call_of(fast, batch), 5, 0)) <= 1e-13
+
+
+def call_of(fast: CompiledMechanism, batch: State) -> np.ndarray:
+    return fast.forward_dynamics(batch.q, batch.v, batch.tau)
+
+
+def test_a_better_compiler_takes_over() -> None:
+    """Numbers stay the same to rounding; calls go on meanwhile."""
+    if not tcc.is_here() or not list(compilers.find("auto")):
+        pytest.skip("there are not two compilers")
+    exact = of_file("slider_crank").mechanism
+    fast = exact.compile(functions="dynamics")
+    some = list(states(exact))
+    before = [fast.forward_dynamics(s.q, s.v, s.tau) for s in some]
+    fast.wait()
+    assert fast.compilers["dynamics"] != "tcc"
+    for s, one in zip(some, before, strict=True):
+        assert difference(fast.forward_dynamics(s.q, s.v, s.tau), one) <= 1e-12
+    large = np.repeat(stacked(some).q, 500, axis=0), some[0].v, some[0].tau
+    found = fast.forward_dynamics(*large, errors="mask")
+    fast.wait()  # for the code for several samples at once
+    again = fast.forward_dynamics(*large, errors="mask")
+    assert difference(again[np.isfinite(again)], found[np.isfinite(found)]) <= 1e-12

