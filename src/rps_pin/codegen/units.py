@@ -22,7 +22,7 @@ from rps_pin.errors import InputError, did_you_mean
 NOT_FINITE, OPEN, SINGULAR = 1, 2, 4
 #: An entry point has at most this many inputs and outputs together (MOST_ARGUMENTS in C too).
 MOST_ARGUMENTS = 64
-#: And at most this many numbers, 8 samples of which lie on the stack.
+#: An entry point of more numbers computes one sample at a time: 8 lie on the stack otherwise.
 MOST_NUMBERS = 50_000
 
 _KEYWORDS = frozenset(
@@ -193,7 +193,7 @@ class Unit:
     Raises
     ------
     InputError
-        If a name is no identifier, stands twice, or is missing, or if an entry has too many numbers
+        If a name is no identifier, stands twice, or is missing, or if an entry has too many arguments
         or a `check` that is not 2 numbers.
     """
 
@@ -245,12 +245,11 @@ class Unit:
                 f"{one.name} has {count} inputs and outputs; an entry point has at most "
                 f"{MOST_ARGUMENTS}"
             )
-        numbers = sum(size for _, size in (*one.inputs, *one.outputs))
-        if numbers > MOST_NUMBERS:
-            raise InputError(
-                f"{one.name} reads and writes {numbers} numbers; an entry point at most "
-                f"{MOST_NUMBERS}"
-            )
+
+    def _has_lanes(self, name: str) -> bool:
+        """Whether a group of samples of an entry finds room on the stack."""
+        one = self.function(name)
+        return sum(size for _, size in (*one.inputs, *one.outputs)) <= MOST_NUMBERS
 
     @property
     def functions(self) -> tuple[Kernel | Routine, ...]:
@@ -307,8 +306,9 @@ class Unit:
         if lanes:
             many += ["#if defined(__GNUC__) && !defined(__TINYC__)", prelude("lanes.h")]
             many += [*_renamed(needed, "lanes"), prelude("many_lanes.h")]
-            many += [*(self._group(name) for name in self.entries), "#endif", ""]
-        many += [self._many(name, lanes) for name in self.entries]
+            with_lanes = [name for name in self.entries if self._has_lanes(name)]
+            many += [*(self._group(name) for name in with_lanes), "#endif", ""]
+        many += [self._many(name, lanes and self._has_lanes(name)) for name in self.entries]
         return "\n".join(one), "\n".join(many)
 
     def _one(self, name: str) -> str:

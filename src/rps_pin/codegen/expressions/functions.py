@@ -102,7 +102,7 @@ class MechanismFunctions:
             given["wrenches"] = x.wrenches
         if x.parameters.labels:
             given["parameters"] = x.parameters.symbols
-        outputs = ca.cse([ca.densify(result) for result in results.values()])
+        outputs = ca.cse([ca.SX(result) for result in results.values()])
         return ca.Function(name, list(given.values()), outputs, list(given), list(results))
 
 
