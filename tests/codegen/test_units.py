@@ -199,6 +199,14 @@ def test_nvcc_compiles_the_text(tmp_path: Path) -> None:
 # Bad input ------------------------------------------------------------------------------------
 
 
+def test_an_entry_of_many_numbers_has_no_lanes() -> None:
+    routine = Routine("k", (("a", 10**6),), (("b", 1),), "b[0] = a[0];", ())
+    one, many = Unit("r", (), (routine,), ("k",)).library()
+    assert "k_at" in one
+    assert "k_many" in many
+    assert "k_group" not in many
+
+
 def test_bad_units_are_refused() -> None:
     x = ca.SX.sym("x", 3)
     kernel = Kernel(ca.Function("f", [x], [x]))
@@ -212,7 +220,6 @@ def test_bad_units_are_refused() -> None:
         (("r", (kernel,), (Routine("k", (("f", 1),), (), "", ()),)), "an argument and a function"),
         (("r", (), (Routine("int", (), (), "", ()),)), "'int' cannot name something in C"),
         (("r", (), (Routine("k", (("a b", 1),), (), "", ()),)), "'a b' cannot name"),
-        (("r", (), (Routine("k", (("a", 10**6),), (), "", ()),), ("k",)), "1000000 numbers"),
     ):
         with pytest.raises(InputError, match=message):
             Unit(*arguments)

@@ -193,8 +193,8 @@ class Unit:
     Raises
     ------
     InputError
-        If a name is no identifier, stands twice, or is missing, or if an entry has too many arguments
-        or a `check` that is not 2 numbers.
+        If a name is no identifier, stands twice, or is missing, or if an entry has too many
+        arguments or a `check` that is not 2 numbers.
     """
 
     name: str

@@ -57,6 +57,8 @@ STEP, _AWAY = 1e-5, 1e-3
 _SINGULAR = 1e3
 #: And above which a state is too near to one to be of use.
 _USABLE = 1e4
+#: Velocities from which on a proof has one state.
+_LARGE = 200
 #: Condition number of J_d above which generated code may flag a state.
 _MAY_FLAG = 1e3
 
@@ -120,10 +122,14 @@ class Proof:
         self._dependent = np.setdiff1d(np.arange(nv), independent)
         home = self._m.close(mechanism.home, within_limits=False)
         found = regular_samples(self._m.system, home).configurations
-        places = [q for q in found if self._condition(q) < _USABLE][:5]
+        # The Pinocchio engine's work grows with the cube of a mechanism's size.
+        large = nv > _LARGE
+        places = [q for q in found if self._condition(q) < _USABLE][: 1 if large else 5]
         if not places:
             raise CompileError(f"{mechanism.name}: all states near home are singular", "")
-        self.samples = [self._sample(q) for q in (*places, self._towards_singularity(places[-1]))]
+        if not large:
+            places.append(self._towards_singularity(places[-1]))
+        self.samples = [self._sample(q) for q in places]
 
     def _sample(self, q: Array) -> Sample:
         rng, m, model = self._rng, self._m, self._m.model
@@ -295,7 +301,7 @@ class Proof:
             "energy": lambda: (np.array(m.energy(s.q, s.v)),),
             "closed": lambda: (self._completed(s, found[0]),),
             "step": lambda: self._steps(s, 1),
-            "steps": lambda: self._steps(s, BLOCK),
+            "steps": lambda: self._steps(s, BLOCK) if s is self.samples[0] else (None, None),
             "inverse_dynamics_derivatives": lambda: m.inverse_dynamics_derivatives(
                 s.q, s.v, s.a, wrenches=acting
             ),
