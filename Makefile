@@ -35,8 +35,9 @@ test: setup-dev ## lint, format check, types, documentation and all tests; insta
 docs: setup-dev ## build the documentation into build/docs, warnings are errors
 	@sh tools/check docs
 
-bench: setup-dev ## measure the speed of the solvers
+bench: setup-dev ## measure the speed of the solvers, and of generated code against its peers
 	OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks --benchmark-only $(PYTEST_ARGS)
+	OPENBLAS_NUM_THREADS=1 .venv/bin/python -m benchmarks.generated_code_table
 
 wheel: ## build sdist and wheel into dist, and try the wheel on every Python found
 	@sh tools/check-wheel build/wheel
