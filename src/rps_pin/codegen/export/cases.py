@@ -15,8 +15,14 @@ from rps_pin.codegen.export.vectors import vectors
 from rps_pin.codegen.expressions.functions import MechanismFunctions
 from rps_pin.errors import InputError
 
+#: Functions of a mechanism that eliminate nothing.
+UNCHECKED = ("gaps", "jacobian", "generalised_force", "energy")
+#: Functions whose results are forces of all joints, brought to independent ones or to closures.
+_REDUCED = ("inverse_dynamics", "constraint_forces", "bias", "gravity_forces")
 #: States keep this share of the limit of growth.
 _REGULAR = 0.1
+#: What every number of an open configuration is moved by.
+_OPEN = 0.3
 
 
 class Cases:
@@ -59,6 +65,15 @@ class Cases:
         """Return the cases of a function or routine, of its first `count` results."""
         return [self._case(name, inputs, count, sample) for sample in self._samples]
 
+    def opened(self, name: str, inputs: Sequence[str], checked: bool) -> Sequence[Array]:
+        """Return arguments of a function with open loops; none if its status does not tell that."""
+        if not checked or name in ("closed", "step"):
+            return ()
+        given = self._given(name, inputs, self._samples[0])
+        moved = [one + _OPEN if key == "q" else one for key, one in zip(inputs, given, strict=True)]
+        opening = self._evaluation(name, moved)[-1][0]
+        return moved if opening > 10.0 else ()
+
     def _growth(self, sample: Sample) -> float:
         """Return growth at a state; infinity if its loops are open."""
         function = self._functions["forward_dynamics"]
@@ -84,13 +99,27 @@ class Cases:
         expected = [None if one is None else np.ravel(one) for one in answers]
         scales = [self._scale(key, one) for key, one in zip(inputs, given, strict=True)]
         found = [float(one.max(initial=0.0)) for one in conditions(evaluate, given, scales)]
+        share = 0.0 if name in UNCHECKED else sample.condition
         if name in ("closed", "step"):
             found[0] += self._of_closing(sample)
         if name.startswith("forward_dynamics"):
-            share = self._of_inertia(sample)
-            sizes = [float(np.abs(one).max(initial=0.0)) for one in results]
-            found = [one + share * size for one, size in zip(found, sizes, strict=True)]
+            share += self._of_inertia(sample)
+        sizes = [float(np.abs(one).max(initial=0.0)) for one in results]
+        if name in _REDUCED:
+            reduced = self._reduced(sample)
+            sizes = [max(size, reduced) for size in sizes]
+        found = [one + share * size for one, size in zip(found, sizes, strict=True)]
         return Case(tuple(given), tuple(expected), tuple(found))
+
+    def _reduced(self, sample: Sample) -> float:
+        """Return the largest entry of |T|' |force|: what forces on dependent joints add up from."""
+        also = ["parameters"] if sample.parameters.size else []
+        wrenches = ["wrenches"] if sample.wrenches.size else []
+        (basis, _) = self._evaluation("motion_basis", self._given("", ["q", *also], sample))
+        given = self._given("", ["q", "v", "a", *wrenches, *also], sample)
+        (force,) = self._evaluation("generalised_force", given)
+        sums = np.abs(basis.reshape(force.size, -1)).T @ np.abs(force)
+        return float(sums.max(initial=0.0))
 
     def _of_inertia(self, sample: Sample) -> float:
         """Return the condition number of the mass matrix, its coordinates scaled to 1."""

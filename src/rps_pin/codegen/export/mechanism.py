@@ -10,7 +10,7 @@ import numpy as np
 from rps_pin.closed_loop.constraints.equations import OPEN
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen.export import words
-from rps_pin.codegen.export.cases import Cases
+from rps_pin.codegen.export.cases import UNCHECKED, Cases
 from rps_pin.codegen.export.names import identifier, quoted
 from rps_pin.codegen.export.package import Constant, Function, Order, Package, Real
 from rps_pin.codegen.export.vectors import Entry, vectors
@@ -23,7 +23,6 @@ from rps_pin.errors import InputError, did_you_mean
 from rps_pin.validation import choice as one_of
 
 _EPSILONS: Mapping[str, float] = {"double": 2.0**-52, "float": 2.0**-23}
-_UNCHECKED = ("gaps", "jacobian", "generalised_force", "energy")
 
 
 def mechanism_package(
@@ -97,6 +96,7 @@ def mechanism_package(
                 {key: own.get(key) or words.ARGUMENTS[key] for key in (*inputs, *results)},
                 _operations(unit, one),
                 cases.of(source, inputs, len(results)),
+                cases.opened(source, inputs, one in unit.checked),
             )
         )
     return Package(
@@ -137,7 +137,7 @@ def _unit(
         if source not in with_loops:
             kernels.append(Kernel(_renamed(functions[source], one)))
     loops = [one for key, one in with_loops.items() if key in needed]
-    checked = frozenset(sources) - set(_UNCHECKED)
+    checked = frozenset(sources) - set(UNCHECKED)
     return Unit(name, tuple(kernels), tuple(loops), tuple(sources), checked, limit)
 
 

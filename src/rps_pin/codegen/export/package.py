@@ -45,6 +45,8 @@ class Function:
         About how many operations of arithmetic a result takes.
     cases : sequence of Case
         For the self-test.
+    opened : sequence of arrays
+        Arguments for which the status tells open loops; none if there is no such bit.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Function:
     arguments: Mapping[str, str]
     operations: int
     cases: Sequence[Case]
+    opened: Sequence[Array] = ()
 
 
 class Order(NamedTuple):

@@ -96,6 +96,11 @@ def _test(package: Package, function: Function) -> str:
     text += ["    }"]
     if one.inputs and one.inputs[0][1]:
         text += _bad(package, function, results)
+    if function.opened:
+        for (argument, size), value in zip(one.inputs, function.opened, strict=True):
+            text.insert(0, _table(package.real, f"{name}_opened_{argument}", max(1, size), [value]))
+        opened = [f"{name}_opened_{argument}[0]" for argument, _ in one.inputs]
+        text += _flagged(package, name, [*opened, *results], "OPEN", "    ")
     return "\n".join([*text, "    end();", "}", ""])
 
 
@@ -105,16 +110,22 @@ def _bad(package: Package, function: Function, results: Sequence[str]) -> list[s
     (first, size), *rest = one.inputs
     name = function.name
     given = ["bad", *(f"{name}_given_{argument}[0]" for argument, _ in rest)]
-    call = f"{package.name}_{name}({', '.join([*given, *results])})"
     return [
         "    {",
         f"        REAL bad[{size}];",
         f"        for (k = 0; k < {size}; ++k) bad[k] = {name}_given_{first}[0][k];",
         "        bad[0] = (REAL)NAN;",
-        f"        status_is(-1, {call} & {package.macro('NOT_FINITE')},",
-        f"                  {package.macro('NOT_FINITE')});",
+        *_flagged(package, name, [*given, *results], "NOT_FINITE", "        "),
         "    }",
     ]
+
+
+def _flagged(
+    package: Package, name: str, arguments: Sequence[str], bit: str, indent: str
+) -> list[str]:
+    """Return a statement that calls a function whose status must have a bit."""
+    call, macro = f"{package.name}_{name}({', '.join(arguments)})", package.macro(bit)
+    return [f"{indent}status_is(-{macro}, {call} & {macro}, {macro});"]
 
 
 def _table(real: str, name: str, size: int, rows: Sequence[Array]) -> str:

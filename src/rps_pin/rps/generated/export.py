@@ -183,7 +183,7 @@ def _functions(robot: RPSRobot, single: bool) -> tuple[list[Kernel], list[Routin
     """Return kernels and routines of a robot, those that are called before those that call."""
     p = robot.parameters
     limits = limits_of(p)
-    inverse = _bound(inverse_kernel(), numbers=limits)
+    inverse = _within_limits(_bound(inverse_kernel(), numbers=limits))
     forces = _bound(
         forces_kernel(),
         numbers=limits,
@@ -223,6 +223,17 @@ def _functions(robot: RPSRobot, single: bool) -> tuple[list[Kernel], list[Routin
     )
     following = [*follow_kernels(single), start_kernel(), end_kernel()]
     return [*kernels, *following], [FOLLOW, DIRECT, direct, computed_torque]
+
+
+def _within_limits(inverse: Kernel) -> Kernel:
+    """Return inverse kinematics that flags what is beyond the limits, too."""
+    pose = ca.SX.sym("pose", 3)
+    length, angle, reachable, check = inverse.function.call([pose])
+    flagged = ca.vertcat(ca.fmax(check[0], 2.0 * (1.0 - reachable)), 0.0)
+    outputs = [length, angle, ca.densify(flagged)]
+    return Kernel(
+        ca.Function(inverse.name, [pose], outputs, ["pose"], ["length", "angle", "check"])
+    )
 
 
 def _rate_kernel(inverse: Kernel) -> Kernel:
