@@ -518,10 +518,10 @@ class CompiledMechanism:
         **options: Any,
     ) -> Array:
         """Return accelerations under actuator forces, (..., nv); see `ClosedLoopModel`."""
-        if self._plain and not (wrenches or options):
-            a, status = self._calls["forward_dynamics"](q, v, tau)
-            if status.__class__ is int and not status:
-                return a  # type: ignore[no-any-return]
+        if not (wrenches or options):
+            single = self._single.forward_dynamics(q, v, tau)
+            if single and not single[1]:
+                return single[0]  # type: ignore[no-any-return]
 
         def answer(m: ClosedLoopModel, q: Array, v: Array, tau: Array, w: Any) -> Sequence[Any]:
             return (m.forward_dynamics(q, v, tau, wrenches=w),)
@@ -772,10 +772,10 @@ class CompiledMechanism:
         Of order 4, as `Stepper.advance` takes it; the dependent joints are closed, the independent
         ones stay.
         """
-        if duration.__class__ is float and self._plain and not (wrenches or options):
-            *state, status = self._calls["step"](q, v, tau, _length(duration))
-            if status.__class__ is int and not status:
-                return state[0], state[1]
+        if duration.__class__ is float and not (wrenches or options):
+            single = self._single.step(q, v, tau, _length(duration))
+            if single and not single[-1]:
+                return single[0], single[1]
 
         def answer(
             m: ClosedLoopModel, q: Array, v: Array, tau: Array, h: Array, w: Any
