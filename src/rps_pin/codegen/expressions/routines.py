@@ -19,6 +19,8 @@ BLOCK = 64
 #: Squared gaps, in characteristic lengths: rounding error; and from where one more step of Newton's
 #: method leads to rounding error.
 _CLOSED, _LAST = "PRECISE(1e-28, 1e-13)", "PRECISE(1e-16, 1e-8)"
+#: The same in Newton's method beside a singularity, where what a step leaves is many times larger.
+_LAST_OF_ALL = "PRECISE(1e-22, 1e-10)"
 _NEWTON_STEPS = 20
 
 
@@ -79,7 +81,7 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
         if (!ANY(LT({_CLOSED}, gap[0]))) break;
         {_call("integrate", ["q_closed", "dv"], extra, "moved")}
         for (i = 0; i < {model.nq}; ++i) q_closed[i] = moved[i];
-        if (!ANY(LT({_LAST}, gap[0]))) break;
+        if (!ANY(LT({_LAST_OF_ALL}, gap[0]))) break;
     }}
     check[0] = SELECT(LT({_LAST}, before), CONST(2), check[0]);
 """
