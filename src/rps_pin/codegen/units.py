@@ -8,7 +8,7 @@ programs (`Unit.c99`), and for CUDA (`Unit.cuda`).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
@@ -100,7 +100,8 @@ class Routine:
     REAL, chooses by SELECT(condition, x, y), writes numbers as CONST(0.5), those that depend on
     the rounding error as PRECISE(in_double, in_single), and repeats a loop while ANY(condition),
     that of any of the samples. It calls a function as ``NAME(x0, ..., y0, ...)`` with pointers to
-    inputs and outputs that do not overlap.
+    inputs and outputs that do not overlap. A ROW is COLUMNS numbers of type REAL, of which
+    ENTRY(row, j) is one; it is added, and multiplied by a REAL, as one.
 
     Parameters
     ----------
@@ -112,6 +113,10 @@ class Routine:
         What stands between its braces.
     calls
         Names of the kernels and routines that it calls.
+    matrices
+        Shapes of those inputs and outputs that are matrices, row-major.
+    before
+        Text of C functions that only the body calls.
     """
 
     name: str
@@ -119,18 +124,21 @@ class Routine:
     outputs: tuple[tuple[str, int], ...]
     body: str
     calls: tuple[str, ...] = ()
+    matrices: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    before: str = ""
 
     @property
     def shapes(self) -> tuple[tuple[int, ...], ...]:
-        """Return the shapes of inputs and outputs: (size,)."""
-        return tuple((size,) for _, size in (*self.inputs, *self.outputs))
+        """Return the shapes of inputs and outputs: (size,), or a matrix's."""
+        every = (*self.inputs, *self.outputs)
+        return tuple(self.matrices.get(name, (size,)) for name, size in every)
 
     def text(self) -> str:
         """Return the C text, in macros."""
         inputs, outputs = [name for name, _ in self.inputs], [name for name, _ in self.outputs]
         unused = [f"    (void){name};" for name in (*inputs, *outputs)]
         head = f"LOCAL {signature(self.name, inputs, outputs)}"
-        return "\n".join([head, "{", *unused, self.body.strip("\n"), "}", ""])
+        return "\n".join([self.before, head, "{", *unused, self.body.strip("\n"), "}", ""])
 
 
 @cache

@@ -10,6 +10,12 @@ typedef double lanes_real __attribute__((vector_size(8 * LANES)));
 typedef long long lanes_bits __attribute__((vector_size(8 * LANES)));
 #undef REAL
 #define REAL lanes_real
+#undef COLUMNS
+#undef ROW
+#undef ENTRY
+#define COLUMNS 1
+#define ROW REAL
+#define ENTRY(row, j) (row)
 
 /* A function of C for each lane; not inline where it is a call for each. */
 #define EACH_LANE(kind, name) \

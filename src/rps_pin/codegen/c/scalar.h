@@ -41,6 +41,19 @@ double copysign(double, double);
 #endif
 #endif
 
+/* COLUMNS numbers of one sample that are computed alike. */
+#if defined(__GNUC__) && !defined(__TINYC__) && !defined(__CUDACC__) \
+    && (defined(__SSE2__) || defined(__aarch64__))
+#define COLUMNS 8
+typedef REAL columns_row __attribute__((vector_size(8 * sizeof(REAL))));
+#define ROW columns_row
+#define ENTRY(row, j) ((row)[j])
+#else
+#define COLUMNS 1
+#define ROW REAL
+#define ENTRY(row, j) (row)
+#endif
+
 /* Chunks of a function. */
 #define PART(name) name##_part
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rps_pin.codegen.expressions.functions import MechanismFunctions
 from rps_pin.codegen.expressions.mechanism import LIMITS
-from rps_pin.codegen.expressions.routines import routines
+from rps_pin.codegen.expressions.routines import with_calls
 from rps_pin.codegen.units import Kernel, Routine, Unit
 
 #: About the largest number of statements of one function of CUDA. Values that cross from one
@@ -18,16 +18,11 @@ NAMES = ("inverse_dynamics", "forward_dynamics", "step", "motion")
 def unit(functions: MechanismFunctions, name: str, real: str) -> Unit:
     """Return the unit of one of `NAMES`, in "double" or "float"; its text is `Unit.cuda`."""
     limit = LIMITS[real]
-    loops = routines(functions)
-    loops = (*loops, _motion(next(one for one in loops if one.name == "step"), limit))
-    with_loops = {one.name: one for one in loops}
-    needed = [name]
-    for one in needed:
-        calls = with_loops[one].calls if one in with_loops else ()
-        needed += [call for call in calls if call not in needed]
-    kernels = [Kernel(functions[one], CHUNK) for one in needed if one not in with_loops]
-    called = tuple(one for one in loops if one.name in needed)
-    return Unit(f"{name}_unit", tuple(kernels), called, (name,), frozenset({name}), limit)
+    called, loops = with_calls(functions, ["step" if name == "motion" else name])
+    if name == "motion":
+        loops = (*loops, _motion(loops[-1], limit))
+    kernels = tuple(Kernel(functions[one], CHUNK) for one in called)
+    return Unit(f"{name}_unit", kernels, loops, (name,), frozenset({name}), limit)
 
 
 def _motion(step: Routine, limit: float) -> Routine:

@@ -33,7 +33,7 @@ from rps_pin.codegen.expressions.independent import (
 )
 from rps_pin.codegen.expressions.mechanism import MechanismExpressions
 from rps_pin.codegen.expressions.parameters import Parameters
-from rps_pin.codegen.expressions.routines import routines
+from rps_pin.codegen.expressions.routines import with_calls
 from rps_pin.codegen.units import Kernel, Unit
 from rps_pin.errors import InputError, did_you_mean
 
@@ -285,18 +285,10 @@ class GeneratedCode:
     def _unit(self, name: str) -> Unit:
         is_checked = name in _CHECKED or name.startswith("frame_jacobian_")
         checked = frozenset({name} if is_checked else ())
-        with_loops = {one.name: one for one in routines(self.functions)}
-        if name not in with_loops:
-            kernel = Kernel(self.functions[name])
-            return Unit(name, (kernel,), (), (name,), checked, limit=1.0)
-        needed = [name]
-        for one in needed:
-            needed += [
-                call for call in getattr(with_loops.get(one), "calls", ()) if call not in needed
-            ]
-        kernels = tuple(Kernel(self.functions[one]) for one in needed if one not in with_loops)
-        loops = tuple(one for one in with_loops.values() if one.name in needed)
-        return Unit(f"{name}_unit", kernels, loops, (name,), checked, limit=1.0)
+        called, loops = with_calls(self.functions, [name])
+        kernels = tuple(Kernel(self.functions[one]) for one in called)
+        unit = f"{name}_unit" if loops else name
+        return Unit(unit, kernels, loops, (name,), checked, limit=1.0)
 
     def _signatures(self, group: str) -> dict[str, Any]:
         """Return names and shapes of the functions' inputs and outputs."""

@@ -17,7 +17,7 @@ from rps_pin.codegen.export.vectors import Entry, vectors
 from rps_pin.codegen.expressions.functions import MechanismFunctions
 from rps_pin.codegen.expressions.independent import choose, regular_samples
 from rps_pin.codegen.expressions.mechanism import GROWTH, LIMITS, MechanismExpressions
-from rps_pin.codegen.expressions.routines import routines
+from rps_pin.codegen.expressions.routines import with_calls
 from rps_pin.codegen.units import Kernel, Unit
 from rps_pin.errors import InputError, did_you_mean
 from rps_pin.validation import choice as one_of
@@ -128,23 +128,11 @@ def _unit(
     functions: MechanismFunctions, name: str, sources: Mapping[str, str], limit: float
 ) -> Unit:
     """Return the unit of functions and of what they call."""
-    with_loops = {one.name: one for one in routines(functions)}
-    needed = dict(sources)
-    for one in list(sources):
-        _add_calls(one, with_loops, needed)
-    kernels = []
-    for one, source in needed.items():
-        if source not in with_loops:
-            kernels.append(Kernel(_renamed(functions[source], one)))
-    loops = [one for key, one in with_loops.items() if key in needed]
+    called, loops = with_calls(functions, sources.values())
+    names = {source: one for one, source in sources.items()}
+    kernels = [Kernel(_renamed(functions[one], names.get(one, one))) for one in called]
     checked = frozenset(sources) - set(UNCHECKED)
-    return Unit(name, tuple(kernels), tuple(loops), tuple(sources), checked, limit)
-
-
-def _add_calls(name: str, with_loops: Mapping[str, object], needed: dict[str, str]) -> None:
-    for call in getattr(with_loops.get(name), "calls", ()):
-        needed.setdefault(call, call)
-        _add_calls(call, with_loops, needed)
+    return Unit(name, tuple(kernels), loops, tuple(sources), checked, limit)
 
 
 def _operations(unit: Unit, name: str) -> int:

@@ -4,13 +4,15 @@ The equations are those of `rps_pin.closed_loop.dynamics.derivatives`: with F = 
 external forces - J' lambda (lambda held) and c = J a + J' v,
 
     inverse dynamics     dtau = T' dF;
-    forward dynamics     (T' M T) da_i = S' dtau - T' (dF + M x),  J x = -dc,  x_i = 0,
+    forward dynamics     (T' M T) da_i = T' (S' dtau - dF - M x),  J x = -dc,  x_i = 0,
+                         da = T da_i + x,
 
 and in independent coordinates y, which the rest follows,
 
     dq = T dy,    dv = T dy' + V_y dy,    J V_y = -(J v)_q T,
 
     dtau = T' (F_q + M X_q) T dy + T' (F_v + M X_v) (T dy' + V_y dy) + T' M T dy'',
+    da_i = a_iq T dy + a_iv (T dy' + V_y dy) + a_itau dtau,
 
 X_q and X_v being the x of c_q and c_v. T' M x needs no x: it is -Y' dc with J_d' Y = (M T)_d.
 The derivatives of rnea are in closed form (see `rnea_derivatives`); of the rest of F, of J v and of
@@ -36,6 +38,7 @@ import casadi as ca
 from rps_pin.codegen.expressions.closures import Carrier
 from rps_pin.codegen.expressions.mechanism import Expression, MechanismExpressions
 from rps_pin.codegen.expressions.rnea_derivatives import rnea_derivatives
+from rps_pin.codegen.linear_maps import LinearMap
 
 
 class InverseSlopes(NamedTuple):
@@ -135,11 +138,6 @@ class Slopes:
             turned += (ca.skew(spin_rate) + spin @ spin) @ gaps
         return turned
 
-    @cached_property
-    def _mass_times_basis(self) -> Expression:
-        """M T, shape (nv, m)."""
-        return ca.sparsify(self.x.tree.mass_matrix() @ self.x.basis)
-
     def _reduced(self, of_force: Expression, opening: Expression) -> Expression:
         """Return T' (dF + M x), (m, k), for the x with J x = -opening and no independent entries.
 
@@ -155,7 +153,7 @@ class Slopes:
     def _adjoint(self) -> Expression:
         """Y, shape (nc, m)."""
         return self.x.factors.transposed(
-            self._mass_times_basis[self.x.partition.dependent.tolist(), :]
+            self.x.mass_times_basis[self.x.partition.dependent.tolist(), :]
         )
 
     @cached_property
@@ -191,41 +189,71 @@ class Slopes:
         values = ca.substitute(list(slopes.values()), [self.multipliers], [ca.densify(multipliers)])
         return dict(zip(slopes, values, strict=True))
 
+    @cached_property
+    def followed(self) -> Expression:
+        """V_y, shape (nv, m)."""
+        return ca.sparsify(-self.x.dependent(self.rate_q @ self.x.basis))
+
     def inverse(self) -> InverseSlopes:
         """Return the derivatives of the actuator forces, the independent joints being actuated."""
         x, T = self.x, self.x.basis
-        velocity_y = ca.sparsify(-x.dependent(self.rate_q @ T))  # V_y
         return InverseSlopes(
             T.T @ self.force_q,
             T.T @ self.force_v,
-            self._mass_times_basis.T,
-            self._reduced_q @ T + self._reduced_v @ velocity_y,
+            x.mass_times_basis.T,
+            self._reduced_q @ T + self._reduced_v @ self.followed,
             self._reduced_v @ T,
             x.mass_matrix,
         )
 
-    def forward(self) -> ForwardSlopes:
-        """Return the derivatives of the acceleration.
+    def changes(self) -> tuple[Expression, Expression]:
+        """Return dF - S' dtau and dc by q, v and tau side by side, of shapes (n, 2 nv + na)."""
+        x = self.x
+        actuators = ca.SX(x.tree.model.nv, x.tau.numel())
+        for k, i in enumerate(x.system.actuated.tolist()):
+            actuators[i, k] = -1
+        still = ca.SX(x.rows.gap.numel(), x.tau.numel())
+        force = ca.horzcat(self.force_q, self.force_v, actuators)
+        return ca.sparsify(force), ca.horzcat(self.opening_q, self.opening_v, still)
 
-        Those of the independent entries: (T' M T) da_i = S' dtau less what inverse dynamics asks.
-        The others follow, J_d da_d = -(dc + J_i da_i).
-        """
-        x, T = self.x, self.x.basis
-        inverse = self.inverse()
-        of_actuators = ca.sparsify(T[x.system.actuated.tolist(), :].T)
-        along = x.inertia.solve(of_actuators)
+    def forward(self) -> ForwardSlopes:
+        """Return the derivatives of the acceleration."""
+        x, nv = self.x, self.x.tree.model.nv
+        independent = x.independent.tolist()
+        by_q, by_v, by_tau = ca.horzsplit(
+            x.response(*self.changes()), [0, nv, 2 * nv, 2 * nv + x.tau.numel()]
+        )
+        of_q, of_v = by_q[independent, :], by_v[independent, :]
         return ForwardSlopes(
-            self._whole(-x.inertia.solve(self._reduced_q), self.opening_q),
-            self._whole(-x.inertia.solve(self._reduced_v), self.opening_v),
-            T @ along,
-            -x.inertia.solve(ca.sparsify(inverse.position)),
-            -x.inertia.solve(ca.sparsify(inverse.velocity)),
-            along,
+            by_q,
+            by_v,
+            by_tau,
+            of_q @ x.basis + of_v @ self.followed,
+            of_v @ x.basis,
+            by_tau[independent, :],
         )
 
-    def _whole(self, along: Expression, opening: Expression) -> Expression:
-        """Return da (nv, k) of its independent entries (m, k) and of dc (nc, k)."""
-        x, independent = self.x, self.x.independent.tolist()
-        da = -x.dependent(opening + x.jacobian[:, independent] @ along)
-        da[independent, :] = along
-        return da
+
+class ForwardColumns:
+    """What the derivatives of the acceleration are computed from, column by column.
+
+    Attributes
+    ----------
+    right
+        dF - S' dtau above dc, by q, v and tau side by side, sparse, shape (nv + nc, 2 nv + na).
+    response : LinearMap
+        From a column of these to one of da.
+    basis, followed
+        Rows of T and V_y of the dependent velocities, sparse, shape (nd, m).
+    """
+
+    def __init__(self, x: MechanismExpressions, multipliers: Expression) -> None:
+        slopes = Slopes(x)
+        dependent = x.partition.dependent.tolist()
+        force = ca.SX.sym("force", x.tree.model.nv)
+        opening = ca.SX.sym("opening", x.rows.gap.numel())
+        self.response = LinearMap(ca.vertcat(force, opening), x.response(force, opening))
+        right = ca.sparsify(ca.vertcat(*slopes.changes()))
+        self.right = slopes.at(multipliers, {"right": right})["right"]
+        self.basis = ca.sparsify(x.basis[dependent, :])
+        self.followed = ca.sparsify(slopes.followed[dependent, :])

@@ -58,11 +58,17 @@ velocities and accelerations are held; the rest of the mechanism follows, its lo
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
 
-from rps_pin.codegen.expressions.derivatives import ForwardSlopes, InverseSlopes, Slopes
+from rps_pin.codegen.expressions.derivatives import (
+    ForwardColumns,
+    ForwardSlopes,
+    InverseSlopes,
+    Slopes,
+)
 from rps_pin.codegen.expressions.elimination import LDL
 from rps_pin.codegen.expressions.mechanism import Expression, MechanismExpressions
 
@@ -91,11 +97,21 @@ class MechanismFunctions:
             self._made[name] = self._make(name)
         return self._made[name]
 
+    @cached_property
+    def forward_columns(self) -> ForwardColumns:
+        """What ``forward_columns`` gives the nonzero numbers of."""
+        x = self.expressions
+        columns = ForwardColumns(x, _multipliers(x))
+        columns.right = ca.substitute(columns.right, x.a, x.acceleration)
+        return columns
+
     def _make(self, name: str) -> Any:
         x = self.expressions
         kind, _, index = name.rpartition("_")
         if kind in ("frame", "frame_jacobian"):
             given, results = _of_frame(x, int(index), kind)
+        elif name == "forward_columns":
+            given, results = _of_columns(x, self.forward_columns)
         else:
             given, results = _MAKERS[name](x)
         if x.wrench_frames and name in UNDER_WRENCHES:
@@ -114,7 +130,7 @@ def is_matrix(result: str) -> bool:
 Made = tuple[dict[str, Expression], dict[str, Expression]]
 _MAKERS: dict[str, Callable[[MechanismExpressions], Made]] = {}
 #: Functions that take wrenches.
-UNDER_WRENCHES: set[str] = {"step", "steps"}
+UNDER_WRENCHES: set[str] = {"step", "steps", "forward_columns"}
 
 
 def _function(
@@ -293,14 +309,31 @@ def _by(slopes: InverseSlopes | ForwardSlopes) -> dict[str, Expression]:
 
 @_function(wrenches=True)
 def _forward_dynamics_derivatives(x: MechanismExpressions) -> Made:
-    slopes = Slopes(x)
     given, results = _accelerated(x)
-    rest = x.required(x.a)
-    rest[x.system.actuated.tolist()] -= x.tau
-    found = slopes.at(x.reduced(rest)[1], _by(slopes.forward()))
+    slopes = Slopes(x)
+    found = slopes.at(_multipliers(x), _by(slopes.forward()))
     names, values = list(found), list(found.values())
     values = ca.substitute(values, [x.a], [results["a"]])
     return given, dict(zip(names, values, strict=True)) | {"check": results["check"]}
+
+
+def _multipliers(x: MechanismExpressions) -> Expression:
+    """Return lambda of the motion q, v, a under the forces tau, shape (nc,)."""
+    rest = x.required(x.a)
+    rest[x.system.actuated.tolist()] -= x.tau
+    return x.reduced(rest)[1]
+
+
+def _of_columns(x: MechanismExpressions, columns: ForwardColumns) -> Made:
+    """Return the numbers from which `routines` computes the derivatives of forward dynamics."""
+    given, results = _accelerated(x)
+    numbers = {
+        "right": ca.vertcat(ca.SX(0, 1), *columns.right.nonzeros()),
+        "coefficients": columns.response.coefficients,
+        "basis_numbers": ca.vertcat(ca.SX(0, 1), *columns.basis.nonzeros()),
+        "followed_numbers": ca.vertcat(ca.SX(0, 1), *columns.followed.nonzeros()),
+    }
+    return given, numbers | {"check": results["check"]}
 
 
 @_function()
@@ -320,10 +353,8 @@ def _inverse_dynamics_by_parameters(x: MechanismExpressions) -> Made:
 def _forward_dynamics_by_parameters(x: MechanismExpressions) -> Made:
     slopes = Slopes(x)
     given, results = _accelerated(x)
-    rest = x.required(x.a)
-    rest[x.system.actuated.tolist()] -= x.tau
     change = -x.inertia.solve(slopes.by_parameters()[1])
-    found = slopes.at(x.reduced(rest)[1], {"by_parameters": change})
+    found = slopes.at(_multipliers(x), {"by_parameters": change})
     found = {k: ca.substitute(f, x.a, results["a"]) for k, f in found.items()}
     return given, found | {"check": results["check"]}
 

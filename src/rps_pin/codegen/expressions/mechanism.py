@@ -317,13 +317,33 @@ class MechanismExpressions:
     @cached_property
     def mass_matrix(self) -> Expression:
         """T' M T, shape (m, m)."""
-        basis = self.basis
-        return ca.sparsify(basis.T @ (self.tree.mass_matrix() @ basis))
+        return ca.sparsify(self.basis.T @ self.mass_times_basis)
 
     @cached_property
     def inertia(self) -> LDL:
         """Factors of T' M T."""
         return LDL(self.mass_matrix)
+
+    @cached_property
+    def mass_times_basis(self) -> Expression:
+        """M T, shape (nv, m)."""
+        return ca.sparsify(self.tree.mass_matrix() @ self.basis)
+
+    def response(self, force: Expression, opening: Expression) -> Expression:
+        """Return the accelerations a (nv, k) with T' (M a + f) = 0, J a = -c.
+
+        With x the solution of J x = -c without independent entries,
+
+            (T' M T) w = -T' (f + M x),    a = T w + x.
+
+        Parameters
+        ----------
+        force, opening
+            f and c, shapes (nv, k) and (nc, k).
+        """
+        x, dependent = -self.dependent(opening), self.partition.dependent.tolist()
+        reduced = self.basis.T @ force + self.mass_times_basis[dependent, :].T @ x[dependent, :]
+        return ca.sparsify(self.basis @ self.inertia.solve(ca.sparsify(-reduced)) + x)
 
     @cached_property
     def acceleration(self) -> Expression:

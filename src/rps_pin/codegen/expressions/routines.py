@@ -1,4 +1,4 @@
-"""Routines of C with loops: Newton's method on the closures, and steps in time.
+"""Routines of C with loops: Newton's method on the closures, steps in time, and derivatives.
 
 A step is that of `rps_pin.closed_loop.simulation.integrators.rk4_step`, and ends on the manifold of
 closed configurations: by a correction of least norm, and what that leaves, its square, by the
@@ -7,7 +7,8 @@ dependent joints.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 
 from rps_pin.closed_loop.assembly.projection import NEAREST_STEP, NEAREST_STEPS
 from rps_pin.closed_loop.constraints.equations import OPEN
@@ -24,31 +25,51 @@ _LAST_OF_ALL = "PRECISE(1e-22, 1e-10)"
 _NEWTON_STEPS = 20
 
 
-def routines(functions: MechanismFunctions) -> tuple[Routine, ...]:
-    """Return ``closed``, ``closed_near``, ``nearest``, ``step`` and ``steps``.
+def routines(functions: MechanismFunctions, names: Iterable[str]) -> tuple[Routine, ...]:
+    """Return those functions of names that are routines, and the routines that they call.
 
-    ========================  =====================  ============================================
-    name                      arguments              results
-    ========================  =====================  ============================================
-    closed                    q                      q, its independent coordinates as given;
-                                                     squared gap of the guess (1) (check)
-    closed_near               q                      the same by steps of least norm (check)
-    nearest                   q                      the closed q at the least distance; squared,
-                                                     that distance in one unit (1) (check)
-    step                      q, v, tau, h (1)       q, v, work (1) (check)
-    steps                     q, v, tau, h (BLOCK)   all q, all v, all work, (BLOCK, ...) each
-                                                     (check)
-    ========================  =====================  ============================================
+    Each stands after those it calls. There are
+
+    ============================  ====================  ========================================
+    name                          arguments             results
+    ============================  ====================  ========================================
+    closed                        q                     q, its independent coordinates as given;
+                                                        squared gap of the guess (1) (check)
+    closed_near                   q                     the same by steps of least norm (check)
+    nearest                       q                     the closed q at the least distance;
+                                                        squared, that distance in one unit (1)
+                                                        (check)
+    step                          q, v, tau, h (1)      q, v, work (1) (check)
+    steps                         q, v, tau, h (BLOCK)  all q, all v, all work, (BLOCK, ...) each
+                                                        (check)
+    forward_dynamics_derivatives  q, v, tau             as the function of this name
+    ============================  ====================  ========================================
 
     External wrenches and parameters follow the arguments, as for `functions`.
     """
-    return (
-        _newton(functions, "closed", "closing_step"),
-        _newton(functions, "closed_near", "least_norm_step"),
-        _nearest(functions),
-        _step(functions),
-        _steps(functions),
-    )
+    found: dict[str, Routine] = {}
+
+    def add(name: str) -> None:
+        if name in _MAKERS and name not in found:
+            one = _MAKERS[name](functions)
+            for call in one.calls:
+                add(call)
+            found[name] = one
+
+    for name in names:
+        add(name)
+    return tuple(found.values())
+
+
+def with_calls(
+    functions: MechanismFunctions, names: Iterable[str]
+) -> tuple[tuple[str, ...], tuple[Routine, ...]]:
+    """Return the kernels of functions and of what they call, by name, and their routines."""
+    names = tuple(names)
+    loops = routines(functions, names)
+    are_loops = {one.name for one in loops}
+    every = dict.fromkeys((*names, *(call for one in loops for call in one.calls)))
+    return tuple(name for name in every if name not in are_loops), loops
 
 
 def _extra(functions: MechanismFunctions, wrenches: bool) -> list[tuple[str, int]]:
@@ -210,3 +231,93 @@ def _steps(functions: MechanismFunctions) -> Routine:
     given = (("q", nq), ("v", nv), ("tau", x.system.actuated.size), ("h", BLOCK), *extra)
     outputs = (("qs", BLOCK * nq), ("vs", BLOCK * nv), ("works", BLOCK), ("check", 2))
     return Routine("steps", given, outputs, body, ("step",))
+
+
+def _forward_dynamics_derivatives(functions: MechanismFunctions) -> Routine:
+    """All columns of the derivatives by one linear map: see `ForwardColumns`."""
+    x, columns = functions.expressions, functions.forward_columns
+    nq, nv, na, m = x.tree.model.nq, x.tree.model.nv, x.tau.numel(), x.independent.size
+    extra, response = _extra(functions, True), columns.response
+    count, right = 2 * nv + na, columns.right.sparsity()
+    dependent, independent = x.partition.dependent, x.independent.tolist()
+    tables = {
+        "starts": right.colind(),
+        "right_rows": [1 + row for row in right.row()],
+        "places": response.places,
+        "independent": independent,
+    }
+    for name, matrix in (("basis", columns.basis), ("followed", columns.followed)):
+        rows, tables[f"{name}_columns"] = matrix.sparsity().get_triplet()
+        tables[f"{name}_rows"] = dependent[rows].tolist()
+    numbers = {
+        "right": right.nnz(),
+        "coefficients": response.coefficients.numel(),
+        "basis": columns.basis.nnz(),
+        "followed": columns.followed.nnz(),
+    }
+    arrays = ", ".join(f"{name}[{max(1, size)}]" for name, size in numbers.items())
+    body = f"""
+    {"".join(_table(name, values) for name, values in tables.items())}
+    REAL {arrays};
+    ROW rows[{response.rows}];
+    int i, j, k, begin;
+    {_call("forward_columns", ["q", "v", "tau"], extra, *numbers, "check")}
+    for (j = 0; j < COLUMNS; ++j) ENTRY(rows[0], j) = CONST(0);
+    for (begin = 0; begin < {count}; begin += COLUMNS) {{
+        const int end = begin + COLUMNS < {count} ? begin + COLUMNS : {count};
+        for (i = 1; i <= {right.size1()}; ++i) rows[i] = rows[0];
+        for (j = begin; j < end; ++j)
+            for (k = starts[j]; k < starts[j + 1]; ++k)
+                ENTRY(rows[right_rows[k]], j - begin) = right[k];
+        {response.calls("response", "rows", "coefficients")}
+        for (j = begin; j < end; ++j) {{
+            const int size = j < {2 * nv} ? {nv} : {na};
+            REAL *to = j < {nv} ? by_q + j
+                : j < {2 * nv} ? by_v + (j - {nv}) : by_tau + (j - {2 * nv});
+            for (i = 0; i < {nv}; ++i) to[i * size] = ENTRY(rows[places[i]], j - begin);
+        }}
+    }}
+    for (i = 0; i < {m}; ++i) {{
+        const REAL *of_q = by_q + independent[i] * {nv}, *of_v = by_v + independent[i] * {nv};
+        REAL *position = by_position + i * {m}, *velocity = by_velocity + i * {m};
+        for (j = 0; j < {m}; ++j) {{
+            position[j] = of_q[independent[j]];
+            velocity[j] = of_v[independent[j]];
+        }}
+        for (k = 0; k < {numbers["basis"]}; ++k) {{
+            j = basis_columns[k];
+            position[j] += of_q[basis_rows[k]] * basis[k];
+            velocity[j] += of_v[basis_rows[k]] * basis[k];
+        }}
+        for (k = 0; k < {numbers["followed"]}; ++k)
+            position[followed_columns[k]] += of_v[followed_rows[k]] * followed[k];
+        for (j = 0; j < {na}; ++j) by_actuation[i * {na} + j] = by_tau[independent[i] * {na} + j];
+    }}
+"""
+    matrices = {
+        "by_q": (nv, nv),
+        "by_v": (nv, nv),
+        "by_tau": (nv, na),
+        "by_position": (m, m),
+        "by_velocity": (m, m),
+        "by_actuation": (m, na),
+    }
+    outputs = (*((name, rows * size) for name, (rows, size) in matrices.items()), ("check", 2))
+    given = (("q", nq), ("v", nv), ("tau", na), *extra)
+    name = "forward_dynamics_derivatives"
+    before = response.text("response")
+    return Routine(name, given, outputs, body, ("forward_columns",), matrices, before)
+
+
+def _table(name: str, values: Sequence[int]) -> str:
+    return f"static const int {name}[] = {{{', '.join(map(str, values or [0]))}}};\n    "
+
+
+_MAKERS: Mapping[str, Callable[[MechanismFunctions], Routine]] = {
+    "closed": partial(_newton, name="closed", kernel="closing_step"),
+    "closed_near": partial(_newton, name="closed_near", kernel="least_norm_step"),
+    "nearest": _nearest,
+    "step": _step,
+    "steps": _steps,
+    "forward_dynamics_derivatives": _forward_dynamics_derivatives,
+}
