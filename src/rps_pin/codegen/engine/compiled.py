@@ -35,7 +35,7 @@ from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.stepper import Stepper
 from rps_pin.codegen.engine.applied import with_parameters
 from rps_pin.codegen.engine.batches import Errors, by_samples, settled
-from rps_pin.codegen.engine.forces import GeneratedForces, each
+from rps_pin.codegen.engine.forces import GeneratedForces, each, kept
 from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.simulation import simulate
 from rps_pin.codegen.expressions.functions import UNDER_WRENCHES
@@ -433,8 +433,8 @@ class CompiledMechanism:
         if usual and not self._underactuated:
             single = self._single.inverse_dynamics(q, v, a)
             if single and not single[-1]:
-                here: Any = self, q.copy(), None  # type: ignore[union-attr]
-                return GeneratedForces(single[0], single[1], single[2], None, here)
+                at = q.copy(), None  # type: ignore[union-attr]
+                return GeneratedForces(single[0], single[1], single[2], None, (self, at, None))
 
         def answer(m: ClosedLoopModel, q: Array, v: Array, a: Array, w: Any) -> Sequence[Any]:
             result = m.inverse_dynamics(q, v, a, wrenches=w)
@@ -461,8 +461,9 @@ class CompiledMechanism:
             lacking = ~(rest[1][..., 0] <= least_effort.RESIDUAL**2)  # NaN without an answer
             if np.any(lacking):
                 unproduced = np.where(lacking[..., None], rest[0], 0.0)
-        at = q.copy() if q.__class__ is np.ndarray else np.array(q, dtype=np.float64)
-        return GeneratedForces(tau, multipliers, residual, unproduced, (self, at, parameters))
+        numbers_ = None if parameters is None else np.array(parameters, dtype=np.float64)
+        here = self, kept(np.asarray(q, dtype=np.float64)), numbers_
+        return GeneratedForces(tau, multipliers, residual, unproduced, here)
 
     def passive_jacobian(self, q: ArrayLike, **options: Any) -> Array:
         """Return J_p, all entries in one unit, shape (..., nc, np)."""

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.inverse_dynamics import orientation
+from rps_pin.errors import InputError
 from rps_pin.numerics.linear_algebra import condition_number
 
 
@@ -18,6 +19,15 @@ class HasPassiveJacobian(Protocol):
 
     def passive_jacobian(self, q: ArrayLike, **options: Any) -> Array:
         """Return J_p."""
+
+
+#: A copy of one sample's q; or a batch's own array, and the sum of its numbers.
+Kept = tuple[Array, Any]
+
+
+def kept(q: Array) -> Kept:
+    """Return q as it is kept for what is computed later: a copy of a batch costs too much."""
+    return (q.copy(), None) if q.ndim == 1 else (q, q.sum())
 
 
 class GeneratedForces:
@@ -40,7 +50,7 @@ class GeneratedForces:
         constraint_forces: Array,
         residual: Array,
         unproduced: Array | None,
-        at: tuple[HasPassiveJacobian, Array, Any],
+        at: tuple[HasPassiveJacobian, Kept, Any],
     ) -> None:
         self.tau, self.constraint_forces, self._residual = tau, constraint_forces, residual
         self.unproduced, self._at = unproduced, at
@@ -51,14 +61,20 @@ class GeneratedForces:
         return self._residual[..., 0] if self._residual.ndim > 1 else float(self._residual[0])
 
     def _passive_jacobian(self) -> Array:
-        mechanism, q, parameters = self._at
+        mechanism, (q, total), parameters = self._at
+        if total is not None and not np.array_equal(q.sum(), total, equal_nan=True):
+            raise InputError(
+                "q was changed since inverse_dynamics was called: the condition of a batch is "
+                "computed from it when it is asked for"
+            )
         return mechanism.passive_jacobian(q, parameters=parameters)
 
     @property
     def condition(self) -> Any:
         """Condition number of the passive joints' Jacobian, float or (...); see `InverseDynamics`.
 
-        Computed when asked for.
+        Computed when asked for, for a batch from the array q that was given: `InputError` if that
+        was changed since.
         """
         return each(condition_number, self._passive_jacobian(), float)
 
