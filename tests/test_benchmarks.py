@@ -1,4 +1,4 @@
-"""The benchmark of generated code compares one mechanism, and its tables say which goals are met."""
+"""The benchmark of generated code compares one mechanism, and its tables say what is met."""
 
 from __future__ import annotations
 
