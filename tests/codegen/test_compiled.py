@@ -338,6 +338,10 @@ def test_samples_without_an_answer() -> None:
     forces = fast.inverse_dynamics(q, batch.v, batch.a, errors="mask")
     assert np.isnan(forces.tau[1]).all()
     assert np.isfinite(forces.tau[[0, 2, 3, 4]]).all()
+    broken = np.where(np.arange(5)[:, None] == 2, np.nan, batch.q)
+    forces = fast.inverse_dynamics(broken, batch.v, batch.a, errors="mask")
+    np.testing.assert_array_equal(np.isnan(forces.condition), np.arange(5) == 2)
+    np.testing.assert_array_equal(forces.orientation, [0] * 5)  # more rows than passive joints
     with pytest.raises(InputError, match=r"sample \(0, 3\): .*tau"):
         fast.linearize(batch.q, batch.v, tau[None])
     A = fast.linearize(batch.q, batch.v, tau, errors="mask").A

@@ -7,9 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rps_pin import ClosedLoopModel, MechanismError, SingularityError
+from rps_pin import ClosedLoopModel, LoopClosure, MechanismError, SingularityError
 from rps_pin.codegen.engine.proof import ACCEPTED
 from tests.closed_loop import mechanisms
+from tests.closed_loop.mechanisms import joint, link, robot
+from tests.closed_loop.test_simulation import geared_pendulums
 from tests.codegen.engines import (
     ALL,
     CALLS,
@@ -118,3 +120,39 @@ def test_actuators_in_another_order_than_the_tree() -> None:
     exact = mechanisms.five_bar(actuated=["right_arm_joint", "left_joint"])
     fast = exact.compile(compiler=QUICK, functions=["dynamics"])
     assert check(fast, states(exact, spread=0.05)) > 50
+
+
+def structure() -> ClosedLoopModel:
+    """A triangle: nothing moves, and an actuator strains it."""
+    parts = [link(name, 1.0, "0.1 0 0", 0.01) for name in ("a", "b")]
+    tips = [joint("fixed", name, f"{name}_tip", "0.3 0 0") for name in ("a", "b")]
+    urdf = robot(
+        *parts,
+        link("a_tip"),
+        link("b_tip"),
+        joint("revolute", "base", "a"),
+        joint("revolute", "base", "b", "0.3 0 0"),
+        *tips,
+    )
+    closure = LoopClosure("a_tip", "b_tip", name="tips")
+    home = [-np.pi / 3, -2 * np.pi / 3]
+    return ClosedLoopModel.from_urdf(urdf, [closure], ["a_joint"], home=home)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [lambda: geared_pendulums(False), lambda: geared_pendulums(True), structure],
+    ids=["a tree", "gears", "a structure"],
+)
+def test_without_loops_and_without_motions(make: Callable[[], ClosedLoopModel]) -> None:
+    exact = make()
+    fast = exact.compile(compiler=QUICK, functions="dynamics")
+    for s in free_states(exact, 2):
+        for group in ALL:
+            for call in CALLS[group].values():
+                same_outcome(fast, lambda e, s=s, call=call: call(e, s))
+    found = fast.simulate(exact.home, duration=0.1)
+    wanted = exact.simulate(exact.home, duration=0.1)
+    assert difference(found.q, wanted.q) <= ACCEPTED
+    assert difference(found.gap, wanted.gap) <= 1e-12
+    assert fast.loop_gap(found.q[:5]).shape == (5,)

@@ -196,8 +196,9 @@ class CompiledMechanism:
         equations = self.mechanism.system.equations
         if gaps.ndim == 1:
             return equations.largest_gap(gaps)
-        flat = gaps.reshape(-1, gaps.shape[-1])
-        return np.array([equations.largest_gap(row) for row in flat]).reshape(gaps.shape[:-1])
+        batch = gaps.shape[:-1]
+        largest = [equations.largest_gap(gaps[index]) for index in np.ndindex(batch)]
+        return np.array(largest, dtype=np.float64).reshape(batch)
 
     def loop_errors(
         self,

@@ -67,14 +67,14 @@ class GeneratedForces:
                 "q was changed since inverse_dynamics was called: the condition of a batch is "
                 "computed from it when it is asked for"
             )
-        return mechanism.passive_jacobian(q, parameters=parameters)
+        return mechanism.passive_jacobian(q, parameters=parameters, errors="mask")
 
     @property
     def condition(self) -> Any:
         """Condition number of the passive joints' Jacobian, float or (...); see `InverseDynamics`.
 
         Computed when asked for, for a batch from the array q that was given: `InputError` if that
-        was changed since.
+        was changed since. NaN where q is.
         """
         return each(condition_number, self._passive_jacobian(), float)
 
@@ -92,8 +92,14 @@ class GeneratedForces:
 
 
 def each(of: Callable[[Array], Any], matrices: Array, kind: type) -> Any:
-    """Return a number of each matrix, (..., rows, columns)."""
+    """Return a number of each matrix, (..., rows, columns); NaN, or 0, if it is not finite."""
+
+    def number(matrix: Array) -> Any:
+        if np.isfinite(matrix).all():
+            return of(matrix)
+        return 0 if kind is int else np.nan
+
     if matrices.ndim == 2:
-        return of(matrices)
+        return number(matrices)
     batch = matrices.shape[:-2]
-    return np.array([of(matrices[index]) for index in np.ndindex(batch)], kind).reshape(batch)
+    return np.array([number(matrices[index]) for index in np.ndindex(batch)], kind).reshape(batch)

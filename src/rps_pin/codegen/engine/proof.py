@@ -172,6 +172,8 @@ class Proof:
     def _towards_singularity(self, q: Array) -> Array:
         """Return the end of a walk in an allowed direction, short of a singularity."""
         m, best, worst = self._m, q, 0.0
+        if not self._independent.size:
+            return q
         direction = self._rng.normal(size=self._independent.size)
         for _ in range(30):
             try:
