@@ -268,7 +268,7 @@ def test_what_the_pinocchio_engine_does(options: dict[str, Any]) -> None:
     )
 
 
-@pytest.mark.parametrize(
+@each(
     "options",
     [
         {"duration": 0.0},
@@ -286,7 +286,6 @@ def test_what_the_pinocchio_engine_does(options: dict[str, Any]) -> None:
         {"duration": 1.0, "q": np.ones(3)},
         {"duration": 1.0, "typo": 3},
     ],
-    ids=str,
 )
 def test_bad_options(options: dict[str, Any]) -> None:
     """The errors of the Pinocchio engine."""
