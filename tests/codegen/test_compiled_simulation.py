@@ -15,6 +15,7 @@ from rps_pin.codegen.expressions.routines import BLOCK
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import joint, link, robot
 from tests.codegen.engines import QUICK, answered_by_pinocchio, difference, of_file, states
+from tests.each import each
 
 ARRAYS = ("time", "q", "v", "a", "tau", "kinetic", "potential", "work")
 
