@@ -206,7 +206,8 @@ def test_motions_that_break_off() -> None:
             )
         errors.append(caught.value)
     mine, theirs = errors  # which of the errors, rounding errors decide
-    common = min(len(mine.partial.time), len(theirs.partial.time)) - 3
+    # The motion grows without bound, and differences with it: its second half is not compared.
+    common = min(len(mine.partial.time), len(theirs.partial.time)) // 2
     assert common >= 5
     assert np.isfinite(mine.partial.energy).all()
     assert difference(mine.partial.q[:common], theirs.partial.q[:common]) <= 1e-6
