@@ -206,11 +206,10 @@ def test_motions_that_break_off() -> None:
             )
         errors.append(caught.value)
     mine, theirs = errors  # which of the errors, rounding errors decide
-    # The motion grows without bound, and differences with it: its second half is not compared.
-    common = min(len(mine.partial.time), len(theirs.partial.time)) // 2
-    assert common >= 5
+    assert min(len(mine.partial.time), len(theirs.partial.time)) > 8
     assert np.isfinite(mine.partial.energy).all()
-    assert difference(mine.partial.q[:common], theirs.partial.q[:common]) <= 1e-6
+    # Both close the loops by least-norm steps; what these leave, the gap's square, differently.
+    assert difference(mine.partial.q[:5], theirs.partial.q[:5]) <= 1e-8
 
 
 def parallelogram() -> ClosedLoopModel:

@@ -39,7 +39,9 @@ HELICES = {
 }
 
 
-def by_constraints(robot: RPSRobot, motion: Motion, engine: str) -> tuple[Array, Array]:
+def by_constraints(
+    robot: RPSRobot, motion: Motion, engine: str = "pinocchio"
+) -> tuple[Array, Array]:
     """Forces (n, 3) by constraint models, and the condition numbers (n,)."""
     if engine == "generated":
         whole = common.through(engine, robot.mechanism).inverse_dynamics(*robot.state(*motion))
