@@ -185,26 +185,37 @@ class GeneratedCode:
             If there is no compiler, or it fails, or the result does not agree with Pinocchio's.
         """
         with self._lock:
-            for group in groups:
-                if group not in self.libraries:
-                    self._build(group)
+            left = []
+            for group in dict.fromkeys(groups):
+                if group not in self.libraries and not self._take_lanes(group):
+                    left.append(group)
+            if left:  # together: their texts compile at the same time
+                self._build(tuple(left))
 
-    def _build(self, group: str) -> None:
-        lanes, single = self._source(group, lanes=True), self._source(group, lanes=False)
-        library = kept(lanes, self.compiler)
-        prove, replace = self._proof_of(group), self._replacing(group)
+    def _take_lanes(self, group: str) -> bool:
+        """Use code for several samples at once, if it is kept or has to be built."""
+        source, groups = self._source((group,), lanes=True), (group,)
+        library = kept(source, self.compiler)
         if library is None and self.batches:
-            library = build(lanes, prove, self.compiler, replace)
-        has_lanes = library is not None
-        library = library or build(single, prove, self.compiler, replace)
-        functions = self._loaded(library, library.proof["signatures"])
+            prove, replace = self._proof_of(groups), self._replacing(groups)
+            library = build(source, prove, self.compiler, replace)
+        if library is not None:
+            self._use(groups, library)
+        return library is not None
+
+    def _build(self, groups: tuple[str, ...]) -> None:
+        source = self._source(groups, lanes=False)
+        library = build(source, self._proof_of(groups), self.compiler, self._replacing(groups))
+        self._use(groups, library)
+        for group in groups:
+            for name in self._names(group):
+                self._functions[name].before_batch = partial(self._want_lanes, group)
+
+    def _use(self, groups: tuple[str, ...], library: Library) -> None:
+        self._functions |= self._loaded(library, library.proof["signatures"])
+        self.libraries |= dict.fromkeys(groups, library)
         if library.better is not None:
             self._better.append(library.better)
-        if not has_lanes:
-            for function in functions.values():
-                function.before_batch = partial(self._want_lanes, group)
-        self._functions |= functions
-        self.libraries[group] = library
 
     def _want_lanes(self, group: str) -> None:
         """Build code for several samples at once in the background, once."""
@@ -212,24 +223,26 @@ class GeneratedCode:
             if group in self._with_lanes:
                 return
             self._with_lanes.add(group)
-        source, prove = self._source(group, lanes=True), self._proof_of(group)
-        better = build_in_background(source, prove, self.compiler, self._replacing(group, True))
+        groups = (group,)
+        source, prove = self._source(groups, lanes=True), self._proof_of(groups)
+        better = build_in_background(source, prove, self.compiler, self._replacing(groups, True))
         if better is not None:
             self._better.append(better)
 
-    def _source(self, group: str, *, lanes: bool) -> Source:
-        kind = "batches" if lanes else "samples"
+    def _source(self, groups: tuple[str, ...], *, lanes: bool) -> Source:
+        kind, which = "batches" if lanes else "samples", ", ".join(groups)
+        names = [name for group in groups for name in self._names(group)]
         return Source(
-            f"{self.mechanism.name or 'mechanism'}, {group}, {kind}",
-            tuple(f"{name}_{end}" for name in self._names(group) for end in ("call", "many")),
-            lambda: self._texts(group, lanes),
+            f"{self.mechanism.name or 'mechanism'}: {which}; {kind}",
+            tuple(f"{name}_{end}" for name in names for end in ("call", "many")),
+            lambda: self._texts(groups, lanes),
             vectors=lanes,
-            determined_by=f"{self.identity} {group} {kind}",
+            determined_by=f"{self.identity} {which} {kind}",
         )
 
-    def _proof_of(self, group: str) -> Callable[[Library], Mapping[str, Any]]:
+    def _proof_of(self, groups: tuple[str, ...]) -> Callable[[Library], Mapping[str, Any]]:
         def prove(library: Library) -> Mapping[str, Any]:
-            signatures = self._signatures(group)
+            signatures = self._signatures(groups)
             functions = self._loaded(library, signatures)
             return {
                 "signatures": signatures,
@@ -242,18 +255,19 @@ class GeneratedCode:
 
         return prove
 
-    def _replacing(self, group: str, lanes: bool = False) -> Callable[[Library], None]:
+    def _replacing(self, groups: tuple[str, ...], lanes: bool = False) -> Callable[[Library], None]:
         """Return what takes over a better library: one with lanes gives way to no other."""
 
         def replace(better: Library) -> None:
             with self._lock:
-                if group in self._lanes_in_use and not lanes:
-                    return
-                if lanes:
-                    self._lanes_in_use.add(group)
-                for name in self._names(group):
-                    self._functions[name].replace(Entry.of(better, name))
-                self.libraries[group] = better
+                for group in groups:
+                    if group in self._lanes_in_use and not lanes:
+                        continue
+                    if lanes:
+                        self._lanes_in_use.add(group)
+                    for name in self._names(group):
+                        self._functions[name].replace(Entry.of(better, name))
+                    self.libraries[group] = better
 
         return replace
 
@@ -275,26 +289,37 @@ class GeneratedCode:
             f"{', '.join(possible)}"
         )
 
-    def _texts(self, group: str, lanes: bool) -> tuple[str, ...]:
+    def _texts(self, groups: tuple[str, ...], lanes: bool) -> tuple[str, ...]:
         """Return the texts of the functions; they compile at the same time."""
         texts: list[str] = []
-        for name in self._names(group):
-            texts += self._unit(name).library(lanes=lanes and name != "steps")  # of one motion
+        for group in groups:
+            for names in self._units(group, lanes):
+                one_motion = names == ["steps"]
+                texts += self._unit(names).library(lanes=lanes and not one_motion)
         return tuple(texts)
 
-    def _unit(self, name: str) -> Unit:
-        is_checked = name in _CHECKED or name.startswith("frame_jacobian_")
-        checked = frozenset({name} if is_checked else ())
-        called, loops = with_calls(self.functions, [name])
-        kernels = tuple(Kernel(self.functions[one]) for one in called)
-        unit = f"{name}_unit" if loops else name
-        return Unit(unit, kernels, loops, (name,), checked, limit=1.0)
+    def _units(self, group: str, lanes: bool) -> list[list[str]]:
+        """Return which functions share a text: large ones, and those without lanes, have their own.
 
-    def _signatures(self, group: str) -> dict[str, Any]:
+        A text takes a compiler some time to start with.
+        """
+        names = list(self._names(group))
+        if group == "derivatives" or (lanes and "steps" in names):
+            return [[name] for name in names]
+        return [names]
+
+    def _unit(self, names: Sequence[str]) -> Unit:
+        checked = {n for n in names if n in _CHECKED or n.startswith("frame_jacobian_")}
+        called, loops = with_calls(self.functions, list(names))
+        kernels = tuple(Kernel(self.functions[one]) for one in called)
+        entries = tuple(names)
+        return Unit(f"unit_{names[0]}", kernels, loops, entries, frozenset(checked), limit=1.0)
+
+    def _signatures(self, groups: tuple[str, ...]) -> dict[str, Any]:
         """Return names and shapes of the functions' inputs and outputs."""
         found = {}
-        for name in self._names(group):
-            unit = self._unit(name)
+        for name in [name for group in groups for name in self._names(group)]:
+            unit = self._unit([name])
             one = unit.function(name)
             shapes = [list(shape) for shape in one.shapes]
             count, outputs = len(one.inputs), unit.handed_out(name)
