@@ -4,8 +4,8 @@ The equations are those of `rps_pin.closed_loop.dynamics.derivatives`: with F = 
 external forces - J' lambda (lambda held) and c = J a + J' v,
 
     inverse dynamics     dtau = T' dF;
-    forward dynamics     (T' M T) da_i = T' (S' dtau - dF - M x),  J x = -dc,  x_i = 0,
-                         da = T da_i + x,
+    forward dynamics     (T' M T) da_i = S' dtau - T' (dF + M x),  J x = -dc,  x_i = 0,
+                         J_d da_d = -(dc + J_i da_i),
 
 and in independent coordinates y, which the rest follows,
 
@@ -207,14 +207,15 @@ class Slopes:
         )
 
     def changes(self) -> tuple[Expression, Expression]:
-        """Return dF - S' dtau and dc by q, v and tau side by side, of shapes (n, 2 nv + na)."""
+        """Return T' (dF + M x - S' dtau) and dc by q, v and tau side by side.
+
+        Shapes (m, 2 nv + na) and (nc, 2 nv + na).
+        """
         x = self.x
-        actuators = ca.SX(x.tree.model.nv, x.tau.numel())
-        for k, i in enumerate(x.system.actuated.tolist()):
-            actuators[i, k] = -1
+        of_actuators = x.basis[x.system.actuated.tolist(), :].T
         still = ca.SX(x.rows.gap.numel(), x.tau.numel())
-        force = ca.horzcat(self.force_q, self.force_v, actuators)
-        return ca.sparsify(force), ca.horzcat(self.opening_q, self.opening_v, still)
+        reduced = ca.horzcat(self._reduced_q, self._reduced_v, -of_actuators)
+        return ca.sparsify(reduced), ca.horzcat(self.opening_q, self.opening_v, still)
 
     def forward(self) -> ForwardSlopes:
         """Return the derivatives of the acceleration."""
@@ -240,7 +241,8 @@ class ForwardColumns:
     Attributes
     ----------
     right
-        dF - S' dtau above dc, by q, v and tau side by side, sparse, shape (nv + nc, 2 nv + na).
+        T' (dF + M x - S' dtau) above dc, by q, v and tau side by side, sparse, shape
+        (m + nc, 2 nv + na).
     response : LinearMap
         From a column of these to one of da.
     basis, followed
@@ -250,9 +252,9 @@ class ForwardColumns:
     def __init__(self, x: MechanismExpressions, multipliers: Expression) -> None:
         slopes = Slopes(x)
         dependent = x.partition.dependent.tolist()
-        force = ca.SX.sym("force", x.tree.model.nv)
+        reduced = ca.SX.sym("reduced", x.independent.size)
         opening = ca.SX.sym("opening", x.rows.gap.numel())
-        self.response = LinearMap(ca.vertcat(force, opening), x.response(force, opening))
+        self.response = LinearMap(ca.vertcat(reduced, opening), x.response(reduced, opening))
         right = ca.sparsify(ca.vertcat(*slopes.changes()))
         self.right = slopes.at(multipliers, {"right": right})["right"]
         self.basis = ca.sparsify(x.basis[dependent, :])

@@ -329,21 +329,23 @@ class MechanismExpressions:
         """M T, shape (nv, m)."""
         return ca.sparsify(self.tree.mass_matrix() @ self.basis)
 
-    def response(self, force: Expression, opening: Expression) -> Expression:
-        """Return the accelerations a (nv, k) with T' (M a + f) = 0, J a = -c.
+    def response(self, reduced: Expression, opening: Expression) -> Expression:
+        """Return the accelerations a (nv, k) with given T' f and J a = -c.
 
-        With x the solution of J x = -c without independent entries,
+        That is w of the independent velocities and what follows of the others:
 
-            (T' M T) w = -T' (f + M x),    a = T w + x.
+            (T' M T) w = -T' f,    J_d a_d = -(c + J_u w).
 
         Parameters
         ----------
-        force, opening
-            f and c, shapes (nv, k) and (nc, k).
+        reduced, opening
+            T' f and c, shapes (m, k) and (nc, k).
         """
-        x, dependent = -self.dependent(opening), self.partition.dependent.tolist()
-        reduced = self.basis.T @ force + self.mass_times_basis[dependent, :].T @ x[dependent, :]
-        return ca.sparsify(self.basis @ self.inertia.solve(ca.sparsify(-reduced)) + x)
+        independent = self.independent.tolist()
+        w = -self.inertia.solve(ca.sparsify(reduced))
+        a = -self.dependent(opening + self.jacobian[:, independent] @ w)
+        a[independent, :] = w
+        return ca.sparsify(a)
 
     @cached_property
     def acceleration(self) -> Expression:

@@ -247,8 +247,8 @@ def _forward_dynamics_derivatives(functions: MechanismFunctions) -> Routine:
         "independent": independent,
     }
     for name, matrix in (("basis", columns.basis), ("followed", columns.followed)):
-        rows, tables[f"{name}_columns"] = matrix.sparsity().get_triplet()
-        tables[f"{name}_rows"] = dependent[rows].tolist()
+        tables[f"{name}_starts"] = matrix.sparsity().colind()
+        tables[f"{name}_rows"] = dependent[matrix.sparsity().row()].tolist()
     numbers = {
         "right": right.nnz(),
         "coefficients": response.coefficients.numel(),
@@ -279,18 +279,17 @@ def _forward_dynamics_derivatives(functions: MechanismFunctions) -> Routine:
     }}
     for (i = 0; i < {m}; ++i) {{
         const REAL *of_q = by_q + independent[i] * {nv}, *of_v = by_v + independent[i] * {nv};
-        REAL *position = by_position + i * {m}, *velocity = by_velocity + i * {m};
         for (j = 0; j < {m}; ++j) {{
-            position[j] = of_q[independent[j]];
-            velocity[j] = of_v[independent[j]];
+            REAL position = of_q[independent[j]], velocity = of_v[independent[j]];
+            for (k = basis_starts[j]; k < basis_starts[j + 1]; ++k) {{
+                position += of_q[basis_rows[k]] * basis[k];
+                velocity += of_v[basis_rows[k]] * basis[k];
+            }}
+            for (k = followed_starts[j]; k < followed_starts[j + 1]; ++k)
+                position += of_v[followed_rows[k]] * followed[k];
+            by_position[i * {m} + j] = position;
+            by_velocity[i * {m} + j] = velocity;
         }}
-        for (k = 0; k < {numbers["basis"]}; ++k) {{
-            j = basis_columns[k];
-            position[j] += of_q[basis_rows[k]] * basis[k];
-            velocity[j] += of_v[basis_rows[k]] * basis[k];
-        }}
-        for (k = 0; k < {numbers["followed"]}; ++k)
-            position[followed_columns[k]] += of_v[followed_rows[k]] * followed[k];
         for (j = 0; j < {na}; ++j) by_actuation[i * {na} + j] = by_tau[independent[i] * {na} + j];
     }}
 """
