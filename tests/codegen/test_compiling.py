@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import pinocchio as pin
 import pytest
 
 from rps_pin import ClosedLoopModel, CompileError, InputError, LoopClosure, MechanismError
-from rps_pin.codegen.build import compilers
+from rps_pin.codegen.build import compilers, tcc
 from rps_pin.codegen.engine import generated, proof
 from rps_pin.codegen.expressions import functions
 from tests import processes
@@ -189,6 +190,30 @@ def test_a_result_of_another_shape_is_refused(
     with pytest.raises(CompileError, match=r"basis has shape \(3,\), not \(3, 1\)"):
         one.compile(compiler=QUICK, functions="kinematics")
     assert kept(own_cache) == []
+
+
+def test_proofs_of_several_threads_take_turns(
+    own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of TinyCC's code of one group, and of GCC's of another in the background."""
+    if not tcc.is_here() or not list(compilers.find("auto")):
+        pytest.skip("there are not two compilers")
+    right, at_work, most = proof.Proof.compare, [0], [0]
+
+    def slow(self: proof.Proof, *given: Any) -> float:
+        at_work[0] += 1
+        most[0] = max(most[0], at_work[0])
+        time.sleep(0.15)
+        result = right(self, *given)
+        at_work[0] -= 1
+        return result
+
+    monkeypatch.setattr(proof.Proof, "compare", slow)
+    fast = five_bar().compile(functions=["dynamics"])
+    fast.code.build("kinematics", "forces", "closing")
+    fast.wait()
+    assert "tcc" not in fast.compilers.values()
+    assert most == [1]
 
 
 # The cache ----------------------------------------------------------------------------------------

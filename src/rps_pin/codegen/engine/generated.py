@@ -103,6 +103,7 @@ class GeneratedCode:
         self._with_lanes: set[str] = set()
         self._lanes_in_use: set[str] = set()
         self._lock = threading.RLock()
+        self._proving = threading.Lock()  # the proof's mechanism has one scratch memory
         self._functions: dict[str, CompiledFunction] = {}
         self._better: list[Future[Library]] = []
         #: Of each group that is built.
@@ -242,16 +243,17 @@ class GeneratedCode:
 
     def _proof_of(self, groups: tuple[str, ...]) -> Callable[[Library], Mapping[str, Any]]:
         def prove(library: Library) -> Mapping[str, Any]:
-            signatures = self._signatures(groups)
-            functions = self._loaded(library, signatures)
-            return {
-                "signatures": signatures,
-                "partition": _as_dict(self.partition),
-                "differences": {
-                    name: self._proof.compare(name, function)
-                    for name, function in functions.items()
-                },
-            }
+            with self._proving:
+                signatures = self._signatures(groups)
+                functions = self._loaded(library, signatures)
+                return {
+                    "signatures": signatures,
+                    "partition": _as_dict(self.partition),
+                    "differences": {
+                        name: self._proof.compare(name, function)
+                        for name, function in functions.items()
+                    },
+                }
 
         return prove
 
