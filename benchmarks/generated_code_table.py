@@ -38,11 +38,13 @@ from benchmarks.mujoco_twin import MujocoTwin
 from benchmarks.timing import medians
 from rps_pin import RPSRobot
 from rps_pin.closed_loop.simulation.stepper import Stepper
+from rps_pin.codegen.expressions.routines import BLOCK
 from rps_pin.errors import RPSPinError
 
 Array = NDArray[np.float64]
 
 OURS, TODAY = "generated", "Pinocchio engine"
+INSIDE = "inside C"
 """Columns: `ClosedLoopModel.compile()`, and the same call of `ClosedLoopModel`."""
 STEPS, STEP = 1000, 1e-3
 SAMPLES = 100_000
@@ -183,7 +185,11 @@ def add_steps(figures: Figures, one: Case, fast: Any) -> None:
     engines = stepped(one, fast)
     gaps = {name: largest_gap(make) for name, make in engines.items()}
     figures.add("largest gap in 1000 steps (m)", one.name, gaps)
-    figures.add("step of 1 ms (us)", one.name, step_times(engines))
+    times = step_times(engines, one, fast)
+    inside = times.pop(INSIDE)
+    figures.add("step of 1 ms (us)", one.name, times)
+    peers = {name: time for name, time in times.items() if name not in (OURS, TODAY)}
+    figures.add("step of 1 ms, 64 in a call (us)", one.name, {OURS: inside, **peers})
 
 
 Motion = tuple[Callable[[], None], Callable[[], float]]
@@ -230,17 +236,22 @@ def largest_gap(make: Callable[[], Motion]) -> float:
     return float(np.max(gaps))
 
 
-def step_times(engines: dict[str, Callable[[], Motion]]) -> dict[str, float]:
-    """Return the median time of a step in us: fifty steps of each engine in turn."""
-    block, times = 50, {name: [] for name in engines}
+def step_times(engines: dict[str, Callable[[], Motion]], one: Case, fast: Any) -> dict[str, float]:
+    """Return the median time of a step in us: of each engine in turn, and inside one call of C."""
+    times: dict[str, list[float]] = {name: [] for name in (*engines, INSIDE)}
     for _ in range(2):
         steps = {name: make()[0] for name, make in engines.items()}
-        for _ in range(STEPS // block):
+        q, v, tau = one.start()
+        for _ in range(STEPS // BLOCK):
             for name, step in steps.items():
                 began = time.process_time()
-                for _ in range(block):
+                for _ in range(BLOCK):
                     step()
-                times[name].append((time.process_time() - began) / block)
+                times[name].append((time.process_time() - began) / BLOCK)
+            began = time.process_time()
+            qs, vs = fast.steps(q, v, tau, STEP, BLOCK)
+            times[INSIDE].append((time.process_time() - began) / BLOCK)
+            q, v = qs[-1], vs[-1]
     return {name: 1e6 * float(np.median(found)) for name, found in times.items()}
 
 

@@ -39,6 +39,7 @@ from rps_pin.codegen.engine.forces import GeneratedForces, each, kept
 from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.simulation import simulate
 from rps_pin.codegen.expressions.functions import UNDER_WRENCHES
+from rps_pin.codegen.expressions.routines import BLOCK
 from rps_pin.errors import InputError, SingularityError
 from rps_pin.numerics.linear_algebra import condition_number
 from rps_pin.validation import (
@@ -793,6 +794,50 @@ class CompiledMechanism:
             raise InputError("duration: all must be positive numbers of s, finite")
         found = self._run("step", (q, v, tau, h), answer, wrenches, **options)
         return found[0], found[1]
+
+    def steps(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        tau: ArrayLike,
+        duration: float,
+        count: int,
+        *,
+        wrenches: Wrenches | None = None,
+        **options: Any,
+    ) -> tuple[Array, Array]:
+        """Return the states after each of many steps under constant forces, many in one call of C.
+
+        Parameters
+        ----------
+        q, v, tau, wrenches
+            As for `step`.
+        duration
+            Of one step, s.
+        count
+            Of steps.
+
+        Returns
+        -------
+        q, v : arrays
+            Shapes (..., count, nq) and (..., count, nv).
+        """
+        h = np.full(BLOCK, positive_number(duration, "duration", "s"))
+        states: list[tuple[Array, Array]] = []
+        left = whole_number(count, "count")
+        while left:
+            whole = left >= BLOCK and not options
+            found = self.generated("steps", wrenches, None, q, v, tau, h) if whole else None
+            if found is not None and not np.any(found[-1]):
+                qs, vs = (one.reshape(*one.shape[:-1], BLOCK, -1) for one in found[:2])
+            else:  # one by one: options, a rest, or a state that the code flags
+                next_q, next_v = self.step(q, v, tau, duration, wrenches=wrenches, **options)
+                qs, vs = next_q[..., None, :], next_v[..., None, :]
+            q, v = qs[..., -1, :], vs[..., -1, :]
+            states.append((qs, vs))
+            left -= qs.shape[-2]
+        every_q, every_v = zip(*states, strict=True)
+        return np.concatenate(every_q, axis=-2), np.concatenate(every_v, axis=-2)
 
     def simulate(
         self, q: ArrayLike, v: ArrayLike | None = None, *, duration: float, **options: Any
