@@ -11,7 +11,7 @@ import shlex
 import shutil
 import signal
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -123,22 +123,26 @@ def compile_library(
     OSError
         If the folder cannot be written to, or is full.
     """
-    total = len(source.units) + 1
-    objects = []
-    for number, text in enumerate(source.units):
-        (folder / f"{number}.c").write_text(text, "utf-8")
-        objects.append(f"{number}.o")
+    count = source.count or len(source.units)
+    objects = [f"{number}.o" for number in range(count)]
     flags = compiler.flags(source)
-    steps = [[*compiler.command, *flags, "-c", f"{one[:-2]}.c", "-o", one] for one in objects]
+
+    def steps() -> Iterator[list[str]]:
+        """Write a text while the compiler works on those before."""
+        for number, (text, made) in enumerate(zip(source.each(), objects, strict=True)):
+            (folder / f"{number}.c").write_text(text, "utf-8")
+            yield [*compiler.command, *flags, "-c", f"{number}.c", "-o", made]
+
     library = folder / FILE
     mvec = [] if "-DNO_MVEC" in flags else ["-lmvec"]
     link = [*compiler.command, "-shared", *objects, "-o", library.name, *mvec, "-lm"]
-    for before, commands in ((0, steps), (total - 1, [link])):
+    runs: list[tuple[Iterable[Sequence[str]], int]] = [(steps(), count), ([link], 1)]
+    for before, (commands, size) in zip((0, count), runs, strict=True):
 
         def seen(done: int, _: int, before: int = before) -> None:
-            watch(before + done, total)
+            watch(before + done, count + 1)
 
-        for ended in process.run(commands, folder, limit, seen):
+        for ended in process.run(commands, size, folder, limit, seen):
             _check(ended, source, compiler, folder, limit)
     if not library.is_file():
         raise CompileError(f"{compiler} ended without an error, but made no library", str(compiler))

@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -37,13 +37,17 @@ class Ended(NamedTuple):
     """What it wrote, without empty lines."""
 
 
-def run(commands: Sequence[Sequence[str]], folder: Path, limit: float, watch: Watch) -> list[Ended]:
+def run(
+    commands: Iterable[Sequence[str]], count: int, folder: Path, limit: float, watch: Watch
+) -> list[Ended]:
     """Run commands, as many at once as there are cores, until all have ended or one has failed.
 
     Parameters
     ----------
-    commands : sequence of sequence of str
-        The programs with their arguments.
+    commands : iterable of sequence of str
+        The programs with their arguments, asked for one by one while the others run.
+    count : int
+        How many there are.
     folder : Path
         Where they run; their temporary files are here too.
     limit : float
@@ -57,14 +61,14 @@ def run(commands: Sequence[Sequence[str]], folder: Path, limit: float, watch: Wa
         Of all commands, or only of the one that failed.
     """
     environment = {**os.environ, "TMPDIR": str(folder), "LC_ALL": "C"}
-    waiting = list(enumerate(commands))
+    waiting = enumerate(commands)
     running: dict[int, subprocess.Popen[bytes]] = {}
     ended: dict[int, Ended] = {}
     end = time.monotonic() + limit
     try:
-        while waiting or running:
-            while waiting and len(running) < cores():
-                number, command = waiting.pop(0)
+        while len(ended) < count:
+            while len(running) < cores() and (next_one := next(waiting, None)) is not None:
+                number, command = next_one
                 running[number] = _start(command, folder, folder / f"{number}.txt", environment)
             for number, process in list(running.items()):
                 late = time.monotonic() > end
@@ -75,7 +79,7 @@ def run(commands: Sequence[Sequence[str]], folder: Path, limit: float, watch: Wa
                 ended[number] = Ended(status, _words(folder / f"{number}.txt"))
                 if status != 0:
                     return [ended[number]]
-            watch(len(ended), len(commands))
+            watch(len(ended), count)
             time.sleep(_PAUSE)
     finally:
         for process in running.values():

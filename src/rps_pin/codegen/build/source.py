@@ -8,7 +8,7 @@ import json
 import os
 import platform
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,7 +28,7 @@ class Source:
         What the library is, for files and messages.
     functions : tuple of str
         The names of the functions that Python calls.
-    texts : tuple of str, or function that returns it
+    texts : tuple of str, or function that returns them one by one
         The translation units. Each is compiled on its own, on as many cores as there are. The
         macro ``__TINYC__`` is defined where there are no vector types.
     vectors : bool
@@ -39,19 +39,33 @@ class Source:
         All that determines the texts, if they come from a function: the key is then made of this,
         and the function is called only if nothing suitable is in the cache. Otherwise anything
         else that the key has to depend on, such as the version of the proof.
+    count : int
+        How many texts there are, if they come from a function; it is called at once otherwise.
     """
 
     name: str
     functions: tuple[str, ...]
-    texts: tuple[str, ...] | Callable[[], tuple[str, ...]]
+    texts: tuple[str, ...] | Callable[[], Iterable[str]]
     vectors: bool = False
     flags: tuple[str, ...] = ()
     determined_by: str = ""
+    count: int = 0
 
     @functools.cached_property
     def units(self) -> tuple[str, ...]:
         """The translation units."""
-        return self.texts() if callable(self.texts) else self.texts
+        return tuple(self.texts()) if callable(self.texts) else self.texts
+
+    def each(self) -> Iterator[str]:
+        """Return the translation units one by one; each is made when it is asked for."""
+        if "units" in vars(self) or not callable(self.texts):
+            yield from self.units
+            return
+        made = []
+        for text in self.texts():
+            made.append(text)
+            yield text
+        vars(self)["units"] = tuple(made)
 
     @functools.cached_property
     def key(self) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import asdict
 from functools import cached_property, partial
@@ -239,6 +239,7 @@ class GeneratedCode:
             lambda: self._texts(groups, lanes),
             vectors=lanes,
             determined_by=f"{self.identity} {which} {kind}",
+            count=2 * sum(len(self._units(group, lanes)) for group in groups),
         )
 
     def _proof_of(self, groups: tuple[str, ...]) -> Callable[[Library], Mapping[str, Any]]:
@@ -291,14 +292,12 @@ class GeneratedCode:
             f"{', '.join(possible)}"
         )
 
-    def _texts(self, groups: tuple[str, ...], lanes: bool) -> tuple[str, ...]:
-        """Return the texts of the functions; they compile at the same time."""
-        texts: list[str] = []
-        for group in groups:
+    def _texts(self, groups: tuple[str, ...], lanes: bool) -> Iterator[str]:
+        """Return the texts of the functions, the longest first; they compile at the same time."""
+        for group in sorted(groups, key=lambda one: one != "derivatives"):
             for names in self._units(group, lanes):
                 one_motion = names == ["steps"]
-                texts += self._unit(names).library(lanes=lanes and not one_motion)
-        return tuple(texts)
+                yield from self._unit(names).library(lanes=lanes and not one_motion)
 
     def _units(self, group: str, lanes: bool) -> list[list[str]]:
         """Return which functions share a text: large ones, and those without lanes, have their own.
