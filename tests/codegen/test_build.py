@@ -187,8 +187,8 @@ def test_all_that_a_compiler_started_ends_with_it(tmp_path: Path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run([command, command], tmp_path, 10.0, stop)
-    (ended,) = run([command], tmp_path, 0.1, lambda *_: None)
+        run([command, command], 2, tmp_path, 10.0, stop)
+    (ended,) = run([command], 1, tmp_path, 0.1, lambda *_: None)
     assert ended.status is None
     time.sleep(0.7)
     assert not mark.exists()
