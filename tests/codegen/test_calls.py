@@ -88,12 +88,12 @@ def drawn(*shape: int) -> np.ndarray:
 def test_one_sample(product: CompiledFunction) -> None:
     A, x, y = drawn(2, 3), drawn(3), drawn(2)
     z, total, status = product(A, x, y)
-    assert worst(z - right(A, x, y)) < 1e-15
-    assert worst(total[0] - A.sum()) < 1e-15
+    assert worst(z - right(A, x, y)) < 1e-14
+    assert worst(total[0] - A.sum()) < 1e-14
     assert isinstance(status, int)
     assert (z.shape, total.shape, status) == ((2,), (1,), 0)
     again, _, _ = product.call(A, x + 1, y)
-    assert worst(again - right(A, x + 1, y)) < 1e-15
+    assert worst(again - right(A, x + 1, y)) < 1e-14
     assert again is not z
     assert worst(z - right(A, x, y)) < 1e-15, "results are the caller's"
     found = product.one(A, x, y)
@@ -214,12 +214,12 @@ def test_many_threads_call_one_function(product: CompiledFunction) -> None:
 
     def work(seed: int) -> float:
         rng = np.random.default_rng(seed)
-        error = 0.0
+        errors = []
         for k in range(300):
             batch = (11,) if k % 10 == 0 else ()
             A, x, y = (rng.standard_normal((*batch, *end)) for end in ((2, 3), (3,), (2,)))
-            error = max(error, worst(product(A, x, y)[0] - right(A, x, y)))
-        return error
+            errors.append(worst(product(A, x, y)[0] - right(A, x, y)))
+        return worst(errors)
 
     with ThreadPoolExecutor(6) as pool:
         assert worst(list(pool.map(work, range(12)))) < 1e-14

@@ -202,7 +202,7 @@ def test_proofs_of_several_threads_take_turns(
 
     def slow(self: proof.Proof, *given: Any) -> float:
         at_work[0] += 1
-        most[0] = max(most[0], at_work[0])
+        most[0] = int(np.maximum(most[0], at_work[0]))
         time.sleep(0.15)
         result = right(self, *given)
         at_work[0] -= 1

@@ -80,7 +80,8 @@ def compile_mechanism(
     for frame in frames:
         mechanism.system.frame(frame)
     functions = _names(functions, "functions")
-    code = GeneratedCode(mechanism, groups, frames, compiler, batches)
+    single = device == "cuda" and dtype == "float32"
+    code = GeneratedCode(mechanism, groups, frames, compiler, batches, single)
     if device == "cuda":
         return _on_card(code, functions, compiler, dtype)
     if dtype != "float64":

@@ -87,6 +87,8 @@ class GeneratedCode:
     batches
         Whether code for several samples at once is built with the rest. Otherwise it is built in
         the background when a batch first asks for it.
+    single
+        Whether the functions are for single precision, whose rounding errors open loops further.
     """
 
     def __init__(
@@ -96,10 +98,11 @@ class GeneratedCode:
         wrench_frames: Sequence[str] = (),
         compiler: CompilerName = "auto",
         batches: bool = False,
+        single: bool = False,
     ) -> None:
         self.mechanism = copy.deepcopy(mechanism)
         self.parameters, self.wrench_frames = tuple(parameters), tuple(wrench_frames)
-        self.compiler, self.batches = compiler, batches
+        self.compiler, self.batches, self._single = compiler, batches, single
         self._with_lanes: set[str] = set()
         self._lanes_in_use: set[str] = set()
         self._lock = threading.RLock()
@@ -117,13 +120,19 @@ class GeneratedCode:
         shared = choose_shared(system, samples.jacobians)
         return MechanismFunctions(
             MechanismExpressions(
-                system, self.partition, self.parameters, self.wrench_frames, shared=shared
+                system,
+                self.partition,
+                self.parameters,
+                self.wrench_frames,
+                single=self._single,
+                shared=shared,
             )
         )
 
     def with_wrenches(self, frames: Sequence[str]) -> GeneratedCode:
         """Return the code of the same mechanism for wrenches at other frames."""
-        return GeneratedCode(self.mechanism, self.parameters, frames, self.compiler, self.batches)
+        options = self.compiler, self.batches, self._single
+        return GeneratedCode(self.mechanism, self.parameters, frames, *options)
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
