@@ -35,6 +35,11 @@ static lanes_bits many_not_finite(const REAL *x, int size)
     return bad;
 }
 
+static void many_fetch(const double *from, long size)
+{
+    for (long k = 0; k < size; k += 8) __builtin_prefetch(from + k);
+}
+
 /* x and y have room for a group's inputs and outputs, the output `check` included. */
 static void many_groups(const many_shape *f, long n, const double *const *in, const long *stride,
                         double *const *out, int *status, REAL *x, REAL *y,
@@ -62,6 +67,12 @@ static void many_groups(const many_shape *f, long n, const double *const *in, co
                 many_gather(to, in[i] + s * stride[i], stride[i], in_size[i], count);
                 bits |= many_not_finite(to, in_size[i]);
             }
+        if (n - s >= 2 * LANES) { /* what the next group reads and writes is fetched meanwhile */
+            for (int i = 0; i < f->inputs; ++i)
+                many_fetch(in[i] + (s + LANES) * stride[i], LANES * stride[i]);
+            for (int j = 0; j < f->outputs; ++j)
+                many_fetch(out[j] + (s + LANES) * out_size[j], LANES * out_size[j]);
+        }
         group(x, y);
         const REAL *from = y;
         for (int j = 0; j < f->outputs; from += out_size[j++]) {

@@ -247,8 +247,9 @@ class GeneratedCode:
             tuple(f"{name}_{end}" for name in names for end in ("call", "many")),
             lambda: self._texts(groups, lanes),
             vectors=lanes,
-            # Straight-line code is as fast as by -O2, and takes a third less time to compile.
-            flags=() if lanes else ("-O1",),
+            # Straight-line code is as fast as by -O2, and takes a third less time to compile. That
+            # of several samples gains a tenth by fused multiply-add, which rounds once less.
+            flags=("-ffp-contract=fast",) if lanes else ("-O1",),
             determined_by=f"{self.identity} {which} {kind}",
             count=2 * sum(len(self._units(group, lanes)) for group in groups),
         )
