@@ -278,19 +278,31 @@ def add_batch(figures: Figures, one: Case, fast: Any, count: int) -> None:
 
 
 def add_direct_kinematics(figures: Figures) -> None:
-    """Measure the direct kinematics of 10^5 poses of the 3-RPS, followed from one pose."""
-    robot, rng = RPSRobot.from_preset("sokolov"), np.random.default_rng(3)
-    poses = np.array([0.4, 0.0, 0.0]) + rng.uniform(-1, 1, (SAMPLES, 3)) * [0.02, 0.1, 0.1]
-    lengths, near = robot.inverse_kinematics(poses).length, [0.4, 0.0, 0.0]
-    times = {}
+    """Measure the direct kinematics of 10^5 poses of the 3-RPS, followed from one pose.
+
+    The lengths of bench_forward_kinematics; and poses of the larger robot, farther from the one
+    that they are followed from.
+    """
+    rng = np.random.default_rng(3)
+    micro, sokolov = (RPSRobot.from_preset(name) for name in ("micro", "sokolov"))
+    far = np.array([0.4, 0.0, 0.0]) + rng.uniform(-1, 1, (SAMPLES, 3)) * [0.02, 0.1, 0.1]
+    cases = {
+        "3-RPS": (micro, rng.uniform(0.2, 0.25, (SAMPLES, 3)), [0.22, 0.0, 0.0]),
+        "3-RPS, far": (sokolov, sokolov.inverse_kinematics(far).length, [0.4, 0.0, 0.0]),
+    }
+    times: dict[str, dict[str, float]] = {case: {} for case in cases}
     with tempfile.TemporaryDirectory() as folder, mock.patch.dict(os.environ, RPS_PIN_CACHE=folder):
+        found = {}
         for name in ("NumPy", OURS):
-            if name == OURS:
-                robot.compile(compiler="gcc")
-            same(robot.forward_kinematics(lengths, near), poses)
-            call = {name: lambda: robot.forward_kinematics(lengths, near)}
-            times[name] = medians(call, rounds=9)[name] / SAMPLES
-    figures.add(DIRECT, "3-RPS", {OURS: times[OURS], "NumPy": times["NumPy"]})
+            for case, (robot, lengths, near) in cases.items():
+                if name == OURS:
+                    robot.compile(compiler="gcc")
+                poses = robot.forward_kinematics(lengths, near)
+                same(poses, found.setdefault(case, poses))
+                call = {name: lambda r=robot, d=lengths, x=near: r.forward_kinematics(d, x)}
+                times[case][name] = medians(call, rounds=9)[name] / SAMPLES
+    for case, engines in times.items():
+        figures.add(DIRECT, case, {OURS: engines[OURS], "NumPy": engines["NumPy"]})
 
 
 if __name__ == "__main__":
