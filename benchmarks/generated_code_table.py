@@ -284,19 +284,20 @@ def add_direct_kinematics(figures: Figures) -> None:
     that they are followed from.
     """
     rng = np.random.default_rng(3)
-    micro, sokolov = (RPSRobot.from_preset(name) for name in ("micro", "sokolov"))
     far = np.array([0.4, 0.0, 0.0]) + rng.uniform(-1, 1, (SAMPLES, 3)) * [0.02, 0.1, 0.1]
-    cases = {
-        "3-RPS": (micro, rng.uniform(0.2, 0.25, (SAMPLES, 3)), [0.22, 0.0, 0.0]),
-        "3-RPS, far": (sokolov, sokolov.inverse_kinematics(far).length, [0.4, 0.0, 0.0]),
-    }
-    times: dict[str, dict[str, float]] = {case: {} for case in cases}
     with tempfile.TemporaryDirectory() as folder, mock.patch.dict(os.environ, RPS_PIN_CACHE=folder):
-        found = {}
+        micro, sokolov = (RPSRobot.from_preset(name) for name in ("micro", "sokolov"))
+        cases = {
+            "3-RPS": (micro, rng.uniform(0.2, 0.25, (SAMPLES, 3)), [0.22, 0.0, 0.0]),
+            "3-RPS, far": (sokolov, sokolov.inverse_kinematics(far).length, [0.4, 0.0, 0.0]),
+        }
+        times: dict[str, dict[str, float]] = {case: {} for case in cases}
+        found: dict[str, Array] = {}
         for name in ("NumPy", OURS):
             for case, (robot, lengths, near) in cases.items():
                 if name == OURS:
                     robot.compile(compiler="gcc")
+                assert (robot.engine == "Python") == (name != OURS), robot.engine
                 poses = robot.forward_kinematics(lengths, near)
                 same(poses, found.setdefault(case, poses))
                 call = {name: lambda r=robot, d=lengths, x=near: r.forward_kinematics(d, x)}

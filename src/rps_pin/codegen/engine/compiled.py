@@ -83,6 +83,7 @@ class CompiledMechanism:
         self._calls, self._single = _Calls(code), _Single(code)
         actuated = code.mechanism.system.actuated.size
         self._is_actuated = code.partition.is_actuated
+        self._chosen: dict[tuple[str, ...], bool] = {}  # whether these are the independent joints
         self._underactuated = actuated < code.partition.independent.size
 
     # Structure ------------------------------------------------------------------------------------
@@ -659,7 +660,7 @@ class CompiledMechanism:
         **options: Any,
     ) -> ForwardDynamicsDerivatives:
         """Return derivatives of the acceleration, (..., rows, columns); see `ClosedLoopModel`."""
-        if wrenches is None and independent is None and not options and self._is_actuated:
+        if wrenches is None and not options and self._has(independent):
             single = self._single.forward_dynamics_derivatives(q, v, tau)
             if single and not single[-1]:
                 return ForwardDynamicsDerivatives._make(single[:-1])
@@ -951,9 +952,12 @@ class CompiledMechanism:
     def _has(self, independent: Sequence[str] | None) -> bool:
         """Return whether these are the independent velocities of the generated code."""
         if independent is None:
-            return self.code.partition.is_actuated
-        chosen = self.mechanism.system.independent(independent)
-        return np.array_equal(chosen, self.code.partition.independent)
+            return self._is_actuated
+        names = (independent,) if isinstance(independent, str) else tuple(independent)
+        if names not in self._chosen:
+            chosen = self.mechanism.system.independent(independent)
+            self._chosen[names] = np.array_equal(chosen, self.code.partition.independent)
+        return self._chosen[names]
 
     def _by_samples(
         self,
