@@ -180,6 +180,11 @@ def _sines_with_cosines(text: str) -> str:
     return _SINE_AND_COSINE.sub(together, text)
 
 
+def batch_prelude() -> str:
+    """Return what stands before the `Unit.batches` of units that share a text."""
+    return "\n".join([prelude("scalar.h"), prelude("many.h")])
+
+
 @dataclass(frozen=True)
 class Unit:
     """One file of C: kernels and routines, and those of them that are entry points.
@@ -318,6 +323,10 @@ class Unit:
             many += [*(self._group(name) for name in with_lanes), "#endif", ""]
         many += [self._many(name, lanes and self._has_lanes(name)) for name in self.entries]
         return "\n".join(one), "\n".join(many)
+
+    def batches(self) -> list[str]:
+        """Return NAME_many of the entries, sample by sample, to stand after `batch_prelude`."""
+        return [self._many(name, False) for name in self.entries]
 
     def _one(self, name: str) -> str:
         one = self.function(name)

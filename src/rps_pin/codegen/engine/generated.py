@@ -34,7 +34,7 @@ from rps_pin.codegen.expressions.independent import (
 from rps_pin.codegen.expressions.mechanism import MechanismExpressions
 from rps_pin.codegen.expressions.parameters import Parameters
 from rps_pin.codegen.expressions.routines import with_calls
-from rps_pin.codegen.units import Kernel, Unit
+from rps_pin.codegen.units import Kernel, Unit, batch_prelude
 from rps_pin.errors import InputError, did_you_mean
 
 #: Functions that are built together.
@@ -244,6 +244,7 @@ class GeneratedCode:
     def _source(self, groups: tuple[str, ...], *, lanes: bool) -> Source:
         kind, which = "batches" if lanes else "samples", ", ".join(groups)
         names = [name for group in groups for name in self._names(group)]
+        units = sum(len(self._units(group, lanes)) for group in groups)
         return Source(
             f"{self.mechanism.name or 'mechanism'}: {which}; {kind}",
             tuple(f"{name}_{end}" for name in names for end in ("call", "many")),
@@ -253,7 +254,7 @@ class GeneratedCode:
             # of several samples gains a tenth by fused multiply-add, which rounds once less.
             flags=("-ffp-contract=fast",) if lanes else ("-O1",),
             determined_by=f"{self.identity} {which} {kind}",
-            count=2 * sum(len(self._units(group, lanes)) for group in groups),
+            count=2 * units if lanes else units + 1,
         )
 
     def _proof_of(self, groups: tuple[str, ...]) -> Callable[[Library], Mapping[str, Any]]:
@@ -307,12 +308,21 @@ class GeneratedCode:
         )
 
     def _texts(self, groups: tuple[str, ...], lanes: bool) -> Iterator[str]:
-        """Return the texts of the functions, the longest first; they compile at the same time."""
-        for group in sorted(groups, key=lambda one: one != "derivatives"):
+        """Return the texts of the functions, which compile while the next are written.
+
+        A short one comes first, then those that take longest.
+        """
+        order, batches = ("dynamics", "derivatives"), list[str]()
+        for group in sorted(groups, key=lambda one: order.index(one) if one in order else 2):
             for names in self._units(group, lanes):
-                one_motion = names == ["steps"]
-                texts = self._unit(names).library(lanes=lanes and not one_motion)
-                yield from (_MORE + text for text in texts) if group == "derivatives" else texts
+                unit, more = self._unit(names), _MORE if group == "derivatives" else ""
+                one, many = unit.library(lanes=lanes and names != ["steps"])  # of one motion
+                yield more + one
+                if lanes:
+                    yield more + many
+                batches += unit.batches()
+        if not lanes:
+            yield "\n".join([batch_prelude(), *batches])
 
     def _units(self, group: str, lanes: bool) -> list[list[str]]:
         """Return which functions share a text: large ones, and those without lanes, have their own.
