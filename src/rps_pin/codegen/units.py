@@ -101,7 +101,7 @@ class Routine:
     the rounding error as PRECISE(in_double, in_single), and repeats a loop while ANY(condition),
     that of any of the samples. It calls a function as ``NAME(x0, ..., y0, ...)`` with pointers to
     inputs and outputs that do not overlap. A ROW is COLUMNS numbers of type REAL, of which
-    ENTRY(row, j) is one; it is added, and multiplied by a REAL, as one.
+    ENTRY(row, j) is one; it is added, and multiplied by a REAL, as one. STORE(to, row) writes all.
 
     Parameters
     ----------

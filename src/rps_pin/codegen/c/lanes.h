@@ -13,9 +13,11 @@ typedef long long lanes_bits __attribute__((vector_size(8 * LANES)));
 #undef COLUMNS
 #undef ROW
 #undef ENTRY
+#undef STORE
 #define COLUMNS 1
 #define ROW REAL
 #define ENTRY(row, j) (row)
+#define STORE(to, row) (*(to) = (row))
 
 /* A function of C for each lane; not inline where it is a call for each. */
 #define EACH_LANE(kind, name) \

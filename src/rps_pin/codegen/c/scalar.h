@@ -46,12 +46,16 @@ double copysign(double, double);
     && (defined(__SSE2__) || defined(__aarch64__))
 #define COLUMNS 8
 typedef REAL columns_row __attribute__((vector_size(8 * sizeof(REAL))));
+typedef REAL columns_stored
+    __attribute__((vector_size(8 * sizeof(REAL)), aligned(sizeof(REAL)), may_alias));
 #define ROW columns_row
 #define ENTRY(row, j) ((row)[j])
+#define STORE(to, row) (*(columns_stored *)(to) = (row))
 #else
 #define COLUMNS 1
 #define ROW REAL
 #define ENTRY(row, j) (row)
+#define STORE(to, row) (*(to) = (row))
 #endif
 
 /* Chunks of a function. */

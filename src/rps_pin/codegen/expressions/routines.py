@@ -238,7 +238,7 @@ def _forward_dynamics_derivatives(functions: MechanismFunctions) -> Routine:
     x, columns = functions.expressions, functions.forward_columns
     nq, nv, na, m = x.tree.model.nq, x.tree.model.nv, x.tau.numel(), x.independent.size
     extra, response = _extra(functions, True), columns.response
-    count, right = 2 * nv + na, columns.right.sparsity()
+    right = columns.right.sparsity()
     dependent, independent = x.partition.dependent, x.independent.tolist()
     tables = {
         "starts": right.colind(),
@@ -260,21 +260,26 @@ def _forward_dynamics_derivatives(functions: MechanismFunctions) -> Routine:
     {"".join(_table(name, values) for name, values in tables.items())}
     REAL {arrays};
     ROW rows[{response.rows}];
-    int i, j, k, begin;
+    int i, j, k, part, begin;
     {_call("forward_columns", ["q", "v", "tau"], extra, *numbers, "check")}
     for (j = 0; j < COLUMNS; ++j) ENTRY(rows[0], j) = CONST(0);
-    for (begin = 0; begin < {count}; begin += COLUMNS) {{
-        const int end = begin + COLUMNS < {count} ? begin + COLUMNS : {count};
-        for (i = 1; i <= {right.size1()}; ++i) rows[i] = rows[0];
-        for (j = begin; j < end; ++j)
-            for (k = starts[j]; k < starts[j + 1]; ++k)
-                ENTRY(rows[right_rows[k]], j - begin) = right[k];
-        {response.calls("response", "rows", "coefficients")}
-        for (j = begin; j < end; ++j) {{
-            const int size = j < {2 * nv} ? {nv} : {na};
-            REAL *to = j < {nv} ? by_q + j
-                : j < {2 * nv} ? by_v + (j - {nv}) : by_tau + (j - {2 * nv});
-            for (i = 0; i < {nv}; ++i) to[i * size] = ENTRY(rows[places[i]], j - begin);
+    for (part = 0; part < 3; ++part) {{
+        const int size = part < 2 ? {nv} : {na};
+        const int *const start = starts + part * {nv};
+        REAL *const to = part == 0 ? by_q : part == 1 ? by_v : by_tau;
+        for (begin = 0; begin < size; begin += COLUMNS) {{
+            const int left = size - begin, wide = left < COLUMNS ? left : COLUMNS;
+            for (i = 1; i <= {right.size1()}; ++i) rows[i] = rows[0];
+            for (j = 0; j < wide; ++j)
+                for (k = start[begin + j]; k < start[begin + j + 1]; ++k)
+                    ENTRY(rows[right_rows[k]], j) = right[k];
+            {response.calls("response", "rows", "coefficients")}
+            if (wide == COLUMNS)
+                for (i = 0; i < {nv}; ++i) STORE(to + i * size + begin, rows[places[i]]);
+            else
+                for (j = 0; j < wide; ++j)
+                    for (i = 0; i < {nv}; ++i)
+                        to[i * size + begin + j] = ENTRY(rows[places[i]], j);
         }}
     }}
     for (i = 0; i < {m}; ++i) {{
