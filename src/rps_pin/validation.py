@@ -115,7 +115,7 @@ def real_vector(value: ArrayLike, size: int, name: str) -> Array:
         isinstance(value, np.ndarray)
         and value.dtype == np.float64
         and value.shape == (size,)
-        and math.isfinite(dasum(value))
+        and (not size or math.isfinite(dasum(value)))
     ):
         return value
     array = numbers(value, name, f"{size} numbers")

@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 Rng = np.random.Generator
 
 ALL_KINDS = (*KINDS, "coupling")
+#: Further couplings, which a draw of any kind leaves out.
+EVERY_KIND = (*ALL_KINDS, "polynomial", "differential")
 #: Joints of a tree, as often as they come.
 SPATIAL = ["revolute"] * 8 + ["prismatic"] * 3 + ["ball", "free", "turn", "planar", "translation"]
 PLANAR = ["revolute"] * 5 + ["prismatic"] * 2 + ["turn", "planar"]
@@ -300,8 +302,8 @@ def _closures(
         must = bool(kinds) and not closures
         kind = kinds[0] if must else str(rng.choice(list(kinds or ALL_KINDS)))
         closure = (
-            _coupling(rng, model, q, f"loop_{attempt}")
-            if kind == "coupling"
+            _COUPLINGS[kind](rng, model, q, f"loop_{attempt}")
+            if kind in _COUPLINGS
             else _loop(rng, model, q, kind, f"loop_{attempt}_", planar)
         )
         if closure is not None and _regular(
@@ -348,6 +350,36 @@ def _coupling(rng: Rng, model: pin.Model, q: Array, name: str) -> JointCoupling 
     ratio = float(rng.choice([-1, 1]) * rng.uniform(0.4, 2.0))
     offset = float(q[one.idx_q] - ratio * q[other.idx_q])
     return JointCoupling(model.names[one.id], model.names[other.id], ratio, offset, name)
+
+
+def _polynomial(rng: Rng, model: pin.Model, q: Array, name: str) -> JointCoupling | None:
+    """Of degree 2 to 5, about 1 in size near where the tree stands."""
+    simple = [joint for joint in list(model.joints)[1:] if joint.nq == joint.nv == 1]
+    if len(simple) < 2:
+        return None
+    first, second = rng.choice(len(simple), size=2, replace=False)
+    one, other = simple[first], simple[second]
+    x = float(q[other.idx_q])
+    degrees = np.arange(1, int(rng.integers(2, 6)) + 1)
+    above = rng.normal(size=degrees.size) / (degrees * (1 + abs(x)) ** degrees)
+    below = float(q[one.idx_q] - above @ x**degrees)
+    joints = (model.names[joint.id] for joint in (one, other))
+    return JointCoupling(*joints, name=name, polynomial=(below, *above))
+
+
+def _differential(rng: Rng, model: pin.Model, q: Array, name: str) -> JointCoupling | None:
+    simple = [joint for joint in list(model.joints)[1:] if joint.nq == joint.nv == 1]
+    if len(simple) < 3:
+        return None
+    one, *others = (simple[k] for k in rng.choice(len(simple), size=3, replace=False))
+    ratios = {
+        model.names[joint.id]: float(rng.choice([-1, 1]) * rng.uniform(0.4, 2)) for joint in others
+    }
+    offset = float(q[one.idx_q] - sum(ratios[model.names[j.id]] * q[j.idx_q] for j in others))
+    return JointCoupling(model.names[one.id], ratios, offset=offset, name=name)
+
+
+_COUPLINGS = {"coupling": _coupling, "polynomial": _polynomial, "differential": _differential}
 
 
 def _regular(mechanism: ClosedLoopModel, q: Array) -> bool:

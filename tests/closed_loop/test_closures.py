@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rps_pin import JointCoupling, LoopClosure, MechanismError
+from rps_pin import LoopClosure, MechanismError
 from rps_pin.closed_loop.constraints.closures import KINDS
 from tests.closed_loop.mechanisms import FourBar
 
@@ -158,44 +158,3 @@ def test_lengths_of_other_kinds_are_refused(kind: str) -> None:
 
 def test_closures_of_arrays_are_hashable_too() -> None:
     assert len({closure("revolute", axis=np.array([0, 0, 2.0])), closure("revolute")}) == 1
-
-
-# Couplings ----------------------------------------------------------------------------------------
-
-
-def test_couplings_have_one_row_and_are_named_after_their_joints() -> None:
-    coupling = JointCoupling("left", "right", 2.0, 0.1)
-    assert coupling.size == 1
-    assert coupling.name == "left = right"
-    assert JointCoupling("left", "right", name="gear").name == "gear"
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        coupling.ratio = 3.0
-
-
-def test_joint_coupled_to_itself_is_refused() -> None:
-    with pytest.raises(MechanismError, match="cannot tie joint 'left' to itself"):
-        JointCoupling("left", "left")
-
-
-@pytest.mark.parametrize("option", ["ratio", "offset"])
-@pytest.mark.parametrize("bad", [np.nan, np.inf, "two", None])
-def test_couplings_are_of_finite_numbers(option: str, bad: object) -> None:
-    with pytest.raises(MechanismError, match=f"coupling 'left = right': {option} = .* finite"):
-        JointCoupling("left", "right", **{option: bad})
-
-
-def test_ratio_of_zero_is_refused() -> None:
-    with pytest.raises(MechanismError, match="a ratio of 0 couples nothing"):
-        JointCoupling("left", "right", 0)
-
-
-@pytest.mark.parametrize("joints", [("crank_joint", "ball"), ("elbow", "crank_joint")])
-def test_joints_that_cannot_be_coupled_are_refused_with_those_that_can(
-    joints: tuple[str, str],
-) -> None:
-    model = pin.buildModelFromXML(FourBar().urdf())
-    model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
-    with pytest.raises(MechanismError, match="of one coordinate; there are: crank_joint") as caught:
-        JointCoupling(*joints).joint_ids(model)
-    assert "universe" not in str(caught.value)
-    assert caught.match("no joint '(ball|elbow)'")

@@ -15,12 +15,12 @@ from rps_pin.closed_loop.dynamics.forward_dynamics import forward_dynamics
 from rps_pin.closed_loop.dynamics.inverse_dynamics import inverse_dynamics
 from tests.closed_loop import mechanisms, random_mechanisms
 from tests.closed_loop.mechanisms import FOUR_BAR, five_bar, values
-from tests.closed_loop.random_mechanisms import ALL_KINDS, Case, case, pooled, slopes, worst_error
+from tests.closed_loop.random_mechanisms import EVERY_KIND, Case, case, pooled, slopes, worst_error
 
 Array = NDArray[np.float64]
 
 seeds = random_mechanisms.pool
-every_kind = pytest.mark.parametrize("kind", ALL_KINDS)
+every_kind = pytest.mark.parametrize("kind", EVERY_KIND)
 
 #: Relative; what central differences and a well conditioned mechanism leave.
 CLOSE = 1e-6

@@ -13,7 +13,7 @@ from rps_pin import ClosedLoopModel, InputError, LoopClosure, MechanismError, Si
 from tests.closed_loop import mechanisms, random_mechanisms
 from tests.closed_loop.mechanisms import derivative
 from tests.closed_loop.random_mechanisms import (
-    ALL_KINDS,
+    EVERY_KIND,
     Case,
     body_jacobians,
     case,
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 seeds = random_mechanisms.pool
 yes_or_no = st.booleans()
-every_kind = pytest.mark.parametrize("kind", ALL_KINDS)
+every_kind = pytest.mark.parametrize("kind", EVERY_KIND)
 
 
 def forces(c: Case, seed: int = 0) -> Array:

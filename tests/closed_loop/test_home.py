@@ -16,11 +16,11 @@ from rps_pin import ClosedLoopModel, ClosureError, InputError, LoopClosure
 from rps_pin.closed_loop import ForceDistribution
 from tests.closed_loop import mechanisms
 from tests.closed_loop.mechanisms import FOUR_BAR, closed_guess, joint, link, robot
-from tests.closed_loop.random_mechanisms import ALL_KINDS, Case, case
+from tests.closed_loop.random_mechanisms import EVERY_KIND, Case, case
 
 Array = NDArray[np.float64]
 
-every_kind = pytest.mark.parametrize("kind", ALL_KINDS)
+every_kind = pytest.mark.parametrize("kind", EVERY_KIND)
 
 
 # Home ---------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ from rps_pin import (
 from tests.closed_loop import mechanisms, random_mechanisms
 from tests.closed_loop.mechanisms import FOUR_BAR, FourBar, derivative, five_bar, values
 from tests.closed_loop.random_mechanisms import (
-    ALL_KINDS,
+    EVERY_KIND,
     Case,
     case,
     gap_slope,
@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 seeds = random_mechanisms.pool
 plane = st.booleans()
-every_kind = pytest.mark.parametrize("kind", ALL_KINDS)
+every_kind = pytest.mark.parametrize("kind", EVERY_KIND)
 
 
 def along(c: Case, t: float) -> Array:

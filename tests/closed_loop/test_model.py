@@ -640,9 +640,14 @@ def test_names_may_not_come_twice() -> None:
         build(closures=[LoopClosure("knee", "rocker_tip", kind) for kind in ("rigid", "spherical")])
 
 
-def test_mechanism_without_actuators_is_refused() -> None:
-    with pytest.raises(MechanismError, match="actuate"):
-        build(actuated=[])
+def test_tree_without_joints_is_refused() -> None:
+    with pytest.raises(MechanismError, match="'stone' has no joints: nothing can move"):
+        ClosedLoopModel(named(pin.Model(), "stone"), [], [])
+
+
+def named(model: pin.Model, name: str) -> pin.Model:
+    model.name = name
+    return model
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])

@@ -22,7 +22,7 @@ from rps_pin.codegen.expressions.parameters import Parameters
 from rps_pin.codegen.expressions.tree import Tree
 from rps_pin.errors import MechanismError
 from tests.closed_loop.random_mechanisms import (
-    ALL_KINDS,
+    EVERY_KIND,
     allowed_placement,
     case,
     joint_model,
@@ -115,8 +115,8 @@ def moved(rng: np.random.Generator, model: pin.Model, q: Array, size: float) -> 
 
 
 #: Kinds, in space and in the plane; there a closure that allows all motion in it does nothing.
-CASES = [(kind, False) for kind in ALL_KINDS]
-CASES += [(kind, True) for kind in ALL_KINDS if kind != "planar"]
+CASES = [(kind, False) for kind in EVERY_KIND]
+CASES += [(kind, True) for kind in EVERY_KIND if kind != "planar"]
 
 
 @pytest.mark.parametrize(("kind", "planar"), CASES)
@@ -222,7 +222,7 @@ def test_closed_loops_on_a_moving_ancestor_need_only_be_turned(kind: str) -> Non
 # Against differences ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ALL_KINDS)
+@pytest.mark.parametrize("kind", EVERY_KIND)
 def test_the_bias_is_the_derivative_of_the_jacobian(kind: str) -> None:
     """In their own axes, at configurations that are open."""
     rng, found = np.random.default_rng(5), []

@@ -354,6 +354,20 @@ def test_a_coupling_is_drawn_between_its_joints():
     assert "closures" in row["text"]
 
 
+def test_a_coupling_of_several_joints_is_drawn_to_each():
+    tree = ClosedLoopModel.load(URDF / "four_bar.yaml").model
+    others = {"crank_joint": 1.0, "coupler_joint": -2.0}
+    tied = [JointCoupling("rocker_joint", others, name="tie")]
+    geared = ClosedLoopModel(tree, tied, ["crank_joint", "coupler_joint"])
+    _, recorder = shown(geared, layers=["closures"])
+    found, data = placed(recorder), geared.model.createData()
+    pin.forwardKinematics(geared.model, data, geared.home)
+    for name, other in zip(("tie", "tie_1"), others, strict=True):
+        for side, joint in (("a", "rocker_joint"), ("b", other)):
+            place = data.oMi[geared.model.getJointId(joint)].translation
+            np.testing.assert_allclose(found[f"closures/{name}_{side}"][:3, 3], place, atol=1e-12)
+
+
 def test_a_skeleton_reaches_every_closed_frame():
     four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
     bars = [one for one in skeleton(four_bar).geometryObjects if one.name.startswith("bar")]

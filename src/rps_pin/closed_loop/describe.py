@@ -70,11 +70,16 @@ class ClosureDescription(NamedTuple):
 
     name: str
     kind: str
-    between: tuple[str, str]
-    """The two frames, or joints."""
+    between: tuple[str, ...]
+    """The two frames, or the joint and those that it follows."""
     rows: int
     needed: int
     """How far the rank falls without it: the rows that no other closure replaces."""
+
+    def ends(self) -> str:
+        """Return what it is between, in words."""
+        first, *others = self.between
+        return f"{first} = {' + '.join(others) or 'fixed'}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +160,7 @@ class MechanismDescription:
             for j in self.joints
         ]
         closures = [
-            (c.name, c.kind, " = ".join(c.between), f"{c.rows} ({c.needed} needed)")
-            for c in self.closures
+            (c.name, c.kind, c.ends(), f"{c.rows} ({c.needed} needed)") for c in self.closures
         ]
         lines = [
             f"{self.name}: mobility {self.mobility}, actuation {self.verdict()}",
@@ -178,6 +182,8 @@ class MechanismDescription:
     def verdict(self) -> str:
         """Return the actuation in words."""
         driven, left = self.actuated_velocities, self.mobility - self.actuated_rank
+        if not driven:
+            return f"{self.actuation}: nothing driven"
         if self.actuation == "underactuated":
             return f"underactuated: {left} of {self.mobility} motions have no actuator"
         if self.actuation == "redundant":
@@ -252,10 +258,11 @@ def _closure(
     system: ConstraintSystem, closure: Closure, scaled: Array, found: int
 ) -> ClosureDescription:
     others = np.delete(scaled, system.equations.rows(closure.name), axis=0)
+    between: tuple[str, ...]
     if isinstance(closure, LoopClosure):
         kind, between = str(closure.kind), (closure.frame_a, closure.frame_b)
     else:
-        kind, between = "coupling", (closure.joint, closure.other)
+        kind, between = "coupling", (closure.joint, *closure.others)
     needed = found - rank(singular_values(others))
     return ClosureDescription(closure.name, kind, between, closure.size, needed)
 

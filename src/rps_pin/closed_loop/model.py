@@ -61,7 +61,7 @@ class ClosedLoopModel:
     closures
         Its loop closures: `LoopClosure` and `JointCoupling` objects.
     actuated
-        Names of the actuated joints; `tau` comes in this order.
+        Names of the actuated joints; `tau` comes in this order. ``[]``: nothing is driven.
     home
         Configuration to start from, shape (nq,); its loops are closed here (see `close`) if they
         are open. Left out: Pinocchio's neutral one, whose loops are closed when `home` is first
@@ -87,7 +87,7 @@ class ClosedLoopModel:
     Raises
     ------
     MechanismError
-        If a frame or joint is unknown or named twice, or no joint is actuated.
+        If a frame or joint is unknown or named twice, or the tree has no joints.
     InputError
         If a number or an array does not fit.
     ClosureError

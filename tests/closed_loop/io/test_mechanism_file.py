@@ -104,6 +104,21 @@ def test_every_key_is_read(tmp_path: Path) -> None:
     assert not any(armature.values())
 
 
+def test_couplings_of_several_joints_and_polynomials_are_read(tmp_path: Path) -> None:
+    text = """\
+urdf: four_bar.urdf
+couplings:
+  - {joint: rocker_joint, others: {crank_joint: 10, coupler_joint: -2.5}, offset: 0.5}
+  - {joint: rocker_joint, other: crank_joint, polynomial: [0.1, 2, 0, 1], name: cam}
+  - {joint: rocker_joint, others: {}, offset: 1}
+"""
+    assert parts_from_yaml(written(tmp_path, text)).closures == (
+        JointCoupling("rocker_joint", {"crank_joint": 10, "coupler_joint": -2.5}, offset=0.5),
+        JointCoupling("rocker_joint", "crank_joint", name="cam", polynomial=(0.1, 2, 0, 1)),
+        JointCoupling("rocker_joint", {}, offset=1.0),
+    )
+
+
 def test_most_keys_can_be_left_out(tmp_path: Path) -> None:
     parts = parts_from_yaml(str(written(tmp_path, "urdf: four_bar.urdf\n")))
     assert parts.closures == parts.actuated == ()
@@ -301,6 +316,31 @@ WRONG = {
         U + "couplings: [{joint: crank_joint, other: x}]\n",
         2,
         "no joint 'x' of one coordinate; there are: ",
+    ),
+    "coupling of others": (
+        U + "couplings:\n - {joint: crank_joint, others: {rocker_joint: 1, x: 2}}\n",
+        3,
+        "no joint 'x' of one coordinate; there are: ",
+    ),
+    "coupling of nothing": (
+        U + "couplings:\n - {joint: crank_joint}\n",
+        3,
+        "one of other (a joint) and others (ratios by joints' names); neither was given",
+    ),
+    "coupling of both": (
+        U + "couplings:\n - {joint: crank_joint, other: a, others: {b: 1}}\n",
+        3,
+        "both were given",
+    ),
+    "ratio": (
+        U + "couplings:\n - {joint: crank_joint, others: {rocker_joint: wide}}\n",
+        3,
+        "couplings[0].others.rocker_joint = 'wide': input should be a valid number",
+    ),
+    "polynomial": (
+        U + "couplings:\n - {joint: crank_joint, other: rocker_joint, polynomial: [1]}\n",
+        3,
+        "polynomial = [1.0] couples nothing",
     ),
     "coupling to itself": (
         U + "couplings: [{joint: crank_joint, other: crank_joint}]\n",

@@ -18,7 +18,7 @@ kind                rows  condition
 ``distance``        1     the origins are a given distance apart (a rod with a ball at each end)
 ==================  ====  =========================================================================
 
-A `JointCoupling` (1 row) ties two joints' coordinates, as a gear or a parallelogram does.
+A `JointCoupling` (1 row) ties the coordinates of joints; see `couplings`.
 
 Each closure of frames is built on one Pinocchio constraint model, of a point (``spherical``) or
 of a whole frame (all others), of which it selects some combinations of rows; see `rows`.
@@ -33,7 +33,10 @@ from typing import Any, Literal, get_args
 
 import pinocchio as pin
 
+from rps_pin.closed_loop.constraints.couplings import JointCoupling
 from rps_pin.errors import MechanismError
+
+__all__ = ["KINDS", "Closure", "JointCoupling", "Kind", "LoopClosure", "frame_id", "joint_id"]
 
 Kind = Literal[
     "spherical",
@@ -175,74 +178,6 @@ class LoopClosure:
         )
         constraint.name = self.name
         return constraint
-
-
-@dataclass(frozen=True)
-class JointCoupling:
-    """Two joints of proportional coordinates: q_joint = ratio * q_other + offset.
-
-    Its row is q_joint - ratio q_other - offset = 0; its force is the generalised force (N or N m)
-    that the coupling exerts on `joint`.
-
-    Parameters
-    ----------
-    joint, other
-        Names of two joints of one coordinate each.
-    ratio
-        rad/rad, m/m, or m/rad where the two differ; not zero.
-    offset
-        rad or m.
-    name
-        For messages and for `ClosedLoopModel.rows`; ``"joint = other"`` if left out.
-
-    Raises
-    ------
-    MechanismError
-        If a joint is coupled to itself, the ratio is zero, or a number is not finite.
-    """
-
-    joint: str
-    other: str
-    ratio: float = 1.0
-    offset: float = 0.0
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        if self.joint == self.other:
-            raise MechanismError(f"a coupling cannot tie joint {self.joint!r} to itself")
-        if not self.name:
-            object.__setattr__(self, "name", f"{self.joint} = {self.other}")
-        for option in ("ratio", "offset"):
-            value = getattr(self, option)
-            if not isinstance(value, (int, float)) or not math.isfinite(value):
-                raise MechanismError(f"coupling {self.name!r}: {option} = {value!r} must be finite")
-        if self.ratio == 0:
-            raise MechanismError(f"coupling {self.name!r}: a ratio of 0 couples nothing")
-
-    @property
-    def size(self) -> int:
-        """Number of constraint rows."""
-        return 1
-
-    def joint_ids(self, model: pin.Model) -> tuple[int, int]:
-        """Return the indices of the two joints in a model.
-
-        Raises
-        ------
-        MechanismError
-            If a joint is unknown (lists those there are), or has not exactly one coordinate.
-        """
-        return self._joint_id(model, self.joint), self._joint_id(model, self.other)
-
-    def _joint_id(self, model: pin.Model, name: str) -> int:
-        pairs = list(zip(model.names, model.joints, strict=True))[1:]  # not the world's
-        simple = [candidate for candidate, joint in pairs if joint.nq == joint.nv == 1]
-        if name not in simple:
-            raise MechanismError(
-                f"coupling {self.name!r}: no joint {name!r} of one coordinate; there are: "
-                f"{', '.join(simple)}"
-            )
-        return int(model.getJointId(name))
 
 
 Closure = LoopClosure | JointCoupling

@@ -13,7 +13,8 @@ Then, the derivatives of nu and alpha being Pinocchio's and x the cross product 
     dY = dalpha_a - Ad_M dalpha_b - eta x alpha_b + dX x nu_a + X x dnu_a,
 
 and the rows J v = W X and J a + J' v = W Y + W' X, W' = -D X, follow by the product rule from W,
-its derivative D and the derivative of D (see `rows`). Points in world axes are simpler.
+its derivative D and the derivative of D (see `rows`). Points in world axes are simpler. A coupling
+q_j - sum p(q_k) has the rate v_j - sum p' v_k and the acceleration a_j - sum (p' a_k + p'' v_k^2).
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class FrameMotions:
     """
 
     def __init__(self, equations: ClosureEquations, motion: tuple[Array, Array, Array]) -> None:
-        self.equations = equations
+        self.equations, self.motion = equations, motion
         self._frames: dict[int, _Frame] = {}
         pin.computeForwardKinematicsDerivatives(equations.model, equations.data, *motion)
         pin.updateFramePlacements(equations.model, equations.data)
@@ -97,6 +98,12 @@ def closure_derivatives(motions: FrameMotions) -> ClosureDerivatives:
             derivatives = [*_of_frames(frames, of_a, of_b)]
         for whole, part in zip(found, derivatives, strict=True):
             whole[frames.rows] = part
+    q, v, a = motions.motion
+    for coupling in equations.curved:
+        for k, (_, _, second, third) in coupling.slopes(q):
+            found.rate_q[coupling.row, k] = -second * v[k]
+            found.acceleration_q[coupling.row, k] = -second * a[k] - third * v[k] ** 2
+            found.acceleration_v[coupling.row, k] = -2 * second * v[k]
     return found
 
 
@@ -127,6 +134,9 @@ def closure_force_slope(motions: FrameMotions, multipliers: Array) -> Array:
             f = frames.selected.wrenches(placement).T @ force
             change = np.tensordot(force, frames.selected.slope(placement), 1) @ (B - A)
         slope += (A - B).T @ change + B.T @ _twist_on_wrench(f) @ (B - A)
+    for coupling in equations.curved:
+        for k, (_, _, second, _) in coupling.slopes(motions.motion[0]):
+            slope[k, k] -= second * multipliers[coupling.row]
     return slope
 
 

@@ -20,6 +20,7 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure
+from rps_pin.closed_loop.constraints.couplings import CouplingRow, coupling_row
 from rps_pin.closed_loop.constraints.rows import Floats, Rows, rows_of
 from rps_pin.errors import InputError, MechanismError, shown
 from rps_pin.validation import positive_number
@@ -92,8 +93,8 @@ class ClosureEquations:
         For calling Pinocchio: `getConstraintsJacobian` reads what each of the `calls` refreshes.
     plain : bool
         Whether what it returns is J already; otherwise `select_rows` makes J of it.
-    closed_frames : list of ClosedFrames
-        The closures of frames; the rest are couplings.
+    closed_frames, couplings : lists of ClosedFrames and CouplingRow
+        The closures of frames, and those of joints.
 
     Raises
     ------
@@ -150,16 +151,19 @@ class ClosureEquations:
         self.angular_rows = np.zeros(self.size, dtype=bool)
         for frames in self.closed_frames:
             self.angular_rows[frames.rows] = frames.selected.angular
-        #: Row, two indices in q, ratio and offset of each coupling; and their rows of J.
-        self._couplings: list[tuple[int, int, int, float, float]] = []
+        self.couplings: list[CouplingRow] = []
+        #: Their rows of J, as far as these do not depend on q.
         self._coupling_rows = np.zeros((self.size, model.nv))
         for closure in self.closures:
             if isinstance(closure, JointCoupling):
-                row, ratio = self.rows(closure.name).start, closure.ratio
-                one, other = (model.joints[index] for index in closure.joint_ids(model))
-                self._couplings.append((row, one.idx_q, other.idx_q, ratio, closure.offset))
-                self._coupling_rows[row, [one.idx_v, other.idx_v]] = 1.0, -ratio
-                self.angular_rows[row] = angular[one.idx_v]
+                coupling = coupling_row(closure, model, self.rows(closure.name).start)
+                self.couplings.append(coupling)
+                self._coupling_rows[coupling.row, coupling.idx_v] = 1.0
+                for term in coupling.terms:
+                    self._coupling_rows[coupling.row, term.idx_v] = -term.coefficients[0]
+                self.angular_rows[coupling.row] = angular[coupling.idx_v]
+        #: Those whose rows of J depend on q.
+        self.curved = [coupling for coupling in self.couplings if not coupling.is_linear]
         self.row_scale = np.where(self.angular_rows, self.length, 1.0)
         self._groups = self._row_groups()
         self._open_limit = OPEN * self.length
@@ -183,14 +187,14 @@ class ClosureEquations:
         for calc, constraint_data in self.calls:
             calc(model, data, constraint_data)
         return self.select_rows(
-            pin.getConstraintsJacobian(model, data, self.constraints, self.constraint_data)
+            pin.getConstraintsJacobian(model, data, self.constraints, self.constraint_data), q
         )
 
-    def select_rows(self, jacobian: Array) -> Array:
-        """Return J, shape (nc, nv), from what Pinocchio's `getConstraintsJacobian` returned."""
+    def select_rows(self, jacobian: Array, q: Array) -> Array:
+        """Return J (nc, nv) at q from what Pinocchio's `getConstraintsJacobian` returned there."""
         if self.plain:
             return jacobian.reshape(self.size, self.model.nv)  # a single row or column comes flat
-        rows = self._coupling_rows.copy()
+        rows = self._rows_of_couplings(q)
         all_rows = jacobian.reshape(-1, self.model.nv)
         start = 0
         for frames in self.closed_frames:
@@ -203,6 +207,22 @@ class ClosureEquations:
             )
             start = stop
         return rows
+
+    def _rows_of_couplings(self, q: Array) -> Array:
+        """Return the couplings' rows of J, and zeros for the others, shape (nc, nv)."""
+        rows = self._coupling_rows.copy()
+        for coupling in self.curved:
+            for k, (_, first, _, _) in coupling.slopes(q):
+                rows[coupling.row, k] = -first
+        return rows
+
+    def _curvature(self, q: Array, v: Array) -> Array:
+        """Return J' v of the couplings, -p'' v^2, and zeros for the others, shape (nc,)."""
+        bias = np.zeros(self.size)
+        for coupling in self.curved:
+            for k, (_, _, second, _) in coupling.slopes(q):
+                bias[coupling.row] -= second * v[k] ** 2
+        return bias
 
     # Gaps -----------------------------------------------------------------------------------------
 
@@ -221,8 +241,8 @@ class ClosureEquations:
             if frames.in_world:
                 gap = (gap.reshape(-1, 3) @ frames.constraint_data.oMc1.rotation.T).ravel()
             gaps[frames.rows] = gap
-        for row, one, other, ratio, offset in self._couplings:
-            gaps[row] = q[one] - ratio * q[other] - offset
+        for coupling in self.couplings:
+            gaps[coupling.row] = coupling.gap(q)
         return gaps
 
     def largest_gap(self, gaps: Array) -> float:
@@ -244,8 +264,8 @@ class ClosureEquations:
         for point, rotation, squared_gap in self._open_frames:
             if not squared_gap(point(), rotation()) <= limit:
                 return True
-        for row, one, other, ratio, offset in self._couplings:
-            gap = self.row_scale[row] * (q[one] - ratio * q[other] - offset)
+        for coupling in self.couplings:
+            gap = self.row_scale[coupling.row] * coupling.gap(q)
             if not gap * gap <= limit:
                 return True
         return False
@@ -288,7 +308,8 @@ class ClosureEquations:
         """Return gaps, their rates and their accelerations."""
         gaps = self.gaps(q)
         pin.forwardKinematics(self.model, self.data, q, v, a)
-        rates, accelerations = self._coupling_rows @ v, self._coupling_rows @ a
+        rows = self._rows_of_couplings(q)
+        rates, accelerations = rows @ v, rows @ a + self._curvature(q, v)
         for frames in self.closed_frames:
             rates[frames.rows], accelerations[frames.rows] = (
                 self._world_motion(frames) if frames.in_world else self._selected_motion(frames)
@@ -302,7 +323,7 @@ class ClosureEquations:
         """
         model, data, acceleration = self.model, self.data, pin.getFrameClassicalAcceleration
         pin.forwardKinematics(model, data, q, v, self._still)
-        bias = np.zeros(self.size)
+        bias = self._curvature(q, v)
         for frames in self._points:
             bias[frames.rows] = (
                 acceleration(model, data, frames.frame_a, _WORLD).linear

@@ -66,8 +66,8 @@ class ConstraintSystem:
         self.actuated_names = (actuated,) if isinstance(actuated, str) else tuple(actuated)
         refuse_twice("actuated joint", self.actuated_names)
         self.equations = equations = ClosureEquations(model, closures, characteristic_length)
-        if not self.actuated_names:
-            raise MechanismError("a mechanism needs at least one joint to actuate")
+        if not model.nv:
+            raise MechanismError(f"the tree {model.name!r} has no joints: nothing can move")
         if not max_condition >= 1:
             raise InputError(f"max_condition = {max_condition}: it must be at least 1")
         if effects is not None and effects.damping.size != model.nv:

@@ -142,7 +142,7 @@ def inverse_dynamics(
         calc(model, data, constraint_data)
     jacobian = getConstraintsJacobian(model, data, equations.constraints, equations.constraint_data)
     if not equations.plain:
-        jacobian = equations.select_rows(jacobian)
+        jacobian = equations.select_rows(jacobian, q)
     if closed and equations.is_open(q):
         system.state(q, v, a)  # not finite?
         system.refuse_open(q)

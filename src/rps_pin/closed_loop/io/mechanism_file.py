@@ -23,7 +23,7 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure, frame_id
 from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
-from rps_pin.closed_loop.io.mechanism_schema import Description
+from rps_pin.closed_loop.io.mechanism_schema import CouplingEntry, Description
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
@@ -205,10 +205,21 @@ def _closures(file: YamlFile, description: Description, model: pin.Model) -> lis
             found.append(LoopClosure(**entry.model_dump()))
     for i, coupled in enumerate(description.couplings):
         with file.at("couplings", i):
-            coupling = JointCoupling(**coupled.model_dump())
-            coupling.joint_ids(model)
-            found.append(coupling)
+            found.append(_coupling(coupled, model))
     return found
+
+
+def _coupling(entry: CouplingEntry, model: pin.Model) -> JointCoupling:
+    """Return a coupling of joints that the model has."""
+    if (entry.other is None) == (entry.others is None):
+        both = "both were given" if entry.other else "neither was given"
+        raise MechanismError(
+            f"a coupling has one of other (a joint) and others (ratios by joints' names); {both}"
+        )
+    given = entry.model_dump(exclude={"others"})
+    coupling = JointCoupling(**given | {"other": entry.other or entry.others})
+    coupling.joint_ids(model)
+    return coupling
 
 
 def _check_joint(file: YamlFile, path: tuple[str | int, ...], name: str, model: pin.Model) -> None:

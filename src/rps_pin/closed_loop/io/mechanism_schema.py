@@ -23,12 +23,14 @@ class ClosureEntry(Entry):
 
 
 class CouplingEntry(Entry):
-    """The fields of a `JointCoupling`."""
+    """The fields of a `JointCoupling`; `others` is its `other` with ratios by name."""
 
     joint: Text
-    other: Text
+    other: Text | None = None
+    others: dict[Text, Finite] | None = None
     ratio: Finite = 1.0
     offset: Finite = 0.0
+    polynomial: list[Finite] | None = None
     name: str = ""
 
 

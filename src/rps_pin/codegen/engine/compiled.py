@@ -296,7 +296,8 @@ class CompiledMechanism:
             return (m.complete(q[at], q, within_limits=within_limits), 0.0)
 
         at = np.array(
-            [self.model.joints[self.model.getJointId(name)].idx_q for name in self.actuated]
+            [self.model.joints[self.model.getJointId(name)].idx_q for name in self.actuated],
+            dtype=np.intp,
         )
         guess = self.reference()._start if q_guess is None else self._normalised(q_guess)
         start = np.broadcast_to(guess, (*given.shape[:-1], self.model.nq)).copy()

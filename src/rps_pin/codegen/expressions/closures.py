@@ -17,6 +17,7 @@ import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import JointCoupling, LoopClosure
+from rps_pin.closed_loop.constraints.couplings import coupling_row
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
 from rps_pin.closed_loop.constraints.rows import across
 from rps_pin.codegen.expressions.chains import Chains, End, Motion, constant, cross, tidy
@@ -209,12 +210,15 @@ def _ends(tree: Tree, closure: LoopClosure) -> _Ends:
 
 
 def _coupling(tree: Tree, coupling: JointCoupling, angular: bool) -> _Rows:
-    """q_joint - ratio q_other - offset = 0."""
-    one, other = (tree.model.joints[index] for index in coupling.joint_ids(tree.model))
-    jacobian = ca.SX(1, tree.v.numel())
-    jacobian[0, one.idx_v], jacobian[0, other.idx_v] = 1.0, -coupling.ratio
-    gap = tree.q[one.idx_q] - coupling.ratio * tree.q[other.idx_q] - coupling.offset
-    rows = _Rows(gap, jacobian, jacobian @ tree.v, ca.SX(1, 1))
+    """Q_joint - offset - sum of p(q_other) = 0; its J' v is -sum of p'' v^2."""
+    one = coupling_row(coupling, tree.model, 0)
+    jacobian, bias = ca.SX(1, tree.v.numel()), ca.SX(1, 1)
+    gap, jacobian[0, one.idx_v] = tree.q[one.idx_q] - one.constant, 1.0
+    for term in one.terms:
+        p, first, second, _ = term.derivatives(tree.q[term.idx_q])
+        gap, jacobian[0, term.idx_v] = gap - p, -first
+        bias -= second * tree.v[term.idx_v] ** 2
+    rows = _Rows(gap, jacobian, jacobian @ tree.v, ca.sparsify(bias))
     return rows._replace(turned=gap**2) if angular else rows._replace(apart=gap**2)
 
 

@@ -197,7 +197,7 @@ def _moved(x: MechanismExpressions, u: Expression, bias: Expression | None = Non
     independent = x.independent.tolist()
     right = x.jacobian[:, independent] @ u
     y = -x.dependent(right if bias is None else right + bias)
-    y[independent] = u
+    y[independent, 0] = u
     return y
 
 
@@ -243,7 +243,7 @@ def _accelerated(x: MechanismExpressions) -> Made:
 def _constraint_forces(x: MechanismExpressions) -> Made:
     x = x.cheapest
     rest = x.required(x.a)
-    rest[x.system.actuated.tolist()] -= x.tau
+    rest[x.system.actuated.tolist(), 0] -= x.tau
     rest -= x.least_force(x.reduced(rest)[0])  # what closures cannot carry
     multipliers = x.reduced(rest)[1]
     given = {"q": x.q, "v": x.v, "a": x.a, "tau": x.tau}
@@ -259,7 +259,7 @@ def _generalised_force(x: MechanismExpressions) -> Made:
 def _equations_of_motion(x: MechanismExpressions) -> Made:
     multipliers = ca.SX.sym("multipliers", x.jacobian.shape[0])
     error = x.required(x.a) - x.rows.package_jacobian().T @ multipliers
-    error[x.system.actuated.tolist()] -= x.tau
+    error[x.system.actuated.tolist(), 0] -= x.tau
     given = {"q": x.q, "v": x.v, "a": x.a, "tau": x.tau, "multipliers": multipliers}
     return given, {"error": error}
 
@@ -320,7 +320,7 @@ def _forward_dynamics_derivatives(x: MechanismExpressions) -> Made:
 def _multipliers(x: MechanismExpressions) -> Expression:
     """Return lambda of the motion q, v, a under the forces tau, shape (nc,)."""
     rest = x.required(x.a)
-    rest[x.system.actuated.tolist()] -= x.tau
+    rest[x.system.actuated.tolist(), 0] -= x.tau
     return x.reduced(rest)[1]
 
 
@@ -439,7 +439,7 @@ def _of_least_norm(x: MechanismExpressions, right: Expression) -> Expression:
 def _stage(x: MechanismExpressions) -> Made:
     x = x.cheapest
     acting = x.external_forces - x.passive_forces + x.springs
-    acting[x.system.actuated.tolist()] += x.tau
+    acting[x.system.actuated.tolist(), 0] += x.tau
     growth = x.growth + x.inertia_check
     given = {"q": x.q, "v": x.v, "tau": x.tau}
     return given, {"a": x.acceleration, "power": acting.T @ x.v, "growth": growth}
@@ -448,4 +448,4 @@ def _stage(x: MechanismExpressions) -> Made:
 @_function()
 def _projected_velocity(x: MechanismExpressions) -> Made:
     x = x.cheapest
-    return {"q": x.q, "v": x.v}, {"projected": _moved(x, x.v[x.independent.tolist()])}
+    return {"q": x.q, "v": x.v}, {"projected": _moved(x, x.v[x.independent.tolist(), 0])}

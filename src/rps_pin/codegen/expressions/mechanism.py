@@ -249,9 +249,9 @@ class MechanismExpressions:
         """Return T' f, shape (m,), and lambda with J_d' lambda = f_d, shape (nc,)."""
         independent, dependent = self.independent.tolist(), self.partition.dependent.tolist()
         if not dependent:
-            return force[independent], ca.SX(self.jacobian.shape[0], 1)
-        y = self.factors.transposed(ca.sparsify(force[dependent]))
-        return force[independent] - self.jacobian[:, independent].T @ y, y
+            return force[independent, 0], ca.SX(self.jacobian.shape[0], 1)
+        y = self.factors.transposed(ca.sparsify(force[dependent, 0]))
+        return force[independent, 0] - self.jacobian[:, independent].T @ y, y
 
     @cached_property
     def forces(self) -> Forces:
@@ -286,7 +286,7 @@ class MechanismExpressions:
             share = ca.sumsqr(missing) / (ca.sumsqr(whitened) + _NOTHING)
             unproduced = self.least_force(reduced - of_actuators.T @ tau)
         rest = force - unproduced
-        rest[actuated] -= tau
+        rest[actuated, 0] -= tau
         return self._forces(force, tau, self.reduced(rest)[1], unproduced, share, growth)
 
     def least_force(self, reduced: Expression) -> Expression:
@@ -351,7 +351,7 @@ class MechanismExpressions:
     def acceleration(self) -> Expression:
         """The acceleration under the forces tau, shape (nv,)."""
         force = -self.required(self.drift)
-        force[self.system.actuated.tolist()] += self.tau
+        force[self.system.actuated.tolist(), 0] += self.tau
         return ca.densify(self.basis @ self.inertia.solve(self.basis.T @ force) + self.drift)
 
     @cached_property

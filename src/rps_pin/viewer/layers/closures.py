@@ -24,7 +24,7 @@ class Closures(RobotSizedLayer):
     """A yellow mark at each closure's frame a, a blue one at its frame b, a line between them.
 
     The line of a ``distance`` closure is its rod; of others, the gap. A coupling is drawn in the
-    same way between its joints.
+    same way between its joint and each that it follows.
 
     Parameters
     ----------
@@ -38,9 +38,13 @@ class Closures(RobotSizedLayer):
         """Return the marks and lines; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
         data = model.createData()
-        ends = {node_name(one.name): _ends(one, model, data) for one in mechanism.closures}
-        if not ends:
+        if not mechanism.closures:
             raise InputError("layer 'closures': the mechanism has no closures")
+        ends = {
+            node_name(f"{one.name}_{k}" if k else one.name): pair
+            for one in mechanism.closures
+            for k, pair in enumerate(_ends(one, model, data))
+        }
         size = context.radius / 60.0 if self.size is None else self.size
         yellow, blue = (Material(colour, on_top=True) for colour in (YELLOW, BLUE))
         line = Cylinder(1.0, 0.3 * size, 0.3 * size)
@@ -68,8 +72,9 @@ class Closures(RobotSizedLayer):
         return DrawnLayer(LegendEntry("closures", text, css(YELLOW)), parts, update)
 
 
-def _ends(closure: LoopClosure | JointCoupling, model: pin.Model, data: pin.Data) -> Any:
-    """Return the placements, and the two indices in them, that a closure ties together."""
+def _ends(closure: LoopClosure | JointCoupling, model: pin.Model, data: pin.Data) -> list[Any]:
+    """Return the placements, and the two indices in them, of each pair that a closure ties."""
     if isinstance(closure, JointCoupling):
-        return data.oMi, model.getJointId(closure.joint), model.getJointId(closure.other)
-    return data.oMf, *closure.frame_ids(model)
+        joint, *others = closure.joint_ids(model)
+        return [(data.oMi, joint, other) for other in others]
+    return [(data.oMf, *closure.frame_ids(model))]
