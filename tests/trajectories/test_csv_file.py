@@ -272,3 +272,35 @@ def test_a_damaged_file_is_finite_or_refused(tmp_path: Path, columns: int) -> No
         for part in found.sample(np.linspace(0, found.duration, 100)):
             assert np.isfinite(part).all()
     assert min(outcomes.values()) > 20
+
+
+SLOW = "time_s,z_m,tilt_x_rad,tilt_y_rad"
+
+
+def slow_rows(step: float, count: int) -> np.ndarray:
+    """Return a circle sampled in such steps of time."""
+    share = np.linspace(0.0, 1.0, count)
+    around = 2 * np.pi * share
+    return np.column_stack(
+        [step * np.arange(count), 0.223 + 0 * share, 0.1 * np.sin(around), 0.1 * np.cos(around)]
+    )
+
+
+@pytest.mark.parametrize("step", [1.0, 10.0])
+def test_times_in_milliseconds_are_doubted(tmp_path: Path, step: float) -> None:
+    rows = slow_rows(step, 101)
+    file = save(tmp_path / "path.csv", SLOW, rows)
+    with pytest.raises(InputError, match=rf"line 1: time_s has steps of {step:g} s.*time_ms"):
+        read_csv(file)
+    meant = read_csv(file, max_step=2 * step)
+    assert meant.duration == pytest.approx(100 * step, rel=1e-12)
+    named = save(tmp_path / "named.csv", SLOW.replace("time_s", "time_ms"), rows)
+    assert read_csv(named).duration == pytest.approx(0.1 * step, rel=1e-12)
+
+
+@pytest.mark.parametrize(("step", "count"), [(0.5, 101), (5.0, 5)])
+def test_slow_motions_of_few_or_short_steps_are_taken(
+    tmp_path: Path, step: float, count: int
+) -> None:
+    file = save(tmp_path / "path.csv", SLOW, slow_rows(step, count))
+    assert read_csv(file).duration == pytest.approx(step * (count - 1), rel=1e-12)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import Progress, track
@@ -18,6 +20,8 @@ from rps_pin.rps import robot_file
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.unit_doubts import unit_doubts
 
+#: Bytes of a number in a table; and of a file whose size is told before it is written.
+BYTES, LARGE = 20, 100e6
 #: A vector: a pose (z, tilt_x, tilt_y), three leg lengths, a direction.
 Three = tuple[float, float, float]
 
@@ -55,6 +59,31 @@ def load_robot(name_or_file: str) -> RPSRobot:
     for doubt in unit_doubts(robot.parameters):
         typer.echo(f"note: {name_or_file}: {doubt}. Units are SI: m, kg, kg m^2", err=True)
     return robot
+
+
+def doubt_pose(name: str, pose: Three) -> None:
+    """Print a note on a pose whose tilt is more than half a turn."""
+    _, *tilts = pose
+    if math.hypot(*tilts) > math.pi:
+        given, radians = (
+            " ".join(f"{value:g}" for value in values) for values in (tilts, np.radians(tilts))
+        )
+        typer.echo(
+            f"note: {name}: a tilt of {given} rad is more than half a turn. Tilts are in radians; "
+            f"{given} degrees would be {radians}",
+            err=True,
+        )
+
+
+def tell_size(name: str, rows: float, columns: int) -> None:
+    """Print a note on a table that will be larger than `LARGE`, before it is computed."""
+    size = BYTES * rows * columns
+    if size > LARGE:
+        typer.echo(
+            f"note: {name} will have {rows:.3g} rows of {columns} columns, about "
+            f"{1e-6 * size:.3g} MB. Ctrl-C stops it",
+            err=True,
+        )
 
 
 def print_json(answer: dict[str, Any]) -> None:

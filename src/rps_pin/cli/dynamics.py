@@ -15,6 +15,7 @@ from rps_pin.errors import InputError
 from rps_pin.files import write_text
 from rps_pin.rps.dynamics.force_causes import force_causes
 from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.dynamics.motion_csv import COLUMNS
 from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 from rps_pin.rps.dynamics.sizing import size_actuators
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
@@ -99,6 +100,7 @@ def dynamics_command(
             path = time_optimal(machine, path, limits=limits, wrench=wrench)
         console.print(f"shortest time {path.duration:.6g} s (as given: {given:.6g} s)")
     progress = common.progress_bar(console, "inverse dynamics")
+    common.tell_size("dynamics.csv", path.duration * rate, COLUMNS)
     run = run_motion(machine, path, rate, wrench=wrench, progress=progress)
     sheet = size_actuators(run.time, run.force, run.speed, run.length, limits)
     summary = summarise(run, machine)

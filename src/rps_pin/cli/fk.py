@@ -53,6 +53,7 @@ def fk_command(
         else:
             _print_modes(modes)
         raise typer.Exit(not len(modes.angle))
+    common.doubt_pose("--near", near)
     pose = machine.forward_kinematics(lengths, near=near)
     position, _ = machine.platform_placement(pose)
     if as_json:

@@ -7,6 +7,7 @@ from pathlib import Path
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
 from rps_pin.cli.motion_report import actuator_table, print_motion, write_motion
+from rps_pin.rps.dynamics.motion_csv import COLUMNS
 from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 
 
@@ -46,6 +47,7 @@ def helix_command(
     machine = common.load_robot(robot)
     path = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     console = common.text_console(as_json)
+    common.tell_size("helix.csv", path.duration * rate, COLUMNS)
     run = run_motion(machine, path, rate, progress=common.progress_bar(console, "inverse dynamics"))
     summary = summarise(run, machine)
     output.mkdir(parents=True, exist_ok=True)

@@ -23,6 +23,7 @@ def ik_command(
     Example: `rps-pin ik --robot micro --pose 0.22 0.1 -0.05`
     """
     machine = common.load_robot(robot)
+    common.doubt_pose("--pose", pose)
     parameters = machine.parameters
     legs = machine.inverse_kinematics(pose, errors="mask")
     position, rotation = machine.platform_placement(pose)

@@ -90,6 +90,9 @@ def simulate_command(
         forces += mechanism.inverse_dynamics(q, still, still).tau
     console = common.text_console(as_json, soft_wrap=True)
     times: dict[str, Any] = {"duration": duration, "step": step, "method": method.value}
+    if step > 0:
+        columns = 5 + mechanism.model.nq + 2 * mechanism.model.nv + forces.size
+        common.tell_size("simulation.csv", duration / step, columns)
     with common.share_bar(console, "simulating") as progress:
         motion = simulate(mechanism, q, v, tau=forces, progress=progress, **times)
     folder = output or Path(f"{file.stem}-simulation")

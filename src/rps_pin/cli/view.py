@@ -77,6 +77,8 @@ def view_command(
 
     - `rps-pin view --interactive --mechanism delta`
     """
+    if pose is not None:
+        common.doubt_pose("--pose", pose)
     if interactive:
         _interact(robot, pose, mechanism, port, layers)
         return

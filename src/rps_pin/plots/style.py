@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
@@ -26,6 +28,10 @@ LEG_COLOURS = (BLUE, VERMILION, GREEN)
 LEG_STYLES = ("-", "--", "-.")
 #: From dark to light, in print without colour too.
 COLOUR_MAP = "cividis"
+
+#: Points of an area that an SVG writes one by one, about 20 bytes each; and dots an inch of the
+#: pictures of those with more.
+MOST_POINTS, PICTURE_DPI = 5000, 300
 
 #: Of all figures.
 STYLE: Any = {
@@ -95,11 +101,34 @@ def legend_above(axes: Axes, columns: int) -> None:
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG, each whole or not at all; return the two paths."""
+    """Write a figure as PNG and SVG, each whole or not at all; return the two paths.
+
+    In the SVG, areas of more than `MOST_POINTS` points are pictures. (Curves are simplified by
+    Matplotlib, areas are not.)
+    """
     written = []
-    for suffix, metadata in ((".png", {}), (".svg", {"Date": None})):
+    svg: Any = {"metadata": {"Date": None}, "dpi": PICTURE_DPI}
+    for suffix, options in ((".png", {}), (".svg", svg)):
         path = folder / f"{name}{suffix}"
-        with matplotlib.rc_context(STYLE), whole_file(path) as scratch:
-            figure.savefig(scratch, metadata=metadata)
+        with matplotlib.rc_context(STYLE), whole_file(path) as scratch, _areas_as_pictures(figure):
+            figure.savefig(scratch, **options)
         written.append(path)
     return written
+
+
+@contextmanager
+def _areas_as_pictures(figure: Figure) -> Iterator[None]:
+    """Let vector formats have pictures of areas that have many points."""
+    areas = [one for one in figure.findobj(Collection) if _points(one) > MOST_POINTS]
+    before = [one.get_rasterized() for one in areas]
+    try:
+        for one in areas:
+            one.set_rasterized(True)
+        yield
+    finally:
+        for one, was in zip(areas, before, strict=True):
+            one.set_rasterized(was)
+
+
+def _points(areas: Any) -> int:
+    return sum(len(path.vertices) for path in areas.get_paths())

@@ -33,6 +33,8 @@ from rps_pin.validation import positive_number
 
 #: A step longer than this many times the median step is a gap.
 GAP = 10.0
+#: Longest usual step of a file of some rows, s: one that is longer is doubted.
+SLOWEST, SOME_ROWS = 1.0, 10
 #: Most lines of a file, and most bytes of a line, that are read.
 MOST_LINES = 2_000_000
 LONGEST_LINE = 100_000
@@ -94,10 +96,12 @@ def read_csv(
     ------
     InputError
         With the file and the line: if a cell is empty, missing, too many, or not a finite number;
-        if times do not increase or leave a gap; if a value cannot be in its unit (a tilt beyond
-        2 pi rad, a height beyond 100 m); if rates or accelerations are not, even roughly, the
-        derivatives of the poses; if a column is unknown, without unit, there twice or missing; if
-        there are fewer rows than 2 (with free ends 6); or if it is not such a file.
+        if times do not increase, leave a gap, or seem to be in milliseconds (without rates,
+        `SOME_ROWS` or more in steps of `SLOWEST` or more; `max_step` allows them); if a value
+        cannot be in its unit (a tilt beyond 2 pi rad, a height beyond 100 m); if rates or
+        accelerations are not, even roughly, the derivatives of the poses; if a column is unknown,
+        without unit, there twice or missing; if there are fewer rows than 2 (with free ends 6); or
+        if it is not such a file.
     """
     if max_step is not None:
         positive_number(max_step, "max_step", "seconds")
@@ -107,6 +111,8 @@ def read_csv(
     _refuse_times(table, max_step)
     _refuse_implausible(table)
     _refuse_wrong_derivatives(table)
+    if max_step is None and RATES[0] not in table.positions:
+        _refuse_slow_times(table)
     columns = [
         np.stack([table.si(name) for name in names], axis=-1)
         for names in (COORDINATES, RATES, ACCELERATIONS)
@@ -344,6 +350,17 @@ def _refuse_times(table: _Table, max_step: float | None) -> None:
         raise InputError(
             f"{table.place(i + 1)}: a gap of {steps[i]:.6g} s, from {name} = {written[i]:.9g} to "
             f"{written[i + 1]:.9g}: {rule}"
+        )
+
+
+def _refuse_slow_times(table: _Table) -> None:
+    """Refuse many long steps without rates, which would tell whether times are in seconds."""
+    step = float(np.median(np.diff(table.si("time"))))
+    if step >= SLOWEST and len(table.rows) >= SOME_ROWS:
+        raise InputError(
+            f"{table.place(-1)}: {table.name('time')} has steps of {step:.6g} s; is it in "
+            "milliseconds? Then name the column time_ms. If such steps are meant, allow them: "
+            "max_step (of read_csv, or of a YAML trajectory of kind csv)"
         )
 
 

@@ -10,6 +10,9 @@ from rps_pin.arrays import Array
 from rps_pin.files import whole_file
 from rps_pin.rps.dynamics.motion_run import MotionRun
 
+#: How many columns `motion_columns` returns.
+COLUMNS = 24
+
 
 def motion_columns(run: MotionRun) -> dict[str, Array]:
     """Return the columns of the table by name; each name ends in its unit."""
