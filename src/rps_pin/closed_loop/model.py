@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop import kinematics
-from rps_pin.closed_loop.assembly.closing import close, closed_gap, complete
+from rps_pin.closed_loop.assembly.closing import close, closed_gap
+from rps_pin.closed_loop.assembly.completion import complete
 from rps_pin.closed_loop.assembly.projection import project
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.constraints.equations import LoopErrors
@@ -414,8 +415,17 @@ class ClosedLoopModel:
         q_guess: ArrayLike | None = None,
         *,
         within_limits: bool = True,
+        jump: bool = False,
     ) -> Array:
         """Return the closed configuration in which some joints have given values.
+
+        It is the one that continues the guess: the given coordinates are followed on the straight
+        line (balls and free-flyers: the geodesic) from their values in the guess to those asked
+        for, in steps that cannot leave the assembly mode (see `continuation`). A guess whose loops
+        are open is closed first, as by `close`.
+
+        Where fewer values are given than there are motions, the others follow by least-norm
+        motions. Where more are given, they are approached by motions that the closures allow.
 
         Parameters
         ----------
@@ -423,19 +433,27 @@ class ClosedLoopModel:
             By joint name, each with as many numbers as the joint has coordinates; or those of the
             actuated joints in order, shape (na,) (if each has one coordinate).
         q_guess
-            Where the other joints start, shape (nq,); selects the assembly mode. Left out: the
-            home that was given, or Pinocchio's neutral configuration.
+            Closed configuration whose assembly mode is kept, shape (nq,). Left out: `home`.
+        within_limits
+            Whether the result must lie within the model's joint limits (the way to it need not).
+            Angles that are not given may be turned by whole turns for that.
+        jump
+            Whether the assembly mode may change: the values are set in the guess, and the loops are
+            closed from there as by `close`, with these joints fixed. That finds some configuration
+            wherever one is found at all.
 
         Raises
         ------
         InputError, MechanismError
             If a value has the wrong shape, or a joint is unknown.
         ClosureError
-            If the loops do not close with these values.
+            If no closed configuration with these values is found, or it is outside joint limits.
+        SingularityError
+            If the assembly mode ends on the way, or the guess is singular; says how far along.
         """
-        guess = self._start if q_guess is None else q_guess
+        guess = self.home if q_guess is None else q_guess
         start = self.system.normalised(guess, "q_guess")
-        return complete(self.system, values, start, within_limits=within_limits)
+        return complete(self.system, values, start, within_limits=within_limits, jump=jump)
 
     # Velocity and acceleration --------------------------------------------------------------------
 

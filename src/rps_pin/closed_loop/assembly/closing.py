@@ -1,4 +1,4 @@
-"""Closing the loops of a mechanism from a guess, and completing a partly given configuration.
+"""Closing the loops of a mechanism from a guess.
 
 The gaps e(q) are brought to zero by the Levenberg-Marquardt method on the configuration manifold,
 
@@ -11,17 +11,15 @@ are held there, and the step is computed again without them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError
 from rps_pin.numerics.linear_algebra import rank
-from rps_pin.validation import real_vector
 
 #: A loop counts as closed below this gap, in characteristic lengths or in m, whichever is more.
 CLOSED = 1e-12
@@ -70,27 +68,6 @@ def close(
         + f"; largest gap of the guess: {equations.largest_gap(equations.gaps(guess)):.6g} m",
         equations.largest_gap(gaps),
     )
-
-
-def complete(
-    system: ConstraintSystem,
-    values: Mapping[str, ArrayLike] | ArrayLike,
-    guess: Array,
-    *,
-    within_limits: bool = True,
-) -> Array:
-    """Return the closed configuration with given joint values; see `ClosedLoopModel.complete`."""
-    q, model, actuated = guess.copy(), system.model, system.actuated_names
-    if not isinstance(values, Mapping):
-        given = real_vector(values, len(actuated), "values")
-        values = dict(zip(actuated, given, strict=True))
-    system.velocity_indices(list(values), "to give a value")
-    for name, value in values.items():
-        joint = model.joints[model.getJointId(name)]
-        numbers = real_vector(np.atleast_1d(value), joint.nq, f"the value of joint {name!r}")
-        q[joint.idx_q : joint.idx_q + joint.nq] = numbers
-    q = system.normalised(q, "q_guess")
-    return close(system, q, fixed=list(values), within_limits=within_limits)
 
 
 def closed_gap(system: ConstraintSystem) -> float:

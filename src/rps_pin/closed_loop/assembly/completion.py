@@ -1,0 +1,185 @@
+"""Completing a partly given configuration, in the assembly mode of a guess."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.assembly.approach import approached
+from rps_pin.closed_loop.assembly.closing import close, closed_gap
+from rps_pin.closed_loop.assembly.continuation import Followed, Path, coordinates_of
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.errors import ClosureError, SingularityError
+from rps_pin.validation import real_vector
+
+#: How far outside a limit rounding error may leave a joint, rad or m.
+_AT_LIMIT = 1e-9
+#: Values this near to those of the guess are its own, rad or m.
+_SAME = 1e-13
+#: The last correction of an overdetermined configuration, characteristic lengths.
+_NEAR = 1e-3
+
+
+def complete(
+    system: ConstraintSystem,
+    values: Mapping[str, ArrayLike] | ArrayLike,
+    guess: Array,
+    *,
+    within_limits: bool = True,
+    jump: bool = False,
+) -> Array:
+    """Return the closed configuration with given joint values; see `ClosedLoopModel.complete`."""
+    named = by_name(system, values)
+    given = system.velocity_indices(list(named), "to give a value")
+    target = with_values(system, guess, named)
+    if jump:
+        return close(system, target, fixed=list(named), within_limits=within_limits)
+    if within_limits:
+        _refuse_values_outside(system, target, named)
+    start = _closed_start(system, guess, within_limits)
+    if start is not guess:
+        target = with_values(system, start, named)
+    found = Path(system, given, start, target).follow()
+    if np.abs(pin.difference(system.model, start, target)).max(initial=0.0) <= _SAME:
+        return target
+    found = Path(system, given, start, target).follow()
+    q = found.q
+    if found.share < 1 and not found.consistent:
+        q = _overdetermined(system, named, given, start, target)
+    elif found.share < 1:
+        _refuse(system, named, target, found, within_limits, start is guess)
+    if system.equations.largest_gap(system.equations.gaps(q)) > closed_gap(system):
+        q = close(system, q, fixed=list(named), within_limits=False, restarts=0)
+    return _within_limits(system, q, named) if within_limits else q
+
+
+def by_name(
+    system: ConstraintSystem, values: Mapping[str, ArrayLike] | ArrayLike
+) -> dict[str, ArrayLike]:
+    """Return values by joint name; an array is that of the actuated joints."""
+    if isinstance(values, Mapping):
+        return dict(values)
+    given = real_vector(values, len(system.actuated_names), "values")
+    return dict(zip(system.actuated_names, given, strict=True))
+
+
+def with_values(system: ConstraintSystem, q: Array, values: Mapping[str, ArrayLike]) -> Array:
+    """Return a configuration in which joints have given values, shape (nq,)."""
+    model, changed = system.model, q.copy()
+    system.velocity_indices(list(values), "to give a value")
+    for name, value in values.items():
+        joint = model.joints[model.getJointId(name)]
+        numbers = real_vector(np.atleast_1d(value), joint.nq, f"the value of joint {name!r}")
+        changed[joint.idx_q : joint.idx_q + joint.nq] = numbers
+    return system.normalised(changed, "q_guess")
+
+
+# The ends of the path -----------------------------------------------------------------------------
+
+
+def _closed_start(system: ConstraintSystem, guess: Array, within_limits: bool) -> Array:
+    equations = system.equations
+    if equations.largest_gap(equations.gaps(guess)) <= closed_gap(system):
+        return guess
+    return close(system, guess, within_limits=within_limits)
+
+
+def _refuse_values_outside(
+    system: ConstraintSystem, target: Array, names: Sequence[str] | Mapping[str, ArrayLike]
+) -> None:
+    outside = system.limits.outside(target)
+    if outside.keys() & set(names):
+        phrases = ", ".join(outside[name] for name in names if name in outside)
+        raise ClosureError(f"given joints are outside their limits: {phrases}", np.inf)
+
+
+def _within_limits(system: ConstraintSystem, q: Array, given: Mapping[str, ArrayLike]) -> Array:
+    """Return the configuration within the joint limits: angles may be turned by whole turns."""
+    limits = system.limits
+    x = q[limits.q]
+    out = (x < limits.lower - _AT_LIMIT) | (x > limits.upper + _AT_LIMIT)
+    out &= np.array([name not in given for name in limits.names], dtype=bool)
+    if not out.any():
+        return q
+    turned = q.copy()
+    for i in np.flatnonzero(out):
+        turns = np.ceil((limits.lower[i] - x[i]) / (2 * np.pi))
+        nearer = x[i] + 2 * np.pi * (
+            turns if turns > 0 else np.floor((limits.upper[i] - x[i]) / (2 * np.pi))
+        )
+        angular = system.equations.angular_velocities[limits.v[i]]
+        sprung = system.effects is not None and system.effects.stiffness[limits.v[i]] > 0
+        if angular and not sprung and limits.lower[i] <= nearer <= limits.upper[i]:
+            turned[limits.q[i]] = nearer
+    equations, outside = system.equations, limits.outside(turned)
+    beyond = [phrase for name, phrase in outside.items() if name not in given]
+    still = [name for i, name in enumerate(limits.names) if out[i] and name in outside]
+    if still or equations.largest_gap(equations.gaps(turned)) > closed_gap(system):
+        raise ClosureError(
+            "the configuration with these values in the assembly mode of the guess is outside "
+            f"joint limits: {', '.join(beyond or list(limits.outside(q).values()))}; "
+            "within_limits=False returns it",
+            np.inf,
+        )
+    return turned
+
+
+def _refuse(
+    system: ConstraintSystem,
+    named: Mapping[str, ArrayLike],
+    target: Array,
+    found: Followed,
+    within_limits: bool,
+    closed: bool,
+) -> None:
+    """Raise the error of a path that ends in a singularity."""
+    where = f"after {found.share:.4%} of the way from the guess's values to those asked for"
+    if not closed:
+        where = f"after the guess, which is open, was closed, and {where[6:]}"
+    try:
+        close(system, target, fixed=list(named), within_limits=within_limits)
+    except ClosureError as error:
+        raise ClosureError(
+            f"no closed configuration with these values was found: {error}; {where} the assembly "
+            "mode ends in a singularity",
+            error.gap,
+        ) from None
+    if found.share == 0 and not found.condition <= system.max_condition:
+        where = "there is no way to tell which: the guess itself is singular"
+    raise SingularityError(
+        f"{where}, a singularity is met (condition number {found.condition:.3g}, at most "
+        f"{system.max_condition:.3g} is followed): configurations with these values exist, but the "
+        "assembly mode of the guess does not lead to them on a straight line of the given "
+        "coordinates. Take a guess nearer to them, lead there in parts, or take jump=True, which "
+        "may change the assembly mode",
+        found.condition,
+        system.max_condition,
+    )
+
+
+# More values than motions -------------------------------------------------------------------------
+
+
+def _overdetermined(
+    system: ConstraintSystem,
+    named: Mapping[str, ArrayLike],
+    given: Indices,
+    start: Array,
+    target: Array,
+) -> Array:
+    """Return the configuration with more given values than there are motions."""
+    q, left = approached(system, given, coordinates_of(system.model, given), start, target)
+    ended = close(system, with_values(system, q, named), fixed=list(named), within_limits=False)
+    moved = np.abs(pin.difference(system.model, q, ended) / system.column_scale).max(initial=0.0)
+    if moved > _NEAR * system.equations.length:
+        raise ClosureError(
+            f"{given.size} values are given, more than there are motions, and no motion from the "
+            f"guess leads to all of them: {left:.3g} m are left where it comes nearest; "
+            "configurations with these values exist elsewhere (jump=True)",
+            left,
+        )
+    return ended
