@@ -109,6 +109,8 @@ class MechanismDescription:
         (Compares equal to ``"lacking"``, its former name, too.)
     condition : float
         Condition number of the passive joints' Jacobian there.
+    notes : tuple of str
+        What the reader of its file has decided.
     """
 
     name: str
@@ -124,6 +126,7 @@ class MechanismDescription:
     actuated_velocities: int
     actuated_rank: int
     condition: float
+    notes: tuple[str, ...] = ()
 
     @property
     def mobility(self) -> int:
@@ -177,6 +180,7 @@ class MechanismDescription:
         ]
         if self.home_is_singular:
             lines.append("the home configuration is singular: all this holds next to it")
+        lines += [f"note: {note}" for note in self.notes]
         return "\n".join(lines)
 
     def verdict(self) -> str:
@@ -192,7 +196,11 @@ class MechanismDescription:
 
 
 def describe(
-    system: ConstraintSystem, name: str, q: Array | None, home: Callable[[], Array]
+    system: ConstraintSystem,
+    name: str,
+    q: Array | None,
+    home: Callable[[], Array],
+    notes: tuple[str, ...] = (),
 ) -> MechanismDescription:
     """Return the description of a mechanism at q, or at a regular configuration near home."""
     at, singular = (q, False) if q is not None else _regular(system, home())
@@ -217,6 +225,7 @@ def describe(
         actuated_velocities=actuated.size,
         actuated_rank=rank(singular_values(motions)),
         condition=system.condition(jacobian),
+        notes=notes,
     )
 
 

@@ -29,12 +29,12 @@ from rps_pin.closed_loop.dynamics.inverse_dynamics import (
     constraint_forces,
     inverse_dynamics,
 )
-from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED, JointEffects
+from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
 from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
-from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts
-from rps_pin.closed_loop.io.urdf import model_from_urdf
+from rps_pin.closed_loop.io.parts import MechanismParts, with_effects, without_position_limits
+from rps_pin.closed_loop.io.urdf import parts_from_urdf
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.errors import ClosureError, CompileError
@@ -77,10 +77,12 @@ class ClosedLoopModel:
         distance of a closed frame from the joint that carries it (1 m if all are zero).
     max_condition
         `SingularityError` is raised where the condition number exceeds this.
+    notes
+        Sentences that `describe` prints: what the reader of a file has decided.
 
     Attributes
     ----------
-    model, closures, actuated, effects, name, max_condition
+    model, closures, actuated, effects, name, max_condition, notes
         As given; `closures` and `actuated` as tuples.
     system : ConstraintSystem
         The tree with its closure equations and their factorisation, for the algorithms.
@@ -106,6 +108,7 @@ class ClosedLoopModel:
         name: str = "",
         characteristic_length: float | None = None,
         max_condition: float = MAX_CONDITION,
+        notes: Sequence[str] = (),
     ) -> None:
         self.system = system = ConstraintSystem(
             model,
@@ -121,6 +124,7 @@ class ClosedLoopModel:
         self.max_condition = max_condition
         self.effects = effects
         self.name: str = name or model.name
+        self.notes = tuple(notes)
         self._home: Array | None = None
         self._start: Array = pin.neutral(model)
         if home is not None:
@@ -133,20 +137,34 @@ class ClosedLoopModel:
         closures: Sequence[Closure],
         actuated: Sequence[str],
         *,
+        root: Literal["fixed", "free"] = "fixed",
         gravity: ArrayLike = (0.0, 0.0, -9.81),
+        within_limits: bool = True,
+        effects: JointEffects | Mapping[str, Mapping[str, ArrayLike]] | None = None,
         **options: Any,
     ) -> ClosedLoopModel:
         """Build a mechanism from a URDF: a file's path, or the XML text itself.
 
+        A joint of type ``continuous`` has one coordinate and no limits, one of type ``floating`` is
+        a free-flyer. ``mimic`` elements, and the loop elements of URDF+, Drake and Isaac Sim, are
+        closures before those given. The damping and friction of ``dynamics`` elements count.
+
         Parameters
         ----------
         path_or_xml
-            Path of a URDF file, or its text (recognised by its leading ``<``). A joint of type
-            ``floating`` becomes a free-flyer.
+            Path of a URDF file, or its text (recognised by its leading ``<``).
         closures, actuated
             As for the class.
+        root
+            ``"free"``: the root link is on a free-flyer called ``"root_joint"``.
         gravity
             Acceleration of gravity in world axes, shape (3,), m/s^2.
+        within_limits
+            Whether the file's position limits count.
+        effects
+            What replaces the file's damping and friction, joint by joint: by effect and joint name,
+            ``{"damping": {"hinge": 0.1}, "stiffness": ...}``, or `JointEffects`, whose entries that
+            are not zero replace the file's.
         **options
             The class's other parameters.
 
@@ -159,16 +177,30 @@ class ClosedLoopModel:
         ClosureError
             As for the class.
         """
-        model = model_from_urdf(path_or_xml)
+        parts = parts_from_urdf(path_or_xml, root)
+        if not within_limits:
+            parts = without_position_limits(parts)
+        model, given = parts.model, tuple(closures)
         model.gravity.linear = real_vector(gravity, 3, "gravity")
-        return cls(model, closures, actuated, **options)
+        own = tuple(closure for closure in parts.closures if closure not in given)
+        options.setdefault("notes", parts.notes)
+        return cls(model, own + given, actuated, effects=with_effects(parts, effects), **options)
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> ClosedLoopModel:
+    def load(
+        cls, path: str | os.PathLike[str], *, within_limits: bool | None = None
+    ) -> ClosedLoopModel:
         """Build a mechanism from its description, a YAML file; see `description`.
 
         The file names a URDF or MJCF, the closures, the actuated joints, and `home`, from where
         the loops are closed. Without `home` they are closed from Pinocchio's neutral configuration.
+
+        Parameters
+        ----------
+        path
+            The file.
+        within_limits
+            Whether position limits count; left out, as the file says, or else they do.
 
         Raises
         ------
@@ -177,7 +209,7 @@ class ClosedLoopModel:
         ClosureError
             If the loops do not close from there; says by how much, and which.
         """
-        return cls._from_parts(parts_from_yaml(path))
+        return cls._from_parts(parts_from_yaml(path, within_limits))
 
     @classmethod
     def from_mjcf(
@@ -212,19 +244,15 @@ class ClosedLoopModel:
 
     @classmethod
     def _from_parts(cls, parts: MechanismParts) -> ClosedLoopModel:
-        effects = None
-        if parts.damping or parts.friction or parts.stiffness:
-            given: dict[str, Any] = {name: getattr(parts, name) for name in EFFECTS}
-            given["friction_speed"] = parts.friction_speed or FRICTION_SPEED
-            effects = JointEffects.named(parts.model, **given)
         mechanism = cls(
             parts.model,
             parts.closures,
             parts.actuated,
-            effects=effects,
+            effects=with_effects(parts, None),
             name=parts.name,
             characteristic_length=parts.characteristic_length,
             max_condition=parts.max_condition or MAX_CONDITION,
+            notes=parts.notes,
         )
         if parts.home is None:
             mechanism._home = mechanism.home  # closed, or not to be built
@@ -241,6 +269,7 @@ class ClosedLoopModel:
             name=self.name,
             characteristic_length=self.characteristic_length,
             max_condition=self.max_condition,
+            notes=self.notes,
         )
         return rebuilt, (self.model, self.closures, self.actuated)
 
@@ -259,7 +288,7 @@ class ClosedLoopModel:
             If the loops do not close from `home`.
         """
         at = None if q is None else self._configuration(q)
-        return describe(self.system, self.name, at, lambda: self.home)
+        return describe(self.system, self.name, at, lambda: self.home, self.notes)
 
     # Structure ------------------------------------------------------------------------------------
 

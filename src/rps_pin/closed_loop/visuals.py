@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,43 +13,85 @@ from pinocchio import coal
 
 from rps_pin.closed_loop.constraints.closures import LoopClosure
 from rps_pin.closed_loop.io.mechanism_schema import Description
+from rps_pin.closed_loop.io.urdf.elements import few
+from rps_pin.closed_loop.io.urdf.normal_form import Shapes, normal_form
+from rps_pin.closed_loop.io.urdf.packages import file_of
+from rps_pin.closed_loop.io.urdf.tree import urdf_file
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.config import read_config
-from rps_pin.errors import MechanismError
+from rps_pin.errors import InputError
+
+PackagePath = Sequence[str | os.PathLike[str]]
 
 
-def visual_model(path: str | os.PathLike[str], model: pin.Model) -> pin.GeometryModel | None:
+def visual_model(
+    path: str | os.PathLike[str], model: pin.Model, package_path: PackagePath = ()
+) -> pin.GeometryModel | None:
     """Return the shapes of the mechanism in a description, to show `model` with.
+
+    Meshes that are not found or cannot be read are left out, with a warning. They are looked for by
+    the rules of ROS; see `packages`.
 
     Parameters
     ----------
     path
-        The description, a YAML file.
+        The description, a YAML file; or a URDF.
     model
         What `ClosedLoopModel.load` made of it.
+    package_path
+        Folders that are ROS packages, or hold some.
 
     Returns
     -------
     pin.GeometryModel or None
-        None where the description names a MuJoCo file, whose shapes are not read.
+        None, for a skeleton, where there is nothing to draw, or the description names a MuJoCo
+        file, whose shapes are not read.
 
     Raises
     ------
     InputError
-        If the file cannot be read.
-    MechanismError
-        If a mesh that the URDF names cannot be.
+        If the description or its URDF cannot be read.
     """
-    _, description = read_config(path, "mechanism", Description)
-    if description.urdf is None:
-        return None
-    urdf = Path(path).parent / Path(description.urdf).expanduser()
+    urdf = Path(path)
+    if urdf.suffix.lower() != ".urdf":
+        _, description = read_config(path, "mechanism", Description)
+        if description.urdf is None:
+            return None
+        urdf = urdf.parent / Path(description.urdf).expanduser()
+    shapes, missing = urdf_shapes(urdf, model, package_path)
+    if missing:
+        warnings.warn(f"{urdf}: not drawn: {few(missing)}", stacklevel=2)
+    return shapes if shapes.ngeoms else None
+
+
+def urdf_shapes(
+    urdf: Path, model: pin.Model, package_path: PackagePath = ()
+) -> tuple[pin.GeometryModel, list[str]]:
+    """Return the shapes of a URDF that can be drawn, and why the others cannot."""
+    loader = coal.CachedMeshLoader()
+
+    def mesh(attributes: dict[str, str]) -> str:
+        name = attributes.get("filename", "")
+        found = str(file_of(name, urdf, package_path))
+        try:
+            scale = np.array(attributes.get("scale", "1 1 1").split(), dtype=np.float64)
+            triangles = loader.load(found, np.broadcast_to(scale, 3).copy())
+            drawable = triangles.num_tris > 0 and np.isfinite(triangles.vertices()).all()
+        except (ValueError, RuntimeError, IndexError):
+            drawable = False
+        if not drawable:
+            raise InputError(f"{name!r}: {found} cannot be read as a mesh")
+        return found
+
+    missing: list[str] = []
+    text = normal_form(urdf_file(urdf), Shapes(mesh, missing))
     try:
-        return pin.buildGeomFromUrdf(
-            model, str(urdf), pin.GeometryType.VISUAL, package_dirs=[str(urdf.parent)]
+        shapes = pin.buildGeomFromUrdfString(
+            model, text, pin.GeometryType.VISUAL, mesh_loader=loader
         )
-    except ValueError as error:
-        raise MechanismError(f"{urdf}: its shapes cannot be read: {error}") from None
+    except (ValueError, RuntimeError, IndexError) as error:
+        return pin.GeometryModel(), [*missing, str(error)]
+    return shapes, list(dict.fromkeys(missing))
 
 
 _JOINT = np.array([0.83, 0.62, 0.22, 1.0])

@@ -56,12 +56,13 @@ class JointLimits:
 
     def reached(self, q: Array) -> list[str]:
         """Return a phrase for each joint that stands at a limit."""
-        x = q[self.q]
-        return [
-            f"joint {self.names[i]!r} at its limit {limit[i]:.6g}"
-            for limit in (self.lower, self.upper)
-            for i in np.flatnonzero(np.isfinite(limit) & (np.abs(x - limit) <= self._margin(limit)))
-        ]
+        x, found = q[self.q], dict[str, str]()
+        for limit in (self.lower, self.upper):
+            at = np.isfinite(limit) & (np.abs(x - limit) <= self._margin(limit))
+            for i in np.flatnonzero(at):
+                name = self.names[i]
+                found.setdefault(name, f"joint {name!r} at its limit {limit[i]:.6g}")
+        return list(found.values())
 
     def _margin(self, limit: Array) -> Array:
         return _AT * np.where(np.isfinite(limit), np.abs(limit), 0.0)

@@ -192,11 +192,18 @@ def joint_id(model: pin.Model, name: str, asked_by: str) -> int:
 
 
 def frame_id(model: pin.Model, name: str, asked_by: str = "") -> int:
-    """Return the index of a frame, or say which frames there are."""
+    """Return the index of a frame, or say which frames there are.
+
+    Where a link and a joint have one name, it is the link's.
+    """
     names = [frame.name for frame in model.frames]
     prefix = f"{asked_by}: " if asked_by else ""
     if name not in names:
         raise MechanismError(f"{prefix}no frame {name!r}; there are: {', '.join(names)}")
-    if names.count(name) > 1:
-        raise MechanismError(f"{prefix}{names.count(name)} frames have the name {name!r}")
-    return names.index(name)
+    found = [index for index, one in enumerate(names) if one == name]
+    if len(found) > 1:
+        links = [i for i in found if model.frames[i].type == pin.FrameType.BODY]
+        if len(links) != 1:
+            raise MechanismError(f"{prefix}{len(found)} frames have the name {name!r}")
+        found = links
+    return found[0]

@@ -25,7 +25,7 @@ from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, Loo
 from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
 from rps_pin.closed_loop.io.mechanism_schema import CouplingEntry, Description
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
-from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts
+from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts, without_position_limits
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
 from rps_pin.config import YamlFile, read_config
 from rps_pin.errors import InputError, MechanismError, shown
@@ -35,8 +35,17 @@ from rps_pin.errors import InputError, MechanismError, shown
 _NORMED = 1e-3
 
 
-def parts_from_yaml(path: str | os.PathLike[str]) -> MechanismParts:
+def parts_from_yaml(
+    path: str | os.PathLike[str], within_limits: bool | None = None
+) -> MechanismParts:
     """Read a mechanism from its description, a YAML file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    within_limits
+        Whether position limits count; None: as the file says.
 
     Raises
     ------
@@ -48,6 +57,8 @@ def parts_from_yaml(path: str | os.PathLike[str]) -> MechanismParts:
     """
     file, description = read_config(path, "mechanism", Description)
     tree = _tree(file, description, Path(path))
+    if not (description.within_limits if within_limits is None else within_limits):
+        tree = without_position_limits(tree)
     merges = []
     for i, entry in enumerate(description.merge):
         with file.at("merge", i):
@@ -57,9 +68,10 @@ def parts_from_yaml(path: str | os.PathLike[str]) -> MechanismParts:
     actuated = parts.actuated if description.actuated is None else tuple(description.actuated)
     for index, name in enumerate(actuated):
         _check_joint(file, ("actuated", index), name, parts.model)
+    added = _closures(file, description, parts.model)
     return replace(
         parts,
-        closures=(*parts.closures, *_closures(file, description, parts.model)),
+        closures=(*(one for one in parts.closures if one not in added), *added),
         actuated=actuated,
         home=_home(file, description, tree, parts, merges),
         name=description.name or parts.name or Path(path).stem,
@@ -158,22 +170,26 @@ def _home(
     for name in description.home:
         if name not in list(tree.model.names)[1:]:
             _check_joint(file, ("home", name), name, parts.model)
-    _set_joints(file, description.home, tree.model, before)
+    _set_joints(file, description.home, tree, before)
     q = merged_configuration(tree.model, merges, before) if merges else before
     new = {k: v for k, v in description.home.items() if not tree.model.existJointName(k)}
-    _set_joints(file, new, parts.model, q)
+    _set_joints(file, new, parts, q)
     return q
 
 
 def _set_joints(
-    file: YamlFile, values: Mapping[str, float | Sequence[float]], model: pin.Model, q: Array
+    file: YamlFile, values: Mapping[str, float | Sequence[float]], parts: MechanismParts, q: Array
 ) -> None:
+    model = parts.model
     for name, value in values.items():
         if not model.existJointName(name):
             continue
         given = np.atleast_1d(np.asarray(value, dtype=np.float64))
         joint = model.joints[model.getJointId(name)]
         where = file.place(("home", name))
+        if name in parts.continuous and given.size == 2:
+            q[joint.idx_q] = _angle(where, name, given)
+            continue
         if given.size != joint.nq:
             raise InputError(
                 f"{where}: home of {name!r} ({joint.shortname()}) has {given.size} numbers; "
@@ -190,6 +206,16 @@ def _set_joints(
                 "rotation; a quaternion (x, y, z, w), or a cosine and a sine, has length 1"
             )
         q[here] = normed
+
+
+def _angle(where: str, name: str, given: Array) -> float:
+    """Return the angle of a cosine and a sine, as Pinocchio has an unbounded turn."""
+    if abs(np.hypot(*given) - 1.0) > _NORMED:
+        raise InputError(
+            f"{where}: home of {name!r} = {shown(given.tolist())} is neither an angle nor a cosine "
+            "and a sine, whose length is 1"
+        )
+    return float(np.arctan2(given[1], given[0]))
 
 
 # Closures -----------------------------------------------------------------------------------------

@@ -55,6 +55,7 @@ class Description(Entry):
     urdf: Text | None = None
     mjcf: Text | None = None
     root: Literal["fixed", "free"] | None = None
+    within_limits: bool = True
     gravity: Three | None = None
     closures: list[ClosureEntry] = Field(default_factory=list)
     couplings: list[CouplingEntry] = Field(default_factory=list)

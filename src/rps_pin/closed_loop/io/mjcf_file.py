@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.io.urdf import xml_root, xml_text
+from rps_pin.closed_loop.io.xml_file import xml_root, xml_text
 from rps_pin.errors import MechanismError
 
 #: How many numbers each form of an orientation has.

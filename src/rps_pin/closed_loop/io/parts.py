@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
+import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure
+from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED, JointEffects
+from rps_pin.errors import InputError
 
 #: Effects at joints, by their names in a description.
 EFFECTS = ("damping", "friction", "stiffness", "rest")
@@ -40,6 +45,10 @@ class MechanismParts:
         m, or None if the description does not say.
     max_condition
         Or None if the description does not say.
+    continuous
+        Revolute joints that the file calls continuous; a home may give their cosine and sine.
+    notes
+        Sentences on what the reader has decided.
     """
 
     model: pin.Model
@@ -54,3 +63,56 @@ class MechanismParts:
     name: str = ""
     characteristic_length: float | None = None
     max_condition: float | None = None
+    continuous: frozenset[str] = frozenset()
+    notes: tuple[str, ...] = ()
+
+
+def with_effects(
+    parts: MechanismParts, given: JointEffects | Mapping[str, Mapping[str, ArrayLike]] | None
+) -> JointEffects | None:
+    """Return the joints' effects of a file, with others in their place joint by joint.
+
+    Parameters
+    ----------
+    parts
+        The file's parts.
+    given
+        By effect and joint name; or `JointEffects`, whose entries that are not zero count.
+
+    Raises
+    ------
+    InputError
+        If there is no such effect.
+    MechanismError
+        As `JointEffects.named`.
+    """
+    values: dict[str, Any] = {name: dict(getattr(parts, name)) for name in EFFECTS}
+    values["friction_speed"] = parts.friction_speed or FRICTION_SPEED
+    if isinstance(given, Mapping):
+        for name, of_joints in given.items():
+            if name not in EFFECTS:
+                raise InputError(f"effects: no {name!r}; there are: {', '.join(EFFECTS)}")
+            values[name] |= of_joints
+    if not any(values[name] for name in ("damping", "friction", "stiffness")):
+        return given if isinstance(given, JointEffects) else None
+    own = JointEffects.named(parts.model, **values)
+    if not isinstance(given, JointEffects):
+        return own
+    if given.damping.size != own.damping.size:
+        size = given.damping.size
+        raise InputError(f"effects are of {size} velocities, not {own.damping.size}")
+    both = {name: (getattr(own, name), getattr(given, name)) for name in EFFECTS}
+    merged = {name: np.where(new != 0, new, old) for name, (old, new) in both.items()}
+    return JointEffects(**merged, friction_speed=given.friction_speed)
+
+
+def without_position_limits(parts: MechanismParts) -> MechanismParts:
+    """Return the parts with a model of which no joint has position limits."""
+    model = pin.Model(parts.model)
+    for joint in list(model.joints)[1:]:
+        if joint.nq == joint.nv:  # those of a quaternion are not limits
+            coordinates = slice(joint.idx_q, joint.idx_q + joint.nq)
+            model.lowerPositionLimit[coordinates] = -np.inf
+            model.upperPositionLimit[coordinates] = np.inf
+    notes = (*parts.notes, "position limits are ignored, as was asked")
+    return replace(parts, model=model, notes=notes)

@@ -88,10 +88,7 @@ class RobotSizedLayer:
 
 def frame_id(model: pin.Model, name: str, layer: str) -> int:
     """Return a frame's index, or raise `InputError` with the frames that there are."""
-    if not model.existFrame(name):
-        known = ", ".join(frame.name for frame in model.frames)
-        raise InputError(f"layer {layer!r}: no frame {name!r}; there are: {known}")
-    return int(model.getFrameId(name))
+    return closures.frame_id(model, name, f"layer {layer!r}")
 
 
 def check_magnification(factor: float | None, layer: str) -> None:

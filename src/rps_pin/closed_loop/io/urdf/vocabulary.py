@@ -1,0 +1,263 @@
+"""Words of URDF files, and what is done with each.
+
+`WORDS` lists the elements and attributes of urdfdom's schema (versions 1.0 to 1.2), of Drake's,
+URDF+'s, Isaac Sim's and Bullet's extensions, and of urdfdom's proposal of constraints. A word is
+*read*, or *harmless*: it changes neither kinematics nor dynamics (appearance, contact, sensors,
+control), or *refused* with the reason. A word that is near a listed one is taken for a misspelt one
+and refused; any other is told in a note.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from lxml import etree
+
+from rps_pin.errors import MechanismError
+
+_DRAKE = "http://drake.mit.edu"
+
+
+@dataclass(frozen=True)
+class Word:
+    """An element: its attributes, and what is done with it.
+
+    Attributes
+    ----------
+    read, harmless
+        Its attributes, by what is done with them.
+    once
+        Whether its parent has at most one of them.
+    is_open
+        Whether anything may be in it: it is harmless as a whole, but for what `extensions` finds.
+    refused
+        Why it is refused; empty if it is not.
+    """
+
+    read: tuple[str, ...] = ()
+    harmless: tuple[str, ...] = ()
+    once: bool = False
+    is_open: bool = False
+    refused: str = ""
+
+
+def _word(read: str = "", harmless: str = "", once: bool = False) -> Word:
+    return Word(tuple(read.split()), tuple(harmless.split()), once)
+
+
+_POSE = _word("xyz rpy quat_xyzw", once=True)
+_OPEN = Word(is_open=True)
+_INERTIAL = {
+    "": _word(once=True),
+    "/origin": _POSE,
+    "/mass": _word("value", once=True),
+    "/inertia": _word("ixx ixy ixz iyy iyz izz", once=True),
+}
+_JOINT = {
+    "": _word("name type", "independent dont_collapse drake_ignore"),
+    "/origin": _POSE,
+    "/parent": _word("link", once=True),
+    "/child": _word("link", once=True),
+    "/axis": _word("xyz", once=True),
+    "/limit": _word(
+        "lower upper effort velocity",
+        "acceleration deceleration jerk drake:acceleration",
+        once=True,
+    ),
+    "/dynamics": _word("damping friction", "coulomb_window", once=True),
+    "/mimic": _word("joint multiplier offset", once=True),
+    "/actuator": _OPEN,
+    "/safety_controller": _OPEN,
+    "/calibration": _OPEN,
+}
+_FORCE = "is a spring between two links, which is not modelled; remove it, or give it as wrenches"
+
+
+def _below(path: str, words: dict[str, Word]) -> dict[str, Word]:
+    return {path + name: word for name, word in words.items()}
+
+
+#: What is done with each element, by its path.
+WORDS: dict[str, Word] = {
+    "robot": _word("name", "version"),
+    "robot/material": _OPEN,
+    "robot/transmission": _OPEN,
+    "robot/gazebo": _OPEN,
+    "robot/sensor": _OPEN,
+    "robot/ros2_control": _OPEN,
+    "robot/mujoco": _OPEN,
+    "robot/link": _word("name", "type drake_ignore"),
+    **_below("robot/link/inertial", _INERTIAL),
+    "robot/link/visual": _OPEN,
+    "robot/link/collision": _OPEN,
+    "robot/link/contact": _OPEN,
+    "robot/link/surface": _OPEN,
+    "robot/link/self_filter": _OPEN,
+    "robot/link/collision_checking": _OPEN,
+    "robot/link/self_collision_checking": _OPEN,
+    **_below("robot/joint", _JOINT),
+    "robot/frame": _word("name link xyz rpy quat_xyzw"),
+    "robot/fixed_frame": _word("name"),
+    "robot/fixed_frame/parent": _word("link", once=True),
+    "robot/fixed_frame/origin": _POSE,
+    # URDF+ (generalized_rbda)
+    "robot/loop": _word("name type"),
+    "robot/loop/predecessor": _word("link", once=True),
+    "robot/loop/predecessor/origin": _POSE,
+    "robot/loop/successor": _word("link", once=True),
+    "robot/loop/successor/origin": _POSE,
+    "robot/loop/axis": _word("xyz", once=True),
+    "robot/coupling": _word("name type"),
+    "robot/coupling/predecessor": _word("link", once=True),
+    "robot/coupling/successor": _word("link", once=True),
+    "robot/coupling/ratio": _word("value", once=True),
+    # Proposed for urdfdom (pull request 264)
+    "robot/constraint": _word("name type"),
+    "robot/constraint/parent": _word("link", once=True),
+    "robot/constraint/parent_origin": _POSE,
+    "robot/constraint/parent_axis": _word("xyz", once=True),
+    "robot/constraint/child": _word("link", once=True),
+    "robot/constraint/child_origin": _POSE,
+    "robot/constraint/child_axis": _word("xyz", once=True),
+    # Isaac Sim, and Drake of old
+    "robot/loop_joint": _word("name type"),
+    "robot/loop_joint/link1": _word("link xyz rpy quat_xyzw", once=True),
+    "robot/loop_joint/link2": _word("link xyz rpy quat_xyzw", once=True),
+    "robot/loop_joint/axis": _word("xyz", once=True),
+    # Drake
+    **_below("robot/drake:joint", _JOINT),
+    "robot/drake:joint/drake:screw_thread_pitch": _word("value", once=True),
+    "robot/drake:joint/drake:curves": _OPEN,
+    "robot/drake:joint/drake:initial_tangent": _OPEN,
+    "robot/drake:joint/drake:plane_normal": _OPEN,
+    "robot/drake:joint/drake:is_periodic": _OPEN,
+    "robot/drake:ball_constraint": _word("name"),
+    "robot/drake:ball_constraint/drake:ball_constraint_body_A": _word("name", once=True),
+    "robot/drake:ball_constraint/drake:ball_constraint_body_B": _word("name", once=True),
+    "robot/drake:ball_constraint/drake:ball_constraint_p_AP": _word("value", once=True),
+    "robot/drake:ball_constraint/drake:ball_constraint_p_BQ": _word("value", once=True),
+    "robot/drake:tendon_constraint": _word("name"),
+    "robot/drake:tendon_constraint/drake:tendon_constraint_joint": _word("name a"),
+    "robot/drake:tendon_constraint/drake:tendon_constraint_offset": _word("value", once=True),
+    "robot/drake:tendon_constraint/drake:tendon_constraint_lower_limit": _word("value", once=True),
+    "robot/drake:tendon_constraint/drake:tendon_constraint_upper_limit": _word("value", once=True),
+    "robot/drake:tendon_constraint/drake:tendon_constraint_stiffness": _word("value", once=True),
+    "robot/drake:tendon_constraint/drake:tendon_constraint_damping": _word("value", once=True),
+    "robot/drake:linear_bushing_rpy": Word(is_open=True, refused=_FORCE),
+    "robot/drake:linear_spring_damper": Word(is_open=True, refused=_FORCE),
+    "robot/drake:collision_filter_group": _OPEN,
+}
+
+
+def tag_of(element: Any) -> str:
+    """Return an element's tag: without a default namespace, and Drake's with its usual prefix."""
+    return _plain(element.tag, element)
+
+
+def get(element: Any, name: str, default: Any = None) -> Any:
+    """Return the attribute of a plain or Drake's name."""
+    if name.startswith("drake:"):
+        other = f"{{{_DRAKE}}}{name[6:]}"
+        return element.get(name, element.get(other, default))
+    return element.get(name, default)
+
+
+def children(element: Any, tag: str) -> Iterator[Any]:
+    """Yield the child elements of a tag."""
+    return (child for child in element.iterchildren("*") if tag_of(child) == tag)
+
+
+def child(element: Any, tag: str) -> Any | None:
+    """Return the first child of a tag, or None."""
+    return next(children(element, tag), None)
+
+
+def refuse(element: Any, origin: str, why: str) -> NoReturn:
+    """Raise `MechanismError` with a file's name and an element's line."""
+    raise MechanismError(f"{origin} is not a valid URDF: line {element.sourceline}: {why}")
+
+
+def check_words(robot: Any, origin: str) -> list[str]:
+    """Refuse misspelt, doubled and impossible words; return a note on each unknown one.
+
+    Raises
+    ------
+    MechanismError
+        With the line.
+    """
+    unknown: Counter[str] = Counter()
+    lines: dict[str, int] = {}
+
+    def note(words: str, element: Any) -> None:
+        unknown[words] += 1
+        lines.setdefault(words, element.sourceline)
+
+    todo = [(robot, "robot")]
+    while todo:
+        element, path = todo.pop()
+        word = WORDS[path]
+        if word.refused:
+            refuse(element, origin, f"<{tag_of(element)}> {word.refused}")
+        if word.is_open:
+            continue
+        tag, attributes = tag_of(element), (*word.read, *word.harmless)
+        for name in (_plain(name, element) for name in element.attrib):
+            if name in attributes:
+                continue
+            if meant := misspelt(name, attributes):
+                why = f"<{tag}> has no attribute {name!r}; did you mean {meant!r}?"
+                refuse(element, origin, why)
+            note(f"the attribute {name!r} of <{tag}>", element)
+        seen: set[str] = set()
+        for inner in element.iterchildren("*"):
+            below, inner_tag = f"{path}/{tag_of(inner)}", tag_of(inner)
+            if below not in WORDS:
+                known = [one.rpartition("/")[2] for one in WORDS if one.rpartition("/")[0] == path]
+                if meant := misspelt(inner_tag, known):
+                    why = f"<{tag}> has a <{inner_tag}>; did you mean <{meant}>?"
+                    refuse(inner, origin, why)
+                note(f"<{inner_tag}> in <{tag}>", inner)
+                continue
+            if WORDS[below].once and below in seen:
+                refuse(inner, origin, f"<{tag}> has a second <{inner_tag}>")
+            seen.add(below)
+            todo.append((inner, below))
+    return [
+        f"{origin}, line {lines[words]}: {words} is not read"
+        + (f" (nor are {count - 1} more)" if count > 1 else "")
+        for words, count in unknown.items()
+    ]
+
+
+def misspelt(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that differs in one letter, two swapped ones, or in capitals."""
+    for right in known:
+        if word.casefold() == right.casefold() or _one_slip(word, right):
+            return right
+    return None
+
+
+def _one_slip(word: str, right: str) -> bool:
+    """Return whether one letter was left out, added, changed or swapped with the next."""
+    start = 0
+    while start < min(len(word), len(right)) and word[start] == right[start]:
+        start += 1
+    rest, wanted = word[start:], right[start:]
+    if min(len(word), len(right)) < 3:
+        return False
+    swapped = rest[:2] == wanted[1::-1] and len(wanted) > 1 and rest[2:] == wanted[2:]
+    return swapped or wanted[1:] in (rest, rest[1:]) or rest[1:] == wanted
+
+
+def _plain(name: Any, element: Any) -> str:
+    qualified = etree.QName(name)
+    if qualified.namespace is None:
+        return str(name)
+    if qualified.namespace == _DRAKE:
+        return f"drake:{qualified.localname}"
+    prefixes = [key for key, uri in element.nsmap.items() if uri == qualified.namespace]
+    prefix = "" if None in prefixes or not prefixes else f"{prefixes[0]}:"
+    return f"{prefix}{qualified.localname}"

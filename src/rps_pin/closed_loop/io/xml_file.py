@@ -1,0 +1,99 @@
+"""Text of XML files (URDF, MJCF), and its root element.
+
+Files are data: a document type, which could declare entities, is refused, and nothing outside the
+file is read.
+"""
+
+from __future__ import annotations
+
+import codecs
+import os
+import re
+from typing import Any
+
+from lxml import etree
+
+from rps_pin.errors import InputError, MechanismError
+from rps_pin.files import opened
+
+#: The longest XML text that is read, bytes. (Meshes are files of their own.)
+LARGEST_XML = 64 * 2**20
+
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+_ENCODING = re.compile(rb"<\?xml[^>]*encoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
+#: The XML declaration, also of a version that there is not, or after comments.
+_DECLARATION = re.compile(r"\A((?:\s|<!--.*?-->)*)(<\?xml\s[^>]*\?>)", re.DOTALL)
+
+
+def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
+    """Return an XML text without its declaration, its lines kept; and its name for messages.
+
+    Parameters
+    ----------
+    path_or_xml
+        A file's path, or the text itself (which begins with ``<``).
+    form
+        ``"URDF"`` or ``"MJCF"``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is larger than `LARGEST_XML`.
+    """
+    if not isinstance(path_or_xml, (str, os.PathLike)):
+        raise InputError(f"a {form} is given by its path or its text, not by {path_or_xml!r}")
+    text = os.fspath(path_or_xml).lstrip("\ufeff")  # without a byte-order mark
+    if text.lstrip().startswith("<"):
+        origin = f"the {form} text"
+    else:
+        origin = text
+        with opened(text, form) as file:
+            content = file.read(LARGEST_XML + 1)
+            if len(content) > LARGEST_XML:
+                raise InputError(
+                    f"the {form} {origin} has more than {LARGEST_XML} bytes, the most that is read"
+                )
+            text = _decoded(content)
+    if len(text) > LARGEST_XML:
+        raise InputError(f"{origin} has more than {LARGEST_XML} characters, the most that is read")
+    return _DECLARATION.sub(lambda m: m[1] + "\n" * m[2].count("\n"), text, count=1), origin
+
+
+def _decoded(content: bytes) -> str:
+    """Return a file's text by its byte-order mark or declared encoding; else it is UTF-8."""
+    for mark, encoding in _MARKS:
+        if content.startswith(mark):
+            return content.decode(encoding)
+    declared = _ENCODING.search(content[:1000])
+    if declared:
+        try:
+            return content.decode(declared[1].decode("ascii"))
+        except (LookupError, UnicodeDecodeError):
+            pass  # many files declare one encoding and are in another
+    return content.decode("utf-8")
+
+
+def xml_root(text: str, origin: str, form: str) -> Any:
+    """Return the root element of an XML text in which nothing is expanded or fetched.
+
+    Raises
+    ------
+    MechanismError
+        If it is not XML, or declares a document type.
+    """
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, encoding="utf-8"
+    )
+    try:
+        root = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)
+    except etree.XMLSyntaxError as error:
+        raise MechanismError(f"{origin} is not a valid {form}: {error}") from None
+    if root.getroottree().docinfo.doctype:
+        raise MechanismError(f"{origin} declares a document type, which no {form} needs: refused")
+    return root
