@@ -84,7 +84,6 @@ ROBOT = (
     Mistake("CSV column without a unit", "rps-pin dynamics path.csv --robot micro"),
 )
 OWN_MECHANISM = (
-    Mistake("URDF instead of a mechanism file", "rps-pin describe four_bar.urdf"),
     Mistake(
         "Misspelt URDF file",
         DESCRIBE,

@@ -64,7 +64,7 @@ def test_describe_reads_mujoco_files(tmp_path: Path) -> None:
     ("name", "text", "words"),
     [
         ("missing.yaml", None, "missing.yaml"),
-        ("robot.urdf", "<robot/>", "a URDF has no closures"),
+        ("robot.urdf", "<robot/>", "<robot> has no link"),
         ("robot.txt", "", "ends in .yaml"),
         ("robot.yaml", "urdf: missing.urdf", "missing.urdf"),
         ("robot.yaml", "urdf: [", "line 1"),

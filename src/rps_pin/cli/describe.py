@@ -7,10 +7,12 @@ import json
 import typer
 
 from rps_pin.cli.console import JsonOption
-from rps_pin.cli.mechanism_options import FileArgument, load_mechanism
+from rps_pin.cli.mechanism_options import FileArgument, IgnoreLimitsOption, load_mechanism
 
 
-def describe_command(file: FileArgument, as_json: JsonOption = False) -> None:
+def describe_command(
+    file: FileArgument, ignore_limits: IgnoreLimitsOption = False, as_json: JsonOption = False
+) -> None:
     """Describe any mechanism: joints, closures, rank, mobility, and whether its actuators suffice.
 
     Exit status: 0; 1 if the file is not a mechanism, or its loops do not close; 2 wrong usage.
@@ -21,7 +23,7 @@ def describe_command(file: FileArgument, as_json: JsonOption = False) -> None:
 
     - `rps-pin describe robot.xml --json` of a MuJoCo file
     """
-    description = load_mechanism(file)[0].describe()
+    description = load_mechanism(file, ignore_limits)[0].describe()
     if as_json:
         typer.echo(json.dumps(description.as_dict(), indent=2, allow_nan=False))
     else:

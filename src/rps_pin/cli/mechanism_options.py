@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,8 +16,8 @@ from rps_pin.errors import InputError
 
 _FILE = typer.Argument(
     metavar="FILE|NAME",
-    help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), or the name of one "
-    "that comes with the package, such as **delta**.",
+    help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), a URDF, or the name of "
+    "one that comes with the package, such as **delta**.",
     show_default=False,
     autocompletion=names_or_files(mechanism_names),
 )
@@ -28,19 +29,41 @@ OptionalFileArgument = Annotated[Path | None, _FILE]
 JointValues = list[str] | None
 
 
+_OF_URDF = (
+    "a URDF names no actuated joints, and loops only in its dialects; for more, name it in a .yaml "
+    "file: urdf: {name}, closures: [...], actuated: [...]"
+)
+
+
 def joint_values(words: str) -> Any:
     """Return an option that takes values by joint name."""
     return typer.Option(metavar="JOINT=VALUE", help=words)
 
 
-def load_mechanism(file: Path) -> tuple[ClosedLoopModel, Path]:
+IgnoreLimitsOption = Annotated[
+    bool,
+    typer.Option("--ignore-limits", help="Ignore the position limits of the joints."),
+]
+PackagePathOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="FOLDER",
+        help="A ROS package, or a folder that holds some, where meshes of **package://** are "
+        "looked for; can be given several times.",
+    ),
+]
+
+
+def load_mechanism(file: Path, ignore_limits: bool = False) -> tuple[ClosedLoopModel, Path]:
     """Return the mechanism of a file, told by its suffix, or of a name; and its file.
+
+    Of a URDF nothing is driven, and only the loops that it states itself are closed.
 
     Raises
     ------
     InputError
-        If there is no mechanism of that name (lists those there are), or the suffix is of neither
-        kind; says what a URDF lacks.
+        If there is no mechanism of that name (lists those there are), or the suffix is of no kind
+        that is read.
     """
     if not (file.suffix or file.is_file()):
         names = mechanism_names()
@@ -51,23 +74,41 @@ def load_mechanism(file: Path) -> tuple[ClosedLoopModel, Path]:
             )
         file = MECHANISMS / f"{file}.yaml"
     suffix = file.suffix.lower()
+    within_limits = False if ignore_limits else None
     if suffix in (".yaml", ".yml"):
-        return ClosedLoopModel.load(file), file
+        return ClosedLoopModel.load(file, within_limits=within_limits), file
     if suffix == ".xml":
-        return ClosedLoopModel.from_mjcf(file), file
+        return ClosedLoopModel.from_mjcf(file, within_limits=not ignore_limits), file
     if suffix == ".urdf":
-        raise InputError(
-            f"{file}: a URDF has no closures; name it in a description: urdf: {file.name}, "
-            "closures: [...], actuated: [...] in a .yaml file"
-        )
-    raise InputError(f"{file}: a mechanism's file ends in .yaml (a description) or .xml (MuJoCo)")
+        mechanism = ClosedLoopModel.from_urdf(file, [], [], within_limits=not ignore_limits)
+        mechanism.notes += (_OF_URDF.format(name=file.name),)
+        return mechanism, file
+    raise InputError(
+        f"{file}: a mechanism's file ends in .yaml (a description), .xml (MuJoCo) or .urdf"
+    )
 
 
-def shapes_of(file: Path, mechanism: ClosedLoopModel) -> pin.GeometryModel | None:
-    """Return the shapes of a mechanism's links; None, for a skeleton, of a MuJoCo file."""
+def shapes_of(
+    file: Path, mechanism: ClosedLoopModel, package_path: Sequence[Path] | None = None
+) -> tuple[pin.GeometryModel | None, list[str]]:
+    """Return the shapes of a mechanism's links, and what is not drawn, in sentences.
+
+    Where there is nothing to draw, and of a MuJoCo file, the shapes are None, for a skeleton.
+    """
     from rps_pin.closed_loop.visuals import visual_model
 
-    return None if file.suffix.lower() == ".xml" else visual_model(file, mechanism.model)
+    if file.suffix.lower() == ".xml":
+        return None, []
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        shapes = visual_model(file, mechanism.model, package_path or ())
+    return shapes, [str(one.message) for one in told]
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print notes to standard error."""
+    for note in notes:
+        typer.echo(f"note: {note}", err=True)
 
 
 def by_joint(pairs: Sequence[str], option: str) -> dict[str, float]:

@@ -58,6 +58,8 @@ def simulate_command(
     hold: Annotated[
         bool, typer.Option("--hold", help="Add the forces that hold the initial position.")
     ] = False,
+    ignore_limits: options.IgnoreLimitsOption = False,
+    package_path: options.PackagePathOption = None,
     output: common.NamedFolderOption = None,
     layers: LayersOption = None,
     as_json: common.JsonOption = False,
@@ -65,8 +67,8 @@ def simulate_command(
     """Simulate a mechanism from rest or a given state, with its loops closed at every step.
 
     Output: **simulation.csv** (every step), **simulation.png** and **.svg** (joints, energy, gap),
-    and **viewer.html**, the motion in 3D (a skeleton if the description names no URDF), with
-    layers: forces, reactions, joint limits and others.
+    and **viewer.html**, the motion in 3D (a skeleton if the file has no shapes that can be drawn),
+    with layers: forces, reactions, joint limits and others.
 
     Exit status: 0 done; 1 it cannot be simulated (the error says when and why); 2 wrong usage.
 
@@ -78,7 +80,7 @@ def simulate_command(
     """
     from rps_pin.closed_loop.simulation.simulate import simulate
 
-    mechanism, file = options.load_mechanism(file)
+    mechanism, file = options.load_mechanism(file, ignore_limits)
     q = mechanism.close(mechanism.home)
     if start:
         q = mechanism.complete(options.by_joint(start, "--start"), q)
@@ -104,7 +106,8 @@ def simulate_command(
     files = [folder / "simulation.csv"]
     motion.to_csv(files[0])
     files += save_figure(plot_simulation(motion, mechanism), folder, "simulation")
-    shapes = options.shapes_of(file, mechanism)
+    shapes, missing = options.shapes_of(file, mechanism, package_path)
+    notes = [*mechanism.notes, *missing]
     files.append(write_page(folder, mechanism, motion, title, layers, shapes))
     energy, work = motion.energy, np.abs(motion.work).max()
     scale = max(float(motion.kinetic.max()), float(np.ptp(motion.potential)), float(work), 1e-300)
@@ -117,6 +120,7 @@ def simulate_command(
         "work": float(motion.work[-1]),
         "energy_balance": float(np.abs(motion.energy_balance).max() / scale),
         "limits_passed": [str(passed) for passed in motion.limits_passed],
+        "notes": notes,
     }
     if as_json:
         common.print_json({"mechanism": mechanism.name} | summary | {"files": files})
@@ -127,6 +131,8 @@ def simulate_command(
         console.print(f"note: {passed}")
     if len(motion.limits_passed) > _MOST_NOTES:
         console.print(f"note: so did {len(motion.limits_passed) - _MOST_NOTES} more joints later")
+    for note in notes:
+        console.print(f"note: {note}", markup=False)
     common.print_files(console, files)
 
 

@@ -14,7 +14,14 @@ from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
 from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.cli.layer_options import LayersOption, SizeOption, chosen_layers, chosen_size
-from rps_pin.cli.mechanism_options import load_mechanism, shapes_of
+from rps_pin.cli.mechanism_options import (
+    IgnoreLimitsOption,
+    PackagePathOption,
+    load_mechanism,
+    print_notes,
+    shapes_of,
+)
+from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 
 
@@ -57,6 +64,8 @@ def view_command(
             autocompletion=names_or_files(mechanism_names),
         ),
     ] = None,
+    ignore_limits: IgnoreLimitsOption = False,
+    package_path: PackagePathOption = None,
     port: Annotated[
         int | None, typer.Option(help="Port of the server; default: a free one.")
     ] = None,
@@ -80,7 +89,8 @@ def view_command(
     if pose is not None:
         common.doubt_pose("--pose", pose)
     if interactive:
-        _interact(robot, pose, mechanism, port, layers)
+        loaded = None if mechanism is None else load_mechanism(mechanism, ignore_limits)
+        _interact(robot, pose, loaded, package_path, port, layers)
         return
     if mechanism is not None:
         raise InputError("--mechanism goes with --interactive; see rps-pin simulate for its motion")
@@ -118,7 +128,8 @@ def view_command(
 def _interact(
     robot: str,
     pose: common.Three | None,
-    mechanism: Path | None,
+    loaded: tuple[ClosedLoopModel, Path] | None,
+    package_path: list[Path] | None,
     port: int | None,
     layers: str | None,
 ) -> None:
@@ -126,12 +137,14 @@ def _interact(
     from rps_pin.panel import BrowserPanel, MechanismPanel, Panel, RPSPanel
 
     panel: Panel
-    if mechanism is None:
+    if loaded is None:
         machine = common.load_robot(robot)
         panel, title = RPSPanel(machine, pose), f"3-RPS {machine.parameters.name}"
     else:
-        loaded, file = load_mechanism(mechanism)
-        panel, title = MechanismPanel(loaded, visual=shapes_of(file, loaded)), loaded.name
+        mechanism, file = loaded
+        shapes, missing = shapes_of(file, mechanism, package_path)
+        print_notes([*mechanism.notes, *missing])
+        panel, title = MechanismPanel(mechanism, visual=shapes), mechanism.name
     chosen = chosen_layers(layers or "none", panel.mechanism)
     with BrowserPanel(panel, port=port, title=title, **chosen) as page:
         typer.echo(f"Open {page.url} in a browser on this machine. Ctrl-C ends.")

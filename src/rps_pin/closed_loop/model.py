@@ -218,6 +218,7 @@ class ClosedLoopModel:
         *,
         closures: Sequence[Closure] = (),
         actuated: Sequence[str] | None = None,
+        within_limits: bool = True,
     ) -> ClosedLoopModel:
         """Build a mechanism from a MuJoCo file: its path, or its text (which begins with ``<``).
 
@@ -232,6 +233,8 @@ class ClosedLoopModel:
             Further closures, after those of the file.
         actuated
             Names of the actuated joints, instead of the file's.
+        within_limits
+            Whether the file's position limits count.
 
         Raises
         ------
@@ -240,7 +243,8 @@ class ClosedLoopModel:
         ClosureError
             As `load`.
         """
-        return cls._from_parts(parts_from_mjcf(path_or_xml, closures=closures, actuated=actuated))
+        parts = parts_from_mjcf(path_or_xml, closures=closures, actuated=actuated)
+        return cls._from_parts(parts if within_limits else without_position_limits(parts))
 
     @classmethod
     def _from_parts(cls, parts: MechanismParts) -> ClosedLoopModel:

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints import closures
 from rps_pin.errors import InputError
 from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
 from rps_pin.viewer.motion import Motion, MotionState

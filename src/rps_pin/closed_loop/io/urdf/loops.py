@@ -245,11 +245,11 @@ def _linear(
 ) -> Closure:
     """Return sum of factor * q = total as a coupling of joints."""
     terms = {joint: factor for joint, factor in terms.items() if factor}
-    if len(terms) != 2:
-        file.refuse(
-            element,
-            f"{tag_of(element)} {name!r} couples {len(terms)} joints "
-            f"({', '.join(terms) or 'none'}); two can be coupled",
-        )
-    (joint, first), (other, second) = terms.items()
-    return JointCoupling(joint, other, -second / first, total / first, name)
+    if not terms:
+        file.refuse(element, f"{tag_of(element)} {name!r} couples no joint")
+    (joint, first), *others = terms.items()
+    ratios = {other: -factor / first for other, factor in others}
+    if len(ratios) == 1:
+        (other, ratio), *_ = ratios.items()
+        return JointCoupling(joint, other, ratio, total / first, name)
+    return JointCoupling(joint, ratios, offset=total / first, name=name)

@@ -9,13 +9,14 @@ from rps_pin.closed_loop.io.urdf.elements import SIMPLE, UrdfFile, UrdfJoint, un
 def couplings_of(file: UrdfFile) -> list[JointCoupling]:
     """Return a coupling for each joint that mimics another, in the file's order.
 
-    A fixed joint has no coordinate; its ``mimic`` says nothing, and is told in a note.
+    A multiplier of 0 holds the joint at the offset. A fixed joint has no coordinate; its ``mimic``
+    says nothing, and is told in a note.
 
     Raises
     ------
     MechanismError
-        If the other joint is unknown, fixed, or one that mimics this one in turn; a joint has
-        several coordinates; or the multiplier is 0; with the line.
+        If the other joint is unknown, fixed, or one that mimics this one in turn, or a joint has
+        several coordinates; with the line.
     """
     found = []
     for joint in file.joints.values():
@@ -39,8 +40,9 @@ def couplings_of(file: UrdfFile) -> list[JointCoupling]:
                 )
         _refuse_circle(file, joint)
         if mimic.multiplier == 0:
-            file.refuse(mimic.element, f"{what} with a multiplier of 0; make it a fixed joint")
-        found.append(JointCoupling(joint.name, mimic.joint, mimic.multiplier, mimic.offset))
+            found.append(JointCoupling(joint.name, {}, offset=mimic.offset))
+        else:
+            found.append(JointCoupling(joint.name, mimic.joint, mimic.multiplier, mimic.offset))
     return found
 
 

@@ -94,9 +94,7 @@ def _visual(file: UrdfFile, element: Any, link: Any, shapes: Shapes) -> None:
     tag, attributes = tag_of(inside[0]).removeprefix("drake:"), _attributes(inside[0])
     try:
         here = file.placement(child(element, "origin"))
-        sizes = {
-            name: file.numbers(inside[0], name, count) for name, count in _SIZES.get(tag, ())
-        }
+        sizes = {name: file.numbers(inside[0], name, count) for name, count in _SIZES.get(tag, ())}
         if tag == "mesh":
             attributes["filename"] = shapes.mesh(attributes)
         elif tag not in _SIZES:
