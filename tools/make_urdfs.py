@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from urdf_linkages import LINKAGES
 from urdf_text import ALONG_X, ALONG_Y, ORIGIN, TURN, Numbers, joint, link, polar, robot, shape, tip
 
 FOLDER = Path(__file__).resolve().parents[1] / "urdf"
@@ -282,6 +283,7 @@ FILES = {
     "delta": delta,
     "delta_rods": delta_rods,
     "stewart": stewart,
+    **LINKAGES,
 }
 
 

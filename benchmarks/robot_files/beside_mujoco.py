@@ -69,17 +69,17 @@ def not_a_mechanism(model: Any, why: str) -> str:
     return ""
 
 
-def differences(mechanism: ClosedLoopModel, model: Any) -> dict[str, float]:
-    """Return the relative differences by quantity.
+def differences(mechanism: ClosedLoopModel, model: Any, seed: int = 1) -> dict[str, float]:
+    """Return the relative differences by quantity, in a random closed state.
 
     Raises
     ------
     NotComparableError
         If the joints are not the same.
     """
-    twin = _Twin(mechanism, model)
-    rng = np.random.default_rng(1)
-    q = _random_closed(mechanism, rng)
+    twin = Twin(mechanism, model)
+    rng = np.random.default_rng(seed)
+    q = random_closed(mechanism, rng)
     motions = mechanism.allowed_motions(q)
     v = motions @ rng.normal(size=motions.shape[1])
     a = rng.normal(size=v.size)
@@ -108,7 +108,7 @@ def differences(mechanism: ClosedLoopModel, model: Any) -> dict[str, float]:
     return found
 
 
-def _random_closed(mechanism: ClosedLoopModel, rng: np.random.Generator) -> Array:
+def random_closed(mechanism: ClosedLoopModel, rng: np.random.Generator) -> Array:
     """Return a closed configuration near home, or home itself where none is found."""
     home = mechanism.home
     for size in (0.3, 0.1, 0.03):
@@ -130,7 +130,7 @@ def _relative(ours: Array, theirs: Array) -> float:
     return float(np.abs(ours - theirs).max() / max(np.abs(theirs).max(), 1e-9))
 
 
-class _Twin:
+class Twin:
     """MuJoCo's model with the coordinates of a mechanism."""
 
     def __init__(self, mechanism: ClosedLoopModel, model: Any) -> None:

@@ -61,7 +61,7 @@ def test_the_shell_is_told_how_to_complete(tmp_path: Path) -> None:
         (["view", "--rob"], {"--robot"}),
         (["view", "--robot", "m"], {"micro", "mine.yaml"}),
         (["describe", "de"], {"delta", "delta_rods"}),
-        (["describe", "m"], {"mine.yaml", "more/"}),
+        (["describe", "m"], {"minitaur_leg", "mine.yaml", "more/"}),
         (["describe", "more/"], {"more/two.xml"}),
     ],
 )

@@ -47,7 +47,7 @@ def test_mechanisms_of_the_package_go_by_their_names(tmp_path: Path) -> None:
     assert run.stdout == f"{ClosedLoopModel.load(URDF / 'delta.yaml').describe()}\n"
     run = rps_pin("describe", "dleta", folder=tmp_path)
     assert run.returncode == 1
-    assert "those are: delta, delta_rods, five_bar" in run.stderr
+    assert "those are: ankle, cassie_biped, cassie_leg, cassie_leg_free, delta" in run.stderr
 
 
 def test_describe_reads_mujoco_files(tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ def doubt_pose(name: str, pose: Three) -> None:
 def tell_size(name: str, rows: float, columns: int) -> None:
     """Print a note on a table that will be larger than `LARGE`, before it is computed."""
     size = BYTES * rows * columns
-    if size > LARGE:
+    if LARGE < size < math.inf:  # an infinite duration is refused elsewhere
         typer.echo(
             f"note: {name} will have {rows:.3g} rows of {columns} columns, about "
             f"{1e-6 * size:.3g} MB. Ctrl-C stops it",
