@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.assembly.closing import close
-from rps_pin.closed_loop.constraints.closures import Closure, LoopClosure
+from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.kinematics import allowed_motions
 from rps_pin.errors import ClosureError
@@ -75,9 +75,15 @@ class ClosureDescription(NamedTuple):
     rows: int
     needed: int
     """How far the rank falls without it: the rows that no other closure replaces."""
+    offsets: tuple[tuple[float, ...] | None, ...] = ()
+    """Of a closure of frames, where the closed frames stand in these: x, y, z (m) and the rotation
+    vector (rad), None for the frame itself."""
 
     def ends(self) -> str:
         """Return what it is between, in words."""
+        if self.offsets:
+            pairs = zip(self.between, self.offsets, strict=True)
+            return " = ".join(f"{name}{_offset(offset)}" for name, offset in pairs)
         first, *others = self.between
         return f"{first} = {' + '.join(others) or 'fixed'}"
 
@@ -267,13 +273,25 @@ def _closure(
     system: ConstraintSystem, closure: Closure, scaled: Array, found: int
 ) -> ClosureDescription:
     others = np.delete(scaled, system.equations.rows(closure.name), axis=0)
-    between: tuple[str, ...]
-    if isinstance(closure, LoopClosure):
-        kind, between = str(closure.kind), (closure.frame_a, closure.frame_b)
-    else:
-        kind, between = "coupling", (closure.joint, *closure.others)
     needed = found - rank(singular_values(others))
-    return ClosureDescription(closure.name, kind, between, closure.size, needed)
+    if isinstance(closure, JointCoupling):
+        between = (closure.joint, *closure.others)
+        return ClosureDescription(closure.name, "coupling", between, closure.size, needed)
+    placements = (closure.placement_a, closure.placement_b)
+    offsets = tuple(
+        None if given is None else (*offset.translation.tolist(), *pin.log3(offset.rotation))
+        for given, offset in zip(placements, closure.offsets(), strict=True)
+    )
+    between = (closure.frame_a, closure.frame_b)
+    return ClosureDescription(closure.name, closure.kind, between, closure.size, needed, offsets)
+
+
+def _offset(offset: tuple[float, ...] | None) -> str:
+    if offset is None:
+        return ""
+    x, y, z, *turn = offset
+    turned = f" turned {np.degrees(np.linalg.norm(turn)):.4g} deg" if any(turn) else ""
+    return f" + ({x:.4g}, {y:.4g}, {z:.4g}) m{turned}"
 
 
 def _plain(value: Any) -> Any:

@@ -113,8 +113,8 @@ def skeleton(mechanism: ClosedLoopModel) -> pin.GeometryModel:
     ]
     for closure in mechanism.closures:
         if isinstance(closure, LoopClosure):
-            for frame in (model.frames[index] for index in closure.frame_ids(model)):
-                ends.append((int(frame.parentJoint), np.array(frame.placement.translation)))
+            for frame in closure.closed_frames(model):
+                ends.append((frame.joint, np.array(frame.placement.translation)))
     longest = max((float(np.linalg.norm(end)) for _, end in ends), default=0.0)
     radius = longest / 50.0 or 0.01
     ball, here = coal.Sphere(1.6 * radius), pin.SE3.Identity()

@@ -18,6 +18,8 @@ kind                rows  condition
 ``distance``        1     the origins are a given distance apart (a rod with a ball at each end)
 ==================  ====  =========================================================================
 
+The closed frames are those named, or stand at an offset in them (`placement_a`, `placement_b`).
+
 A `JointCoupling` (1 row) ties the coordinates of joints; see `couplings`.
 
 Each closure of frames is built on one Pinocchio constraint model, of a point (``spherical``) or
@@ -28,15 +30,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Literal, get_args
 
+import numpy as np
 import pinocchio as pin
 
 from rps_pin.closed_loop.constraints.couplings import JointCoupling
-from rps_pin.errors import MechanismError
+from rps_pin.errors import MechanismError, shown
 
-__all__ = ["KINDS", "Closure", "JointCoupling", "Kind", "LoopClosure", "frame_id", "joint_id"]
+__all__ = [
+    "KINDS",
+    "ClosedFrame",
+    "Closure",
+    "JointCoupling",
+    "Kind",
+    "LoopClosure",
+    "frame_id",
+    "joint_id",
+]
 
 Kind = Literal[
     "spherical",
@@ -51,11 +63,29 @@ Kind = Literal[
     "distance",
 ]
 Vector = tuple[float, float, float]
+#: Four rows of four numbers.
+Placement = tuple[tuple[float, ...], ...]
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _ROWS = dict(zip(KINDS, (3, 6, 5, 5, 4, 4, 3, 2, 1, 1), strict=True))
 _WITHOUT_AXIS = ("spherical", "rigid", "distance")
+#: How far R R' of a placement may be from 1: as files round it, and as computers do.
+_RIGID, _EXACT = 1e-4, 1e-12
 _WITH_AXIS_OF_B = ("revolute", "cylindrical", "universal", "planar")
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedFrame:
+    """A frame that a closure holds, on a body of a model."""
+
+    joint: int
+    """Index of the joint that carries it."""
+    placement: pin.SE3
+    """In that joint's frame."""
+
+    def at(self, data: pin.Data) -> pin.SE3:
+        """Return its placement in the world, after `forwardKinematics` of the data."""
+        return data.oMi[self.joint] * self.placement
 
 
 @dataclass(frozen=True)
@@ -71,21 +101,24 @@ class LoopClosure:
     name
         For messages and for `ClosedLoopModel.rows`; ``"frame_a = frame_b"`` if left out.
     axis
-        Direction fixed in frame a, in its coordinates, of any length: axis of a revolute,
+        Direction fixed in closed frame a, in its coordinates, of any length: axis of a revolute,
         prismatic or cylindrical closure, first axis of a universal one, the line's direction, or
         the plane's normal. Left out: z, or x for a universal closure.
     axis_b
-        Direction fixed in frame b, in its coordinates, that ``revolute``, ``cylindrical`` and
-        ``planar`` hold parallel to `axis` (pointing the same way), and ``universal`` perpendicular
-        to it. Left out: as `axis`, or y for a universal closure.
+        Direction fixed in closed frame b, in its coordinates, that ``revolute``, ``cylindrical``
+        and ``planar`` hold parallel to `axis` (pointing the same way), and ``universal``
+        perpendicular to it. Left out: as `axis`, or y for a universal closure.
     distance
         Length of the rod of a ``distance`` closure, m; positive.
+    placement_a, placement_b
+        Where the closed frames stand in the frames named, as `pin.SE3` or as a matrix of shape
+        (4, 4), m; at these frames if left out. Kept as rows of numbers.
 
     Raises
     ------
     MechanismError
-        If the kind is unknown, a frame is joined to itself, an axis has no direction, or an option
-        does not belong to the kind.
+        If the kind is unknown, a frame is joined to itself, an axis has no direction, a placement
+        is not one, or an option does not belong to the kind.
     """
 
     frame_a: str
@@ -95,6 +128,9 @@ class LoopClosure:
     axis: Sequence[float] | None = None
     axis_b: Sequence[float] | None = None
     distance: float | None = None
+    _: KW_ONLY
+    placement_a: Placement | None = None
+    placement_b: Placement | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in _ROWS:
@@ -119,6 +155,36 @@ class LoopClosure:
                 f"closure {self.name!r}: distance = {given!r}; it must be a positive length in m"
             )
         object.__setattr__(self, "distance", given and float(given))
+        for option in ("placement_a", "placement_b"):
+            object.__setattr__(self, option, self._placement(option))
+
+    def _placement(self, option: str) -> Placement | None:
+        """Return an offset as rows of numbers, None for the identity; or say what is wrong."""
+        given = getattr(self, option)
+        if given is None:
+            return None
+        try:
+            matrix = np.array(getattr(given, "homogeneous", given), dtype=np.float64)
+        except (TypeError, ValueError):
+            matrix = np.empty(0)
+        if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+            raise MechanismError(
+                f"closure {self.name!r}: {option} = {shown(given)} must be a pin.SE3 or 4 x 4 "
+                "finite numbers"
+            )
+        turn, last = matrix[:3, :3], matrix[3]
+        error = float(np.abs(turn @ turn.T - np.eye(3)).max())
+        if not (error <= _RIGID and np.linalg.det(turn) > 0 and np.allclose(last, [0, 0, 0, 1])):
+            raise MechanismError(
+                f"closure {self.name!r}: {option} is not the matrix of a placement: a rotation "
+                f"(here R R' differs from 1 by {error:.3g}) beside a translation, above 0 0 0 1"
+            )
+        if error > _EXACT:
+            left, _, right = np.linalg.svd(turn)
+            matrix[:3, :3] = left @ right
+        if np.array_equal(matrix, np.eye(4)):
+            return None
+        return tuple(tuple(row) for row in matrix.tolist())
 
     def _direction(self, option: str, default: Vector) -> Vector:
         """Return an axis as a unit vector, or say what is wrong with it."""
@@ -159,20 +225,43 @@ class LoopClosure:
         asked_by = f"closure {self.name!r}"
         return frame_id(model, self.frame_a, asked_by), frame_id(model, self.frame_b, asked_by)
 
+    def closed_frames(self, model: pin.Model) -> tuple[ClosedFrame, ClosedFrame]:
+        """Return the two closed frames, offsets included, on the bodies of a model.
+
+        Raises
+        ------
+        MechanismError
+            As `frame_ids`.
+        """
+        frames = (model.frames[index] for index in self.frame_ids(model))
+        a, b = (
+            ClosedFrame(int(frame.parentJoint), frame.placement * offset)
+            for frame, offset in zip(frames, self.offsets(), strict=True)
+        )
+        return a, b
+
+    def offsets(self) -> tuple[pin.SE3, pin.SE3]:
+        """Return the placements of the closed frames in the frames named."""
+        a, b = (
+            pin.SE3.Identity() if rows is None else pin.SE3(np.array(rows))
+            for rows in (self.placement_a, self.placement_b)
+        )
+        return a, b
+
     def constraint_model(self, model: pin.Model) -> Any:
         """Return the Pinocchio constraint model of this closure in `model`.
 
         A point in world axes (``spherical``), or a frame: in world axes at a's origin (``rigid``)
         or in frame a (the others).
         """
-        a, b = (model.frames[i] for i in self.frame_ids(model))
+        a, b = self.closed_frames(model)
         world = self.kind in ("spherical", "rigid")
         constraint = pin.RigidConstraintModel(
             pin.ContactType.CONTACT_3D if self.kind == "spherical" else pin.ContactType.CONTACT_6D,
             model,
-            a.parentJoint,
+            a.joint,
             a.placement,
-            b.parentJoint,
+            b.joint,
             b.placement,
             pin.ReferenceFrame.LOCAL_WORLD_ALIGNED if world else pin.ReferenceFrame.LOCAL,
         )

@@ -26,6 +26,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.closures import ClosedFrame
 from rps_pin.closed_loop.constraints.equations import ClosedFrames, ClosureEquations
 
 _LOCAL = pin.ReferenceFrame.LOCAL
@@ -67,22 +68,26 @@ class FrameMotions:
 
     def __init__(self, equations: ClosureEquations, motion: tuple[Array, Array, Array]) -> None:
         self.equations, self.motion = equations, motion
-        self._frames: dict[int, _Frame] = {}
+        self._frames: dict[ClosedFrame, _Frame] = {}
         pin.computeForwardKinematicsDerivatives(equations.model, equations.data, *motion)
-        pin.updateFramePlacements(equations.model, equations.data)
 
-    def __getitem__(self, index: int) -> _Frame:
-        """Return a frame's, by its index; before the data are used for anything else."""
-        if index not in self._frames:
+    def __getitem__(self, frame: ClosedFrame) -> _Frame:
+        """Return a frame's; before the data are used for anything else."""
+        if frame not in self._frames:
             model, data = self.equations.model, self.equations.data
-            of = model, data, index, _LOCAL
-            self._frames[index] = _Frame(
-                data.oMf[index],
+            of = model, data, frame.joint, frame.placement, _LOCAL
+            self._frames[frame] = _Frame(
+                frame.at(data),
                 pin.getFrameVelocity(*of).vector,
                 pin.getFrameAcceleration(*of).vector,
                 *(part.reshape(6, model.nv) for part in pin.getFrameAccelerationDerivatives(*of)),
             )
-        return self._frames[index]
+        return self._frames[frame]
+
+    def of_index(self, index: int) -> _Frame:
+        """Return that of a frame of the model, by its index."""
+        frame = self.equations.model.frames[index]
+        return self[ClosedFrame(int(frame.parentJoint), frame.placement)]
 
 
 def closure_derivatives(motions: FrameMotions) -> ClosureDerivatives:
@@ -91,7 +96,7 @@ def closure_derivatives(motions: FrameMotions) -> ClosureDerivatives:
     shape = equations.size, equations.model.nv
     found = ClosureDerivatives(np.zeros(shape), np.zeros(shape), np.zeros(shape))
     for frames in equations.closed_frames:
-        of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
+        of_a, of_b = motions[frames.a], motions[frames.b]
         if frames.closure.kind == "spherical":
             derivatives = [a - b for a, b in zip(_point(of_a), _point(of_b), strict=True)]
         else:
@@ -120,7 +125,7 @@ def closure_force_slope(motions: FrameMotions, multipliers: Array) -> Array:
     slope = np.zeros((equations.model.nv, equations.model.nv))
     for frames in equations.closed_frames:
         force = multipliers[frames.rows]
-        of_a, of_b = motions[frames.frame_a], motions[frames.frame_b]
+        of_a, of_b = motions[frames.a], motions[frames.b]
         if frames.closure.kind == "spherical":
             wrench = np.concatenate([force, np.zeros(3)])
             slope += world_wrench_slope(of_a, wrench) - world_wrench_slope(of_b, wrench)
@@ -149,7 +154,9 @@ def world_wrench_slope(frame: _Frame, wrench: Array) -> Array:
 def external_force_slope(motions: FrameMotions, wrenches: Mapping[int, Array]) -> Array:
     """Return the same of external wrenches by frame index, shape (nv, nv)."""
     nv = motions.equations.model.nv
-    slopes = (world_wrench_slope(motions[frame], wrench) for frame, wrench in wrenches.items())
+    slopes = (
+        world_wrench_slope(motions.of_index(frame), wrench) for frame, wrench in wrenches.items()
+    )
     return sum(slopes, np.zeros((nv, nv)))
 
 

@@ -19,7 +19,12 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array, Bools, Indices
-from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure
+from rps_pin.closed_loop.constraints.closures import (
+    ClosedFrame,
+    Closure,
+    JointCoupling,
+    LoopClosure,
+)
 from rps_pin.closed_loop.constraints.couplings import CouplingRow, coupling_row
 from rps_pin.closed_loop.constraints.rows import Floats, Rows, rows_of
 from rps_pin.errors import InputError, MechanismError, shown
@@ -56,8 +61,8 @@ class ClosedFrames(NamedTuple):
     closure: LoopClosure
     rows: slice
     """Its rows in J."""
-    frame_a: int
-    frame_b: int
+    a: ClosedFrame
+    b: ClosedFrame
     selected: Rows
     """The selected rows, in frame a's axes."""
     in_world: bool
@@ -137,9 +142,9 @@ class ClosureEquations:
         ]
         for closure, (_, data) in zip(of_frames, self.calls, strict=True):
             rows, in_world = self.rows(closure.name), closure.kind in _WORLD_AXES
-            ids = closure.frame_ids(model)
+            a, b = closure.closed_frames(model)
             self.closed_frames.append(
-                ClosedFrames(closure, rows, *ids, rows_of(closure), in_world, data)
+                ClosedFrames(closure, rows, a, b, rows_of(closure), in_world, data)
             )
         self._points = [f for f in self.closed_frames if f.closure.kind == "spherical"]
         self._frames = [f for f in self.closed_frames if f.closure.kind != "spherical"]
@@ -326,8 +331,8 @@ class ClosureEquations:
         bias = self._curvature(q, v)
         for frames in self._points:
             bias[frames.rows] = (
-                acceleration(model, data, frames.frame_a, _WORLD).linear
-                - acceleration(model, data, frames.frame_b, _WORLD).linear
+                acceleration(model, data, frames.a.joint, frames.a.placement, _WORLD).linear
+                - acceleration(model, data, frames.b.joint, frames.b.placement, _WORLD).linear
             )
         for frames in self._frames:
             bias[frames.rows] = self._selected_motion(frames)[1]
@@ -337,7 +342,10 @@ class ClosureEquations:
         """Return velocity and acceleration of a less those of b, each frame's at its own origin."""
         size = frames.closure.size
         rates, accelerations = (
-            [of(self.model, self.data, frame, _WORLD) for frame in (frames.frame_a, frames.frame_b)]
+            [
+                of(self.model, self.data, frame.joint, frame.placement, _WORLD)
+                for frame in (frames.a, frames.b)
+            ]
             for of in (pin.getFrameVelocity, pin.getFrameClassicalAcceleration)
         )
         return (
@@ -353,16 +361,16 @@ class ClosureEquations:
         """
         model, data = self.model, self.data
         local = pin.ReferenceFrame.LOCAL
-        placement_a, placement_b = (
-            data.oMi[model.frames[frame].parentJoint] * model.frames[frame].placement
-            for frame in (frames.frame_a, frames.frame_b)
+        of_a, of_b = (
+            (model, data, one.joint, one.placement, local) for one in (frames.a, frames.b)
         )
-        placement = placement_a.actInv(placement_b)
-        twist_a = pin.getFrameVelocity(model, data, frames.frame_a, local)
-        twist_b = placement.act(pin.getFrameVelocity(model, data, frames.frame_b, local))
+        placement_a = frames.a.at(data)
+        placement = placement_a.actInv(frames.b.at(data))
+        twist_a = pin.getFrameVelocity(*of_a)
+        twist_b = placement.act(pin.getFrameVelocity(*of_b))
         twist = twist_a - twist_b
-        a = pin.getFrameAcceleration(model, data, frames.frame_a, local)
-        b = placement.act(pin.getFrameAcceleration(model, data, frames.frame_b, local))
+        a = pin.getFrameAcceleration(*of_a)
+        b = placement.act(pin.getFrameAcceleration(*of_b))
         # d/dt (Ad_M nu_b) = Ad_M nu_b' + xi x (Ad_M nu_b), xi = -X; and X x nu_b = X x nu_a.
         acceleration = a - b + twist.cross(twist_a)
         wrenches = frames.selected.wrenches(placement)
@@ -380,10 +388,10 @@ class ClosureEquations:
         if given is not None:
             return positive_number(given, "characteristic_length", "m")
         levers = [
-            float(np.linalg.norm(self.model.frames[frame].placement.translation))
+            float(np.linalg.norm(frame.placement.translation))
             for frames in self.closed_frames
-            for frame in (frames.frame_a, frames.frame_b)
-            if self.model.frames[frame].parentJoint != 0  # the world is no lever
+            for frame in (frames.a, frames.b)
+            if frame.joint != 0  # the world is no lever
         ]
         return max(levers, default=0.0) or 1.0
 

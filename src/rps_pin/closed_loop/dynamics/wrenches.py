@@ -42,7 +42,7 @@ def forces_on_joints(
 ) -> pin.StdVec_Force:
     """Return all wrenches on the tree's bodies, in their joints' frames, for Pinocchio's `rnea`.
 
-    After `framesForwardKinematics` of the equations' data.
+    After `forwardKinematics` of the equations' data.
 
     Parameters
     ----------
@@ -56,16 +56,16 @@ def forces_on_joints(
     model, data = equations.model, equations.data
     forces = pin.StdVec_Force(model.njoints, pin.Force.Zero())
 
-    def add(frame: int, at: Array, wrench: Array) -> None:
-        joint = model.frames[frame].parentJoint
+    def add(joint: int, at: Array, wrench: Array) -> None:
         placed = pin.SE3(np.eye(3), at)  # a frame with world axes
         forces[joint] += data.oMi[joint].actInv(placed.act(pin.Force(wrench)))
 
     for frames in equations.closed_frames:
         wrench = on_closures[frames.closure.name]
-        at = data.oMf[frames.frame_a].translation
-        add(frames.frame_a, at, wrench)
-        add(frames.frame_b, at, -wrench)
+        at = frames.a.at(data).translation
+        add(frames.a.joint, at, wrench)
+        add(frames.b.joint, at, -wrench)
     for frame, wrench in on_frames.items():
-        add(frame, data.oMf[frame].translation, wrench)
+        joint = int(model.frames[frame].parentJoint)
+        add(joint, data.oMi[joint].act(model.frames[frame].placement.translation), wrench)
     return forces

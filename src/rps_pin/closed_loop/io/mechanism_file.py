@@ -23,7 +23,7 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure, frame_id
 from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
-from rps_pin.closed_loop.io.mechanism_schema import CouplingEntry, Description
+from rps_pin.closed_loop.io.mechanism_schema import ClosureEntry, CouplingEntry, Description
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts, without_position_limits
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
@@ -228,11 +228,22 @@ def _closures(file: YamlFile, description: Description, model: pin.Model) -> lis
             with file.at("closures", i, end):
                 frame_id(model, getattr(entry, end), "closures")
         with file.at("closures", i):
-            found.append(LoopClosure(**entry.model_dump()))
+            found.append(_closure(entry))
     for i, coupled in enumerate(description.couplings):
         with file.at("couplings", i):
             found.append(_coupling(coupled, model))
     return found
+
+
+def _closure(entry: ClosureEntry) -> LoopClosure:
+    """Return a closure; R = R_z(yaw) R_y(pitch) R_x(roll) of an offset."""
+    given = entry.model_dump()
+    for end in ("placement_a", "placement_b"):
+        offset = getattr(entry, end)
+        if offset is not None:
+            turn = pin.rpy.rpyToMatrix(*offset.rpy)
+            given[end] = pin.SE3(turn, np.array(offset.xyz)).homogeneous
+    return LoopClosure(**given)
 
 
 def _coupling(entry: CouplingEntry, model: pin.Model) -> JointCoupling:

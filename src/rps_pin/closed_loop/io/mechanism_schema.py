@@ -10,6 +10,13 @@ from rps_pin.closed_loop.editing.merge import MergedKind
 from rps_pin.config import Entry, Finite, NonNegative, Positive, Text, Three
 
 
+class PlacementEntry(Entry):
+    """An offset as URDF's ``origin``: a shift, m, and roll, pitch and yaw, rad."""
+
+    xyz: Three = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    rpy: Three = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+
+
 class ClosureEntry(Entry):
     """The fields of a `LoopClosure`."""
 
@@ -20,6 +27,8 @@ class ClosureEntry(Entry):
     axis: Three | None = None
     axis_b: Three | None = None
     distance: Finite | None = None
+    placement_a: PlacementEntry | None = None
+    placement_b: PlacementEntry | None = None
 
 
 class CouplingEntry(Entry):

@@ -62,7 +62,7 @@ def _apply(model: pin.Model, closures: list[Closure], group: str, values: Array)
         model.jointPlacements[joint] = model.jointPlacements[joint] * _move(values)
     elif kind == "closure":
         index = next(i for i, closure in enumerate(closures) if closure.name == name)
-        closures[index] = _moved_ends(model, closures[index], values)
+        closures[index] = _moved_ends(closures[index], values)
     else:
         frame = model.frames[model.getFrameId(name)]
         body = frame.placement.act(_body(values, group))
@@ -82,19 +82,14 @@ def _body(values: Array, group: str) -> pin.Inertia:
     return pin.Inertia(0.0, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
-def _moved_ends(model: pin.Model, closure: Closure, values: Array) -> LoopClosure:
-    """Return a closure of two new frames; others may use the old ones."""
+def _moved_ends(closure: Closure, values: Array) -> LoopClosure:
+    """Return a closure whose closed frames stand elsewhere."""
     assert isinstance(closure, LoopClosure)  # a coupling has no placements
-    ends = []
-    for end, name in enumerate((closure.frame_a, closure.frame_b)):
-        old = model.frames[model.getFrameId(name)]
-        placement = old.placement * _move(values[6 * end : 6 * end + 6])
-        new = f"{closure.name}, frame {'ab'[end]}"
-        model.addFrame(
-            pin.Frame(new, old.parentJoint, old.parentFrame, placement, pin.FrameType.OP_FRAME)
-        )
-        ends.append(new)
-    return replace(closure, frame_a=ends[0], frame_b=ends[1])
+    a, b = (
+        offset * _move(part)
+        for offset, part in zip(closure.offsets(), (values[:6], values[6:]), strict=True)
+    )
+    return replace(closure, placement_a=a, placement_b=b)
 
 
 def _move(values: Array) -> pin.SE3:

@@ -200,10 +200,10 @@ _Ends = tuple[End, End]
 
 def _ends(tree: Tree, closure: LoopClosure) -> _Ends:
     """Return the two frames of a closure."""
-    frames = [tree.model.frames[index] for index in closure.frame_ids(tree.model)]
+    frames = closure.closed_frames(tree.model)
     placements = tree.parameters.closure_placements(closure.name)
     a, b = (
-        End(int(frame.parentJoint), tidy(ca.SX(rotation)), tidy(ca.SX(origin)))
+        End(frame.joint, tidy(ca.SX(rotation)), tidy(ca.SX(origin)))
         for frame, (rotation, origin) in zip(frames, placements, strict=True)
     )
     return a, b

@@ -82,6 +82,11 @@ class Parameters:
         self._length = max(
             [float(np.abs(m.translation).max()) for m in self.model.jointPlacements]
             + [float(np.abs(f.placement.translation).max()) for f in self.model.frames]
+            + [
+                float(np.abs(frame.placement.translation).max())
+                for closed in self._closures.values()
+                for frame in (closed.a, closed.b)
+            ]
         )
         #: The joint of the mechanism's own model that starts with a velocity.
         self._starts = {joint.idx_v: joint.id for joint in list(system.model.joints)[1:]}
@@ -240,7 +245,7 @@ class Parameters:
             known = ", ".join(self._closures) or "none"
             raise MechanismError(f"no closure of frames {closure!r}; there are: {known}")
         closed = self._closures[closure]
-        a, b = self.frame_placement(closed.frame_a), self.frame_placement(closed.frame_b)
+        a, b = self._numbers(closed.a.placement), self._numbers(closed.b.placement)
         own = self._symbols.get(f"closure:{closure}")
         if own is None:
             return a, b

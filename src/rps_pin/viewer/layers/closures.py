@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from rps_pin.closed_loop import JointCoupling, LoopClosure
+from rps_pin.closed_loop.constraints.closures import ClosedFrame
 from rps_pin.errors import InputError
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.colours import BLUE, YELLOW, css
@@ -43,7 +43,7 @@ class Closures(RobotSizedLayer):
         ends = {
             node_name(f"{one.name}_{k}" if k else one.name): pair
             for one in mechanism.closures
-            for k, pair in enumerate(_ends(one, model, data))
+            for k, pair in enumerate(_pairs(one, model))
         }
         size = context.radius / 60.0 if self.size is None else self.size
         yellow, blue = (Material(colour, on_top=True) for colour in (YELLOW, BLUE))
@@ -57,10 +57,10 @@ class Closures(RobotSizedLayer):
             ]
 
         def update(state: MotionState) -> dict[str, NodeState]:
-            pin.framesForwardKinematics(model, data, state.q)
+            pin.forwardKinematics(model, data, state.q)
             states = {}
-            for name, (placements, a, b) in ends.items():
-                start, end = (np.array(placements[one].translation) for one in (a, b))
+            for name, pair in ends.items():
+                start, end = (np.array(frame.at(data).translation) for frame in pair)
                 states[f"{name}_a"] = NodeState(translated(start))
                 states[f"{name}_b"] = NodeState(translated(end))
                 states[f"{name}_line"] = NodeState(between(start, end))
@@ -72,9 +72,11 @@ class Closures(RobotSizedLayer):
         return DrawnLayer(LegendEntry("closures", text, css(YELLOW)), parts, update)
 
 
-def _ends(closure: LoopClosure | JointCoupling, model: pin.Model, data: pin.Data) -> list[Any]:
-    """Return the placements, and the two indices in them, of each pair that a closure ties."""
-    if isinstance(closure, JointCoupling):
-        joint, *others = closure.joint_ids(model)
-        return [(data.oMi, joint, other) for other in others]
-    return [(data.oMf, *closure.frame_ids(model))]
+def _pairs(
+    closure: LoopClosure | JointCoupling, model: pin.Model
+) -> list[tuple[ClosedFrame, ClosedFrame]]:
+    """Return the pairs of frames that a closure ties together."""
+    if isinstance(closure, LoopClosure):
+        return [closure.closed_frames(model)]
+    joint, *others = (ClosedFrame(i, pin.SE3.Identity()) for i in closure.joint_ids(model))
+    return [(joint, other) for other in others]

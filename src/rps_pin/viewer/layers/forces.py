@@ -105,10 +105,10 @@ class Reactions(RobotSizedLayer):
                 else:
                     forces = mechanism.constraint_forces(q, v, a, tau, wrenches=outside)
             wrenches = mechanism.closure_wrenches(state.q, forces)
-            pin.framesForwardKinematics(model, data, state.q)
+            pin.forwardKinematics(model, data, state.q)
             return {
                 node_name(one.name): (
-                    np.array(data.oMf[one.frame_ids(model)[0]].translation),
+                    np.array(one.closed_frames(model)[0].at(data).translation),
                     wrenches[one.name][:3],
                 )
                 for one in closures
