@@ -247,9 +247,9 @@ class CompiledMechanism:
 
         whole_number(restarts, "restarts", 0)
         if fixed:
-            return self._by_one(answer, q_guess, **options)
+            return self._by_one(answer, (q_guess,), **options)
         return self._closed(
-            "closed_near", self._normalised(q_guess), answer, within_limits, options
+            "closed_near", (self._normalised(q_guess),), answer, within_limits, options
         )
 
     def project(self, q_guess: ArrayLike, *, within_limits: bool = True, **options: Any) -> Array:
@@ -262,7 +262,7 @@ class CompiledMechanism:
         def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
             return (m.project(q, within_limits=within_limits), np.zeros(1))
 
-        return self._closed("nearest", self._normalised(q_guess), answer, within_limits, options)
+        return self._closed("nearest", (self._normalised(q_guess),), answer, within_limits, options)
 
     def complete(
         self,
@@ -270,53 +270,60 @@ class CompiledMechanism:
         q_guess: ArrayLike | None = None,
         *,
         within_limits: bool = True,
+        jump: bool = False,
         **options: Any,
     ) -> Array:
         """Return the closed configurations in which some joints have given values, (..., nq).
 
         As `ClosedLoopModel.complete`; generated code where the values are those of the actuated
-        joints, and these determine the motion. A batch of values is an array (..., na) of the
-        actuated joints'; by name, one value for each joint.
+        joints, and these determine the motion. It divides the way into up to 64 parts; where
+        Newton's steps do not contract in these, the Pinocchio engine follows it. A batch of values
+        is an array (..., na) of the actuated joints'; by name, one value for each joint.
         """
         ordered: Any = values
+        given: dict[str, Any] = {"within_limits": within_limits, "jump": jump}
+        guess = self.reference().home if q_guess is None else self._normalised(q_guess)
         if isinstance(values, Mapping):
             if any(np.ndim(one) for one in values.values()) or set(values) != set(self.actuated):
                 return self._by_one(
-                    lambda m, q: (m.complete(values, q, within_limits=within_limits),),
-                    self.reference()._start if q_guess is None else self._normalised(q_guess),
-                    **options,
+                    lambda m, q: (m.complete(values, q, **given),), (guess,), **options
                 )
             ordered = [float(np.asarray(values[name])) for name in self.actuated]
         system, count = self.mechanism.system, len(self.actuated)
-        given = numbers(ordered, "values", f"numbers of shape (..., {count})")
-        if given.shape[-1:] != (count,):
-            raise InputError(f"values has shape {given.shape}; expected (..., {count})")
+        asked = numbers(ordered, "values", f"numbers of shape (..., {count})")
+        if asked.shape[-1:] != (count,):
+            raise InputError(f"values has shape {asked.shape}; expected (..., {count})")
 
-        def answer(m: ClosedLoopModel, q: Array) -> Sequence[Any]:
-            return (m.complete(q[at], q, within_limits=within_limits), 0.0)
+        def answer(m: ClosedLoopModel, q: Array, wanted: Array) -> Sequence[Any]:
+            return (m.complete(wanted[at], q, **given),)
 
-        at = np.array(
-            [self.model.joints[self.model.getJointId(name)].idx_q for name in self.actuated],
-            dtype=np.intp,
-        )
-        guess = self.reference()._start if q_guess is None else self._normalised(q_guess)
-        start = np.broadcast_to(guess, (*given.shape[:-1], self.model.nq)).copy()
-        start[..., at] = given
-        simple = system.actuated.size == count and np.all(
-            [self.model.joints[self.model.getJointId(name)].nq == 1 for name in self.actuated]
-        )
+        joints = [self.model.joints[self.model.getJointId(name)] for name in self.actuated]
+        at = np.array([joint.idx_q for joint in joints])
+        batch = np.broadcast_shapes(asked.shape[:-1], guess.shape[:-1])
+        wanted = np.broadcast_to(guess, (*batch, self.model.nq)).copy()
+        wanted[..., at] = asked
+        simple = system.actuated.size == count and all(joint.nq == 1 for joint in joints)
         if not (simple and self.code.partition.is_actuated):
-            return self._by_one(answer, start, **options)
-        return self._closed("closed", start, answer, within_limits, options)
+            return self._by_one(answer, (guess, wanted), **options)
+        if jump:
+            return self._closed(
+                "closed", (wanted,), lambda m, q: (*answer(m, q, q), 0.0), within_limits, options
+            )
+        return self._closed("completed", (guess, wanted), answer, within_limits, options)
 
-    def _by_one(self, answer: Reference, start: ArrayLike, **options: Any) -> Array:
+    def _by_one(self, answer: Reference, given: Sequence[ArrayLike], **options: Any) -> Array:
         """Return the Pinocchio engine's configurations, from where it starts."""
         shapes = [(self.model.nq,)]
-        found = self._by_samples(lambda m, q: answer(m, q)[:1], (start,), shapes, **options)
+        found = self._by_samples(lambda m, *q: answer(m, *q)[:1], given, shapes, **options)
         return np.asarray(found[0])
 
     def _closed(
-        self, name: str, start: Array, answer: Reference, within_limits: bool, options: Any
+        self,
+        name: str,
+        given: Sequence[Array],
+        answer: Reference,
+        within_limits: bool,
+        options: Any,
     ) -> Array:
         """Return what a routine of Newton's steps finds, if that is within the limits."""
         limits = self.mechanism.system.limits
@@ -326,7 +333,7 @@ class CompiledMechanism:
             return ((x < limits.lower) | (x > limits.upper)).any(axis=-1)
 
         refused = outside if within_limits and limits.q.size else None
-        return np.asarray(self._run(name, (start,), answer, refused=refused, **options)[0])
+        return np.asarray(self._run(name, given, answer, refused=refused, **options)[0])
 
     def _normalised(self, q: ArrayLike) -> Array:
         """Return configurations with quaternions of unit length."""

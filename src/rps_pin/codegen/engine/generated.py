@@ -41,7 +41,7 @@ from rps_pin.errors import InputError, did_you_mean
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "dynamics": ("inverse_dynamics", "forward_dynamics"),
     "kinematics": ("gaps", "jacobian", "motion_basis", "velocity", "acceleration"),
-    "closing": ("closed", "closed_near", "nearest"),
+    "closing": ("closed", "closed_near", "completed", "nearest"),
     "forces": (
         "constraint_forces",
         "generalised_force",

@@ -302,6 +302,7 @@ class Proof:
             ),
             "energy": lambda: (np.array(m.energy(s.q, s.v)),),
             "closed": lambda: (self._completed(s, found[0]),),
+            "completed": lambda: (self._completed(s, found[0]),),
             "step": lambda: self._steps(s, 1),
             "steps": lambda: self._steps(s, BLOCK) if s is self.samples[0] else (None, None),
             "inverse_dynamics_derivatives": lambda: m.inverse_dynamics_derivatives(
@@ -335,7 +336,7 @@ class Proof:
         """
         model = self._m.model
         # Moves of a ball about two of its axes add up to one about the third.
-        simple = [joint.idx_v for joint in list(model.joints)[1:] if joint.nv == 1]
+        simple = [joint.idx_v for joint in list(model.joints)[1:] if joint.nq == 1]
         moved = pin.difference(model, s.near, q)[np.intersect1d(self._independent, simple)]
         return np.asarray(q + np.abs(moved).max(initial=self._m.loop_gap(q)))
 

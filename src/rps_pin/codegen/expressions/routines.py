@@ -23,6 +23,11 @@ _CLOSED, _LAST = "PRECISE(1e-28, 1e-13)", "PRECISE(1e-16, 1e-8)"
 #: The same in Newton's method beside a singularity, where what a step leaves is many times larger.
 _LAST_OF_ALL = "PRECISE(1e-22, 1e-10)"
 _NEWTON_STEPS = 20
+#: As in `rps_pin.closed_loop.assembly.continuation`: the squared ratio of corrections, and the
+#: largest motion in a step, here all together, rad or characteristic lengths.
+_CONTRACTION, _REACH = 1 / 16, 0.3
+#: Most parts that a path is divided into.
+_PARTS = 64
 
 
 def routines(functions: MechanismFunctions, names: Iterable[str]) -> tuple[Routine, ...]:
@@ -36,6 +41,9 @@ def routines(functions: MechanismFunctions, names: Iterable[str]) -> tuple[Routi
     closed                        q                     q, its independent coordinates as given;
                                                         squared gap of the guess (1) (check)
     closed_near                   q                     the same by steps of least norm (check)
+    completed                     q, q'                 the closed q that continues the first, with
+                                                        independent coordinates as the second (those
+                                                        of joints of one coordinate) (check)
     nearest                       q                     the closed q at the least distance;
                                                         squared, that distance in one unit (1)
                                                         (check)
@@ -108,6 +116,71 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
 """
     outputs = (("q_closed", model.nq), ("first", 1), ("check", 2))
     return Routine(name, (("q", model.nq), *extra), outputs, body, (kernel, "integrate"))
+
+
+def _completed(functions: MechanismFunctions) -> Routine:
+    """In 1, 2, 4, ... parts, until Newton's steps contract in each as a continuation's must."""
+    x = functions.expressions
+    model, extra = x.tree.model, _extra(functions, False)
+    scale, reach = x.system.column_scale, (_REACH * x.system.equations.length) ** 2
+    independent = set(x.independent.tolist())
+    simple = [
+        (joint.idx_q, float(scale[joint.idx_v]))
+        for joint in list(model.joints)[1:]
+        if joint.nq == 1 and joint.idx_v in independent
+    ]
+    squares = [f"way += SQUARE((given[{i}] - q[{i}]) * CONST({1 / by!r}));" for i, by in simple]
+    moves = [
+        f"at[{i}] = s == n ? given[{i}] : q[{i}] + share * (given[{i}] - q[{i}]);"
+        for i, _ in simple
+    ]
+    lengths = [
+        f"length += SQUARE(dv[{j}] * CONST({1 / by!r}));" for j, by in enumerate(scale.tolist())
+    ]
+    body = f"""
+    REAL at[{model.nq}], moved[{model.nq}], dv[{model.nv}], gap[1], growth[1];
+    REAL way = CONST(0), done = CONST(0), good, before, length, worst, share;
+    int i, k, n, s;
+    #define SQUARE(x) ((x) * (x))
+    for (i = 0; i < {model.nq}; ++i) q_closed[i] = q[i];
+    check[1] = CONST(0);
+    {" ".join(squares)}
+    for (n = 1; n <= {_PARTS}; n += n) {{
+        good = LE(way, CONST({reach!r}) * CONST(n) * CONST(n));
+        worst = CONST(0);
+        if (!ANY(AND(good, NOT(done)))) continue;
+        for (i = 0; i < {model.nq}; ++i) at[i] = q[i];
+        for (s = 0; s <= n; ++s) {{ /* the first closes the guess to rounding error */
+            share = CONST(s) / CONST(n);
+            if (s) {{ {" ".join(moves)} }}
+            before = CONST({reach!r});
+            for (k = 0; k < {_NEWTON_STEPS}; ++k) {{
+                {_call("closing_step", ["at"], extra, "dv", "gap", "growth")}
+                length = CONST(0);
+                {" ".join(lengths)}
+                worst = FMAX(worst, growth[0]);
+                good = AND(good, OR(LT(gap[0], {_LAST}), LE(length, before)));
+                before = CONST({_CONTRACTION!r}) * length;
+                if (!ANY(AND(good, LT({_CLOSED}, gap[0])))) break;
+                {_call("integrate", ["at", "dv"], extra, "moved")}
+                for (i = 0; i < {model.nq}; ++i) at[i] = moved[i];
+                if (!ANY(LT({_LAST_OF_ALL}, gap[0]))) break;
+            }}
+            good = AND(good, LE(gap[0], {_LAST}));
+            if (!ANY(AND(good, NOT(done)))) break;
+        }}
+        good = AND(good, NOT(done));
+        for (i = 0; i < {model.nq}; ++i) q_closed[i] = SELECT(good, at[i], q_closed[i]);
+        check[1] = SELECT(good, worst, check[1]);
+        done = OR(done, good);
+        if (!ANY(NOT(done))) break;
+    }}
+    #undef SQUARE
+    check[0] = SELECT(done, CONST(0), CONST(2));
+"""
+    outputs = (("q_closed", model.nq), ("check", 2))
+    given = (("q", model.nq), ("given", model.nq), *extra)
+    return Routine("completed", given, outputs, body, ("closing_step", "integrate"))
 
 
 def _nearest(functions: MechanismFunctions) -> Routine:
@@ -320,6 +393,7 @@ def _table(name: str, values: Sequence[int]) -> str:
 _MAKERS: Mapping[str, Callable[[MechanismFunctions], Routine]] = {
     "closed": partial(_newton, name="closed", kernel="closing_step"),
     "closed_near": partial(_newton, name="closed_near", kernel="least_norm_step"),
+    "completed": _completed,
     "nearest": _nearest,
     "step": _step,
     "steps": _steps,
