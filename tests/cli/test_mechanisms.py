@@ -134,6 +134,34 @@ def test_held_mechanism_stays_where_it_is(tmp_path: Path) -> None:
     np.testing.assert_allclose(table["q_arm_1_joint"], 0.5, rtol=0, atol=1e-9)
 
 
+_FLOATING = """<mujoco model="floating"><worldbody>
+<body name="hull" pos="0 0 1"><freejoint name="root"/><geom type="box" size=".1 .1 .05" mass="3"/>
+<body name="tail" pos=".1 0 0"><joint name="hip" axis="0 1 0"/>
+<geom type="capsule" size=".01" fromto="0 0 0 .2 0 0" mass=".3"/></body></body>
+</worldbody><actuator><motor joint="hip"/></actuator></mujoco>"""
+
+
+def test_what_cannot_be_held_is_told(tmp_path: Path) -> None:
+    """3.3 kg float: their weight, and 0.3 kg at 0.2 m less the hip, are nobody's."""
+    pytest.importorskip("mujoco")
+    file = tmp_path / "floating.xml"
+    file.write_text(_FLOATING)
+    command = ("simulate", str(file), "--hold", "--duration", "0.05")
+    run = rps_pin(*command, "--json", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    (missing,) = json.loads(run.stdout)["not_held"]
+    assert missing["joint"] == "root"
+    assert missing["force"] == pytest.approx(3.3 * 9.81, rel=1e-12)
+    assert missing["moment"] == pytest.approx(0.3 * 9.81 * 0.2, rel=1e-12)
+    assert "not held are 32.373 N and 0.5886 N m at joint 'root'" in run.stderr
+    run = rps_pin(*command, folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert "not held by the actuators" in run.stdout
+    run = rps_pin("simulate", "delta", "--hold", "--duration", "0.01", "--json", folder=tmp_path)
+    assert json.loads(run.stdout)["not_held"] == []
+    assert "not held" not in run.stderr
+
+
 def test_speeds_and_forces_are_those_asked_for(tmp_path: Path) -> None:
     run = rps_pin(
         *("simulate", str(URDF / "five_bar.yaml"), "--duration", "0.01", "--method", "adaptive"),

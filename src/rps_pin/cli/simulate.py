@@ -14,6 +14,7 @@ from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.layer_options import LayersOption, write_page
 from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.closed_loop.dynamics.not_held import NotHeld, not_held
 from rps_pin.errors import InputError
 
 _MOST_NOTES = 3
@@ -56,7 +57,11 @@ def simulate_command(
         options.joint_values("Constant force of an actuated joint, N m or N; default: 0."),
     ] = None,
     hold: Annotated[
-        bool, typer.Option("--hold", help="Add the forces that hold the initial position.")
+        bool,
+        typer.Option(
+            "--hold",
+            help="Add the forces that hold the initial position; what they cannot hold is told.",
+        ),
     ] = False,
     ignore_limits: options.IgnoreLimitsOption = False,
     package_path: options.PackagePathOption = None,
@@ -88,8 +93,14 @@ def simulate_command(
     speeds = _of_actuated(mechanism, speed, "--speed")
     v = mechanism.velocity(q, speeds) if speeds.any() else still
     forces = _of_actuated(mechanism, tau, "--tau")
+    unheld: tuple[NotHeld, ...] = ()
     if hold:
-        forces += mechanism.inverse_dynamics(q, still, still).tau
+        holding = mechanism.inverse_dynamics(q, still, still)
+        forces += holding.tau
+        needed = mechanism.generalised_force(q, still, still)
+        unheld = not_held(mechanism.system, holding.unproduced, needed)
+    if unheld:
+        typer.echo(f"note: --hold: {_phrase(unheld)}", err=True)
     console = common.text_console(as_json, soft_wrap=True)
     times: dict[str, Any] = {"duration": duration, "step": step, "method": method.value}
     if step > 0:
@@ -119,6 +130,7 @@ def simulate_command(
         "energy_change": float(energy[-1] - energy[0]),
         "work": float(motion.work[-1]),
         "energy_balance": float(np.abs(motion.energy_balance).max() / scale),
+        "not_held": [part._asdict() for part in unheld],
         "limits_passed": [str(passed) for passed in motion.limits_passed],
         "notes": notes,
     }
@@ -126,6 +138,8 @@ def simulate_command(
         common.print_json({"mechanism": mechanism.name} | summary | {"files": files})
         return
     rows = {name: text.format(**summary) for name, text in _ROWS.items()}
+    if unheld:
+        rows["not held by the actuators"] = "; ".join(map(str, unheld))
     console.print(common.table_of(rows.items(), title=title, title_justify="left"))
     for passed in motion.limits_passed[:_MOST_NOTES]:
         console.print(f"note: {passed}")
@@ -134,6 +148,12 @@ def simulate_command(
     for note in notes:
         console.print(f"note: {note}", markup=False)
     common.print_files(console, files)
+
+
+def _phrase(unheld: tuple[NotHeld, ...]) -> str:
+    return "the actuators cannot hold this position, and it will move: not held are " + "; ".join(
+        map(str, unheld)
+    )
 
 
 def _of_actuated(mechanism: ClosedLoopModel, pairs: options.JointValues, option: str) -> Array:
