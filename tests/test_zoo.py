@@ -40,6 +40,7 @@ ARM = """<?xml version="1.0"?><!-- one joint --><robot name="arm">
             ARM.replace("<link", '<xacro:x xmlns:xacro="http://www.ros.org/wiki/xacro"/><link', 1),
             "xacro",
         ),
+        (ARM.replace('xyz="0.5', 'xyz="${far}'), "xacro"),
         ("<mujocoinclude/>", "part of an MJCF"),
         ("<sdf version='1.6'/>", "SDF"),
         ("<mujoco><worldbody></mujoco>", "broken XML"),
@@ -61,6 +62,7 @@ def test_a_folder_is_tried(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
         "arm": ARM,
         "arm.yaml": "urdf: arm\nactuated: [turn]\n",
         "prism.urdf": ARM.replace('type="continuous"', 'type="prism"'),
+        "no_parent.urdf": ARM.replace('parent link="base"', 'parent link="bass"'),
         "no_mass.xml": HINGES.replace("<geom", "<site"),
         "still.xml": "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>",
         "scene.sdf": "<sdf/>",
@@ -77,11 +79,12 @@ def test_a_folder_is_tried(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
         "arm": ("loads", True),
         "arm.yaml": ("loads", None),
         "no_mass.xml": ("apart", None),
-        "prism.urdf": ("refused", None),
+        "no_parent.urdf": ("apart", None),
+        "prism.urdf": ("apart", None),
         "still.xml": ("apart", None),
     }
     printed = capsys.readouterr().out
-    assert "| files tried | 1 | 2 | 1 |" in printed
+    assert "| files tried | 1 | 1 | 1 |" in printed
     assert "1 counted apart: SDF" in printed
     assert "apart: MJCF: no joints (such as still.xml)" in printed
 

@@ -77,12 +77,18 @@ def kind_of(content: bytes) -> str | None:
 def _kind_of_root(root: ElementTree.Element) -> str | None:
     if root.tag != "robot":
         return _ROOTS.get(root.tag)
-    if any(element.tag.startswith(_XACRO) for element in root.iter()):
+    if any(_is_of_xacro(element) for element in root.iter()):
         return "xacro"
     if not root.findall("link"):
         return None  # a semantic description (SRDF), or a part
     moving = [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
     return URDF if moving else "URDF without joints"
+
+
+def _is_of_xacro(element: ElementTree.Element) -> bool:
+    """Return whether an element, or an expression in an attribute, is xacro's."""
+    values = element.attrib.values()
+    return element.tag.startswith(_XACRO) or any("$(" in one or "${" in one for one in values)
 
 
 def included_by(path: Path) -> set[Path]:

@@ -12,6 +12,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+import pinocchio as pin
 
 from benchmarks.robot_files import beside_mujoco
 from benchmarks.robot_files.find import MJCF, PART, URDF, RobotFile
@@ -70,6 +71,9 @@ def tried(file: RobotFile) -> Trial:
         trial.mujoco = why
         if trial.outcome == LOADS and model is not None:
             _compare(trial, path, kind, model)
+        if kind == URDF and trial.outcome == REFUSED and not _urdfdom_reads(path):
+            trial.outcome = APART
+            trial.message = f"urdfdom does not read it either: {trial.message}"
     trial.seconds = time.perf_counter() - began
     return trial
 
@@ -83,10 +87,23 @@ def loaded(path: Path, kind: str) -> ClosedLoopModel:
     return ClosedLoopModel.load(path)
 
 
+def _urdfdom_reads(path: Path) -> bool:
+    """Return whether Pinocchio, by urdfdom, builds a tree of a URDF."""
+    try:
+        pin.buildModelFromXML(_text(path))
+    except (ValueError, RuntimeError):
+        return False
+    return True
+
+
+def _text(path: Path) -> str:
+    """Return the text of a URDF without a version, of which urdfdom takes any."""
+    return re.sub(r"^\s*<\?xml[^>]*\?>", "", path.read_text("utf-8-sig"))
+
+
 def _movable(path: Path) -> list[str]:
     """Return the joints of a URDF that an actuator can drive, less those that mimic another."""
-    text = re.sub(r"^\s*<\?xml[^>]*\?>", "", path.read_text("utf-8-sig"))
-    root = ElementTree.fromstring(text)
+    root = ElementTree.fromstring(_text(path))
     kinds = "revolute", "continuous", "prismatic"
     return [
         joint.get("name", "")
