@@ -18,7 +18,7 @@ from rps_pin.closed_loop import kinematics
 from rps_pin.closed_loop.assembly.closing import close, closed_gap
 from rps_pin.closed_loop.assembly.completion import complete
 from rps_pin.closed_loop.assembly.projection import project
-from rps_pin.closed_loop.constraints.closures import Closure
+from rps_pin.closed_loop.constraints.closures import Closure, Kind, LoopClosure
 from rps_pin.closed_loop.constraints.equations import LoopErrors
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION, ConstraintSystem
 from rps_pin.closed_loop.describe import MechanismDescription, describe
@@ -31,6 +31,7 @@ from rps_pin.closed_loop.dynamics.inverse_dynamics import (
 )
 from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
+from rps_pin.closed_loop.editing.present_pose import closure_at
 from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts, with_effects, without_position_limits
@@ -127,6 +128,7 @@ class ClosedLoopModel:
         self.notes = tuple(notes)
         self._home: Array | None = None
         self._start: Array = pin.neutral(model)
+        self._given_length = characteristic_length
         if home is not None:
             self._start = self._home = self._closed(system.normalised(home, "home"))
 
@@ -266,16 +268,109 @@ class ClosedLoopModel:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Give copies, and other processes, scratch memory of their own."""
-        rebuilt = partial(
-            type(self),
-            home=self._home if self._home is self._start else None,  # as given
-            effects=self.effects,
-            name=self.name,
-            characteristic_length=self.characteristic_length,
-            max_condition=self.max_condition,
-            notes=self.notes,
-        )
+        home = self._home if self._home is self._start else None  # as given
+        rebuilt = partial(type(self), home=home, **self._options())
         return rebuilt, (self.model, self.closures, self.actuated)
+
+    def _options(self) -> dict[str, Any]:
+        """Return what it was made with, but for model, closures, actuated joints and home."""
+        return {
+            "effects": self.effects,
+            "name": self.name,
+            "characteristic_length": self._given_length,
+            "max_condition": self.max_condition,
+            "notes": self.notes,
+        }
+
+    # Other closures and actuators -----------------------------------------------------------------
+
+    def closure_at(
+        self,
+        q: ArrayLike,
+        frame_a: str,
+        frame_b: str = "universe",
+        kind: Kind = "rigid",
+        **options: Any,
+    ) -> LoopClosure:
+        """Return a closure of two frames as they stand at a configuration, for `with_closures`.
+
+        Both closed frames stand at frame a with its axes; or, if the world carries frame a, at
+        frame b's origin with frame a's axes. A closure onto a given pose in the world is
+        ``LoopClosure(frame, "universe", kind, placement_b=pose)``.
+
+        Parameters
+        ----------
+        q
+            Configuration, shape (nq,); its loops need not be closed.
+        frame_a, frame_b
+            Frames by name. The constraint force acts on frame a's body; with the world as frame b,
+            it is the force of the ground.
+        kind
+            As for `LoopClosure`.
+        **options
+            Its other parameters: ``name``, ``axis`` (in frame a), ``placement_a`` (a point of
+            contact, for example). The length of a ``distance`` closure is that at q.
+
+        Raises
+        ------
+        InputError
+            If q does not fit.
+        MechanismError
+            As `LoopClosure`, and for an option that follows from q.
+        """
+        q_ = self.system.normalised(q, "q")
+        return closure_at(self.model, q_, frame_a, frame_b, kind, **options)
+
+    def with_closures(
+        self, closures: Sequence[Closure], *, home: ArrayLike | None = None
+    ) -> ClosedLoopModel:
+        """Return the same mechanism with further closures.
+
+        Parameters
+        ----------
+        closures
+            Closures; they come after the mechanism's own.
+        home
+            Its home, shape (nq,); this mechanism's if left out. Its loops are closed if they are
+            open.
+
+        Raises
+        ------
+        InputError, MechanismError, ClosureError
+            As the class.
+        """
+        return self._with((*self.closures, *closures), self.actuated, home)
+
+    def without_closures(self, names: Sequence[str]) -> ClosedLoopModel:
+        """Return the same mechanism without some of its closures, by name.
+
+        Raises
+        ------
+        MechanismError
+            If there is no closure of a name; lists those there are.
+        """
+        removed = (names,) if isinstance(names, str) else tuple(names)
+        for name in removed:
+            self.rows(name)
+        kept = [closure for closure in self.closures if closure.name not in removed]
+        return self._with(kept, self.actuated)
+
+    def with_actuated(self, joints: Sequence[str]) -> ClosedLoopModel:
+        """Return the same mechanism with other actuated joints, by name.
+
+        Raises
+        ------
+        MechanismError
+            If a joint is unknown or named twice.
+        """
+        return self._with(self.closures, joints)
+
+    def _with(
+        self, closures: Sequence[Closure], actuated: Sequence[str], home: ArrayLike | None = None
+    ) -> ClosedLoopModel:
+        """Return a mechanism of this tree; its home is closed if one is known."""
+        home = self._home if home is None else home
+        return type(self)(self.model, closures, actuated, home=home, **self._options())
 
     def describe(self, q: ArrayLike | None = None) -> MechanismDescription:
         """Return joints, rows, rank, mobility, redundant rows and actuation; `print` it.
