@@ -217,3 +217,27 @@ def test_bad_options_are_told_in_one_line(
     assert words in run.stderr
     assert run.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_convert_writes_what_describe_reads(tmp_path: Path) -> None:
+    run = rps_pin("convert", "stewart", "--to", "urdf", "-o", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == "wrote out/stewart.urdf and out/stewart.yaml\n"
+    run = rps_pin("convert", "out/stewart.yaml", "--to", "mjcf", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == "wrote stewart.xml\n"
+    one, other = (
+        json.loads(rps_pin("describe", name, "--json", folder=tmp_path).stdout)
+        for name in ("stewart", "stewart.xml")
+    )
+    assert one["mobility"] == other["mobility"] == 6
+    assert one["actuated"] == other["actuated"]
+
+
+def test_convert_names_the_link_that_mujoco_does_not_move(tmp_path: Path) -> None:
+    run = rps_pin("convert", "rps", "--to", "mjcf", folder=tmp_path)
+    assert run.returncode == 1
+    assert "'leg_1_rod' has a mass of 0 kg" in run.stderr
+    mend = ("--least-mass", "1e-9", "--least-inertia", "1e-9", "--mend-inertia")
+    run = rps_pin("convert", "rps", "--to", "mjcf", *mend, folder=tmp_path)
+    assert run.returncode == 0, run.stderr

@@ -30,6 +30,7 @@ for _panel, _name, _line in (
     (_MOTION, "control", "A control loop on a simulated robot."),
     (_ANY, "describe", "Joints, closures, rank, mobility, actuation."),
     (_ANY, "simulate", "Simulation, loops closed at every step."),
+    (_ANY, "convert", "URDF with its description, or a MuJoCo file."),
     (_MORE, "reproduce", "The paper's equations, figures and tables."),
 ):
     app.command(_name, rich_help_panel=_panel, short_help=_line)(LazyGroup.stub(_name))

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property, partial
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -36,6 +37,8 @@ from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts, with_effects, without_position_limits
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
+from rps_pin.closed_loop.io.write.files import write_mjcf, write_urdf
+from rps_pin.closed_loop.io.write.source import Source
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.errors import ClosureError, CompileError
@@ -1021,6 +1024,97 @@ class ClosedLoopModel:
             ``step``, ``method``, ``controller``, ``tau``, ``wrenches``, ``closing`` and others.
         """
         return simulate(self, q, v, duration=duration, **options)
+
+    # Files ----------------------------------------------------------------------------------------
+
+    def to_urdf(
+        self, path: str | os.PathLike[str], *, shapes: pin.GeometryModel | None = None
+    ) -> Path:
+        """Write the tree as a URDF and, beside it, the description that `load` reads.
+
+        Spherical and universal joints are written as revolute joints, which the description
+        merges; joints that are rows of others (translations, Z-Y-X angles, composites) as those
+        rows, with the names ``joint:1``, ``joint:2``, ..., ``joint``. q, v and tau keep their
+        entries; but joints on one link come in the order of their names, as Pinocchio reads URDFs.
+
+        Parameters
+        ----------
+        path
+            The URDF, ``NAME.urdf``; the description is ``NAME.yaml``.
+        shapes
+            Shapes for its ``visual`` elements, such as `rps_pin.closed_loop.visuals.visual_model`
+            returns; meshes are named by the paths of their files.
+
+        Returns
+        -------
+        Path
+            The description.
+
+        Raises
+        ------
+        InputError
+            If the path does not end in ``.urdf``.
+        MechanismError
+            If URDF has no such joint (helical, ellipsoid, mimic); names it.
+        """
+        return write_urdf(self._source(), path, shapes)
+
+    def to_mjcf(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        least_mass: float = 0.0,
+        least_inertia: float = 0.0,
+        mend_inertia: bool = False,
+    ) -> Path:
+        """Write the mechanism as a MuJoCo file, its loops closed by equalities.
+
+        Exact on closed configurations: mass matrix, bias and constraints are those of MuJoCo's
+        model. Joints and closures that MuJoCo does not have are written as what it has (tables:
+        `io.write.mjcf_joints`, `io.write.mjcf_closures`); names are kept. Nothing in the file
+        touches. The home is a key frame of that name. Dry friction becomes ``frictionloss``, which
+        sticks where the law here creeps; equalities are soft there.
+
+        Parameters
+        ----------
+        path
+            The file, ``NAME.xml``.
+        least_mass, least_inertia
+            Mass (kg) and moments of inertia (kg m^2) given to moving links that have less, since
+            MuJoCo moves no link without.
+        mend_inertia
+            Whether a principal moment of inertia that exceeds the sum of the other two, as no
+            body's does and MuJoCo refuses, is lowered to it.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            If the path does not end in ``.xml``, or a least value is negative.
+        MechanismError
+            If MuJoCo has no such joint, effect or link; names it.
+        """
+        return write_mjcf(self._source(), path, least_mass, least_inertia, mend_inertia)
+
+    def _source(self) -> Source:
+        try:
+            home = self.home
+        except ClosureError:
+            home = None
+        return Source(
+            self.model,
+            self.closures,
+            self.actuated,
+            self.effects or JointEffects.named(self.model),
+            home,
+            self.name,
+            self.characteristic_length,
+            self.max_condition,
+        )
 
     # Other engines --------------------------------------------------------------------------------
 

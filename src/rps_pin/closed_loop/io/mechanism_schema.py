@@ -71,11 +71,11 @@ class Description(Entry):
     actuated: list[Text] | None = None
     home: dict[str, Finite | list[Finite]] = Field(default_factory=dict)
     merge: list[MergeEntry] = Field(default_factory=list)
-    damping: dict[str, NonNegative] = Field(default_factory=dict)
-    friction: dict[str, NonNegative] = Field(default_factory=dict)
+    damping: dict[str, NonNegative | list[NonNegative]] = Field(default_factory=dict)
+    friction: dict[str, NonNegative | list[NonNegative]] = Field(default_factory=dict)
     stiffness: dict[str, NonNegative] = Field(default_factory=dict)
     rest: dict[str, Finite] = Field(default_factory=dict)
-    armature: dict[str, NonNegative] = Field(default_factory=dict)
+    armature: dict[str, NonNegative | list[NonNegative]] = Field(default_factory=dict)
     friction_speed: Positive | None = None
     characteristic_length: Positive | None = None
     max_condition: Annotated[float, Field(ge=1, allow_inf_nan=False)] | None = None

@@ -1,0 +1,1 @@
+"""Writers: a mechanism as a URDF with its description, and as a MuJoCo file."""

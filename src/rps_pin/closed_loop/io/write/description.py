@@ -1,0 +1,108 @@
+"""A mechanism's description (YAML) beside the URDF of its tree."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.constraints.closures import JointCoupling
+from rps_pin.closed_loop.constraints.system import MAX_CONDITION
+from rps_pin.closed_loop.io.write.numbers import number
+from rps_pin.closed_loop.io.write.source import Source, coordinates, velocities
+
+
+def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, Any]]) -> str:
+    """Return the description of a tree without rows.
+
+    Parameters
+    ----------
+    source
+        The mechanism.
+    urdf
+        The name of the URDF's file.
+    merges
+        The entries of ``merge``.
+    """
+    model, effects = source.model, source.effects
+    lines = [f"name: {_value(source.name or 'mechanism')}", f"urdf: {_value(urdf)}"]
+    lines.append(f"gravity: {_value(model.gravity.linear)}")
+    frames: list[dict[str, Any]] = []
+    couplings: list[dict[str, Any]] = []
+    for closure in source.closures:
+        entry = {k: v for k, v in vars(closure).items() if v is not None}
+        (couplings if isinstance(closure, JointCoupling) else frames).append(entry)
+    lines += _list("merge", merges)
+    lines += _list("closures", frames)
+    lines += _list("couplings", couplings)
+    lines.append(f"actuated: {_value(source.actuated)}")
+    if source.home is not None:
+        home = {name: coordinates(model, i, source.home) for i, name in _joints(model)}
+        lines += _mapping("home", home)
+    lines += _mapping("damping", _by_joint(model, effects.damping))
+    lines += _mapping("friction", _by_joint(model, effects.friction))
+    stiffness = _by_joint(model, effects.stiffness)
+    lines += _mapping("stiffness", stiffness)
+    lines += _mapping("rest", {k: effects.rest[_idx_v(model, k)] for k in stiffness})
+    lines += _mapping("armature", _by_joint(model, model.armature))
+    if effects.friction.any():
+        lines.append(f"friction_speed: {number(effects.friction_speed)}")
+    lines.append(f"characteristic_length: {number(source.characteristic_length)}")
+    if source.max_condition != MAX_CONDITION:
+        lines.append(f"max_condition: {number(source.max_condition)}")
+    return "\n".join(lines) + "\n"
+
+
+def _joints(model: pin.Model) -> list[tuple[int, str]]:
+    return [(index, model.names[index]) for index in range(1, model.njoints)]
+
+
+def _idx_v(model: pin.Model, name: str) -> int:
+    return int(model.joints[model.getJointId(name)].idx_v)
+
+
+def _by_joint(model: pin.Model, array: Array) -> dict[str, Any]:
+    """Return the entries of joints that have some, one number where all are equal."""
+    found: dict[str, Any] = {}
+    for index, name in _joints(model):
+        values = velocities(model, index, array)
+        if values.any():
+            found[name] = values[0] if (values == values[0]).all() else values
+    return found
+
+
+# YAML ---------------------------------------------------------------------------------------------
+
+
+def _list(key: str, entries: Sequence[Mapping[str, Any]]) -> list[str]:
+    return [f"{key}:", *(f"  - {_value(entry)}" for entry in entries)] if entries else []
+
+
+def _mapping(key: str, values: Mapping[str, Any]) -> list[str]:
+    items = [f"  {_value(name)}: {_value(value)}" for name, value in values.items()]
+    return [f"{key}:", *items] if items else []
+
+
+def _value(value: Any) -> str:
+    """Return a value in one line; arrays of one number are that number."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False) if _needs_quotes(value) else value
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_value(k)}: {_value(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.item()
+    if isinstance(value, (Sequence, np.ndarray)):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return number(value)
+
+
+def _needs_quotes(text: str) -> bool:
+    """Return whether a text could be read as something else than this text."""
+    plain = re.fullmatch(r"[A-Za-z_][A-Za-z0-9_./-]*", text)
+    words = ("true", "false", "yes", "no", "on", "off", "null", "nan", "inf", "y", "n")
+    return plain is None or text.lower() in words

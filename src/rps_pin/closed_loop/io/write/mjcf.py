@@ -1,0 +1,153 @@
+"""A mechanism as a MuJoCo file: bodies, joints, inertias, effects, actuators, closures, a home.
+
+Nothing touches: the file has no shapes, or shapes without contact. MuJoCo's dry friction is a
+constraint, not the smooth law of `passive_joint_forces`; its equalities are soft (``solref``).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from lxml import etree
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop.io.write.mjcf_bodies import Bodies, Body
+from rps_pin.closed_loop.io.write.mjcf_closures import add_closures, held_joints
+from rps_pin.closed_loop.io.write.mjcf_inertia import Mending, add_inertial
+from rps_pin.closed_loop.io.write.mjcf_joints import MujocoJoint
+from rps_pin.closed_loop.io.write.numbers import number, numbers, quaternion
+from rps_pin.closed_loop.io.write.source import Source
+
+#: A side on which a joint has no limit, where the other has one; MuJoCo's mjMAXVAL.
+_FAR = 1e10
+#: Time step, s, and the equalities' time constant: the stiffest that MuJoCo's default allows.
+_STEP = 1e-3
+
+
+def mjcf_text(source: Source, mending: Mending) -> str:
+    """Return the MuJoCo file of a mechanism without rows (see `without_rows`).
+
+    Parameters
+    ----------
+    source
+        The mechanism.
+    mending
+        What is done to bodies that MuJoCo does not take.
+
+    Raises
+    ------
+    MechanismError
+        If MuJoCo has no such joint, effect or body; names it.
+    """
+    return _Mjcf(source, mending).text()
+
+
+class _Mjcf:
+    def __init__(self, source: Source, mending: Mending) -> None:
+        self._source, self._model, self._mending = source, source.model, mending
+        self._root = etree.Element("mujoco", model=source.name or "mechanism")
+        self._home: list[Array] = []
+        self._of_velocity: dict[int, MujocoJoint] = {}
+
+    def text(self) -> str:
+        source, root = self._source, self._root
+        q = pin.neutral(self._model) if source.home is None else source.home
+        bodies = Bodies(source, held_joints(source), q)
+        equalities = add_closures(source, bodies, q)
+        etree.SubElement(root, "compiler", angle="radian", autolimits="true")
+        etree.SubElement(
+            root, "option", gravity=numbers(self._model.gravity.linear), timestep=number(_STEP)
+        )
+        default = etree.SubElement(root, "default")
+        etree.SubElement(default, "equality", solref=f"{number(2 * _STEP)} 1")
+        world = etree.SubElement(root, "worldbody")
+        self._fill(world, bodies.world)
+        for section in (equalities.tendon, equalities.equality, self._actuators()):
+            if len(section):
+                root.append(section)
+        if source.home is not None:
+            key = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="home")
+            key.set("qpos", numbers(np.concatenate([np.empty(0), *self._home])))
+        etree.indent(root, space="  ")
+        return str(etree.tostring(root, encoding="unicode")) + "\n"
+
+    def _fill(self, element: Any, body: Body) -> None:
+        for joint, frame in body.joints:
+            self._add_joint(element, joint, frame)
+        if body.joints:
+            add_inertial(element, body.name, body.inertia, self._mending)
+        for name, placement in body.sites.items():
+            etree.SubElement(element, "site", name=name, **_placement(placement))
+        for child in body.children:
+            below = etree.SubElement(
+                element, "body", name=child.name, **_placement(child.placement)
+            )
+            self._fill(below, child)
+
+    def _add_joint(self, element: Any, joint: MujocoJoint, frame: pin.SE3) -> None:
+        self._home.append(joint.coordinates)
+        one = etree.SubElement(element, "joint", name=joint.name, type=joint.kind)
+        if frame.translation.any():
+            one.set("pos", numbers(frame.translation))
+        if joint.axis is not None:
+            one.set("axis", numbers(frame.rotation @ joint.axis))
+        if joint.idx_q is not None:
+            self._add_range(one, joint.idx_q)
+        if joint.idx_v is not None:
+            self._add_effects(one, joint.idx_v)
+            self._of_velocity[joint.idx_v] = joint
+
+    def _add_range(self, one: Any, idx_q: int) -> None:
+        limits = np.array(
+            [self._model.lowerPositionLimit[idx_q], self._model.upperPositionLimit[idx_q]]
+        )
+        if (np.abs(limits) < _FAR).any():
+            one.set("range", numbers(np.clip(limits, -_FAR, _FAR)))
+
+    def _add_effects(self, one: Any, idx_v: int) -> None:
+        effects = self._source.effects
+        for option, array in (
+            ("damping", effects.damping),
+            ("frictionloss", effects.friction),
+            ("armature", self._model.armature),
+            ("stiffness", effects.stiffness),
+        ):
+            if array[idx_v]:
+                one.set(option, number(array[idx_v]))
+        if effects.stiffness[idx_v] and effects.rest[idx_v]:
+            one.set("springref", number(effects.rest[idx_v]))
+
+    def _actuators(self) -> Any:
+        """Return a motor for each coordinate that is driven, in the order of tau."""
+        section = etree.Element("actuator")
+        for name in self._source.actuated:
+            one = self._model.joints[self._model.getJointId(name)]
+            for idx_v in range(one.idx_v, one.idx_v + one.nv):
+                if idx_v in self._of_velocity:
+                    self._add_motors(section, self._of_velocity[idx_v])
+        return section
+
+    def _add_motors(self, section: Any, joint: MujocoJoint) -> None:
+        count = {"ball": 3, "free": 6}.get(joint.kind, 1)
+        for k in range(count):
+            name = joint.name if count == 1 else f"{joint.name}_{k + 1}"
+            motor = etree.SubElement(section, "motor", name=name, joint=joint.name)
+            if count > 1:
+                motor.set("gear", numbers(np.eye(6)[k]))
+            assert joint.idx_v is not None
+            idx_v = joint.idx_v + k
+            limits = [self._model.lowerEffortLimit[idx_v], self._model.upperEffortLimit[idx_v]]
+            if limits[0] < limits[1] and np.abs(limits).max() < _FAR:
+                motor.set("ctrlrange", numbers(limits))
+                motor.set("forcerange", numbers(limits))
+
+
+def _placement(placement: pin.SE3) -> dict[str, str]:
+    found = {}
+    if placement.translation.any():
+        found["pos"] = numbers(placement.translation)
+    if not np.array_equal(placement.rotation, np.eye(3)):
+        found["quat"] = numbers(quaternion(placement.rotation))
+    return found

@@ -1,0 +1,178 @@
+"""A mechanism as a URDF of its tree, and a description of what a URDF cannot say.
+
+==============================  =================================================================
+joint                           in the URDF
+==============================  =================================================================
+revolute, prismatic             the same, with limits, damping and friction
+turn without bounds             ``continuous``
+free-flyer, planar              ``floating``, ``planar``
+spherical, universal            three or two ``revolute`` joints, which the description merges
+translation, Z-Y-X, composite   a row of single joints
+helical, ellipsoid, mimic       refused
+==============================  =================================================================
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from lxml import etree
+
+from rps_pin.closed_loop.io.write.links import Hung, Links
+from rps_pin.closed_loop.io.write.numbers import finite, number, numbers, roll_pitch_yaw
+from rps_pin.closed_loop.io.write.shapes import add_visuals
+from rps_pin.closed_loop.io.write.source import (
+    Names,
+    Source,
+    axes_of,
+    axis_of,
+    is_cardan,
+    kind_of,
+)
+from rps_pin.errors import MechanismError
+
+_TYPES = {
+    "revolute": "revolute",
+    "continuous": "continuous",
+    "prismatic": "prismatic",
+    "planar": "planar",
+    "free": "floating",
+}
+#: Joints that a description merges from several, and the kind it merges them into.
+_MERGED = {"ball": "spherical", "universal": "universal"}
+
+
+def is_whole(joint: Any) -> bool:
+    """Return whether a joint is written as one, rather than as a row of others."""
+    return kind_of(joint) == "ball" or is_cardan(joint)
+
+
+def urdf_text(
+    source: Source, shapes: pin.GeometryModel | None = None
+) -> tuple[str, list[dict[str, Any]]]:
+    """Return the URDF of a tree without rows (see `without_rows`), and the merges it needs.
+
+    Parameters
+    ----------
+    source
+        The mechanism.
+    shapes
+        Shapes of its links, by the joints that move them; none if left out.
+
+    Raises
+    ------
+    MechanismError
+        If a joint is helical; names it.
+    """
+    return _Urdf(source, shapes).text()
+
+
+class _Urdf:
+    def __init__(self, source: Source, shapes: pin.GeometryModel | None) -> None:
+        self._source, self._model, self._shapes = source, source.model, shapes
+        self._links = Links(source.model)
+        self._names = Names(
+            [*source.model.names, *(f.name for f in source.model.frames), *self._links.moved]
+        )
+        self._robot = etree.Element("robot", name=source.name or "mechanism")
+        self._merges: list[dict[str, Any]] = []
+
+    def text(self) -> tuple[str, list[dict[str, Any]]]:
+        for joint in range(self._model.njoints):
+            if joint:
+                self._add_joint(joint)
+            self._add_link(joint)
+        for name, joint_name, below in self._links.fixed:
+            self._joint(joint_name, "fixed", below, name)
+            etree.SubElement(self._robot, "link", name=name)
+        etree.indent(self._robot, space="  ")
+        return str(etree.tostring(self._robot, encoding="unicode")) + "\n", self._merges
+
+    def _add_link(self, joint: int) -> None:
+        link = etree.SubElement(self._robot, "link", name=self._links.moved[joint])
+        body = self._model.inertias[joint]
+        if body.mass or body.inertia.any():
+            inertial = etree.SubElement(link, "inertial")
+            etree.SubElement(inertial, "origin", xyz=numbers(body.lever), rpy="0 0 0")
+            etree.SubElement(inertial, "mass", value=number(body.mass))
+            tensor = body.inertia
+            etree.SubElement(
+                inertial,
+                "inertia",
+                {
+                    f"i{'xyz'[i]}{'xyz'[j]}": number(tensor[i, j])
+                    for i in range(3)
+                    for j in range(i, 3)
+                },
+            )
+        if self._shapes is not None:
+            add_visuals(link, self._shapes, joint)
+
+    def _add_joint(self, joint: int) -> None:
+        name, one = self._model.names[joint], self._model.joints[joint]
+        kind, below, link = kind_of(one), self._links.hung[joint], self._links.moved[joint]
+        if kind in _MERGED:
+            self._add_row(name, kind, one, below, link)
+        elif kind in _TYPES:
+            element = self._joint(name, _TYPES[kind], below, link)
+            if kind in ("revolute", "continuous", "prismatic"):
+                etree.SubElement(element, "axis", xyz=numbers(axis_of(one, self._model.nq)))
+                self._add_limit(element, one.idx_q, one.idx_v, bounded=kind != "continuous")
+                self._add_losses(element, one.idx_v)
+        else:
+            raise MechanismError(f"joint {name!r} ({kind}) cannot be written: URDF has none")
+
+    def _add_row(self, name: str, kind: str, one: Any, below: Hung, link: str) -> None:
+        """Add revolute joints in a row, and the merge that makes one joint of them."""
+        row = []
+        axes = list(np.eye(3)) if kind == "ball" else list(axes_of(one))
+        for place, axis in enumerate(axes):
+            part = self._names.fresh(f"{name}_{place + 1}")
+            last = place == len(axes) - 1
+            moved = link if last else self._names.fresh(f"{part}_link")
+            element = self._joint(part, "revolute", below, moved)
+            etree.SubElement(element, "axis", xyz=numbers(axis))
+            self._add_limit(element, one.idx_q + place, one.idx_v + place, bounded=kind != "ball")
+            if not last:
+                etree.SubElement(self._robot, "link", name=moved)
+            below = Hung(moved, pin.SE3.Identity())
+            row.append(part)
+        self._merges.append({"joints": row, "into": _MERGED[kind], "name": name})
+
+    def _joint(self, name: str, kind: str, below: Hung, link: str) -> Any:
+        joint = etree.SubElement(self._robot, "joint", name=name, type=kind)
+        etree.SubElement(joint, "parent", link=below.link)
+        etree.SubElement(joint, "child", link=link)
+        add_origin(joint, below.placement)
+        return joint
+
+    def _add_limit(self, element: Any, idx_q: int, idx_v: int, *, bounded: bool) -> None:
+        """Add a joint's limits; a missing one is the largest number there is."""
+        model = self._model
+        effort = min(model.upperEffortLimit[idx_v], -model.lowerEffortLimit[idx_v])
+        speed = model.upperVelocityLimit[idx_v]  # Pinocchio's reader has no sign for the lower one
+        limits = {"effort": number(finite(effort)), "velocity": number(finite(speed))}
+        if bounded:
+            limits["lower"] = number(finite(model.lowerPositionLimit[idx_q]))
+            limits["upper"] = number(finite(model.upperPositionLimit[idx_q]))
+        etree.SubElement(element, "limit", limits)
+
+    def _add_losses(self, element: Any, idx_v: int) -> None:
+        effects = self._source.effects
+        damping, friction = effects.damping[idx_v], effects.friction[idx_v]
+        if damping or friction:
+            etree.SubElement(
+                element, "dynamics", damping=number(damping), friction=number(friction)
+            )
+
+
+def add_origin(element: Any, placement: pin.SE3) -> None:
+    """Add an ``origin``, unless it is the identity."""
+    if np.array_equal(placement.homogeneous, np.eye(4)):
+        return
+    angles = (0.0, 0.0, 0.0)
+    if not np.array_equal(placement.rotation, np.eye(3)):
+        angles = roll_pitch_yaw(placement.rotation)
+    etree.SubElement(element, "origin", xyz=numbers(placement.translation), rpy=numbers(angles))

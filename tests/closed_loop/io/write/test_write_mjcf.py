@@ -1,0 +1,219 @@
+"""MuJoCo files, in MuJoCo: masses, forces, residuals and rank are those of the mechanism."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from rps_pin import ClosedLoopModel, InputError, JointEffects, MechanismError
+from tests.closed_loop.io.write.mujoco_agreement import Agreement, agreement
+from tests.closed_loop.random_mechanisms import ALL_KINDS, case
+
+URDF = Path(__file__).resolve().parents[4] / "urdf"
+PACKAGE = sorted(path.stem for path in URDF.glob("*.yaml"))
+JOINTS = ["revolute"] * 3 + [
+    *("prismatic", "ball", "free", "turn", "planar", "translation", "universal", "zyx", "helical")
+]
+#: With these each velocity may have an effect of its own.
+EVEN = ["revolute"] * 3 + ["prismatic", "turn", "translation", "universal", "zyx", "helical"]
+
+
+SOLID = pin.Inertia(1.3, np.array([0.1, -0.2, 0.3]), np.diag([0.2, 0.3, 0.4]))
+
+
+def assert_agrees(found: Agreement) -> None:
+    assert found.gap < 1e-13
+    assert found.rate < 1e-13
+    assert found.mobility == 0
+    assert max(found.mass, found.weight, found.losses) < 1e-12, found
+    assert found.force < 1e-6, found  # differences in time
+
+
+@pytest.mark.parametrize("name", PACKAGE)
+def test_mechanisms_of_the_package(name: str, tmp_path: Path) -> None:
+    mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
+    if name == "rps":  # the paper's platform is no body, and its rods have no mass
+        with pytest.raises(MechanismError, match=r"'leg_1_rod' has a mass of 0 kg"):
+            mechanism.to_mjcf(tmp_path / "m.xml")
+        mechanism = lightest(mechanism)
+    assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
+
+
+def lightest(mechanism: ClosedLoopModel) -> ClosedLoopModel:
+    """The same with a light mass in place of none, and moments that a body can have."""
+    model = pin.Model(mechanism.model)
+    for index in range(1, model.njoints):
+        one = model.inertias[index]
+        moments = np.maximum(np.linalg.eigvalsh(one.inertia), 1e-9)
+        if moments[2] > moments[0] + moments[1] or one.mass == 0:
+            moments[2] = moments[0] + moments[1]
+            model.inertias[index] = pin.Inertia(max(one.mass, 1e-9), one.lever, np.diag(moments))
+    return ClosedLoopModel(model, mechanism.closures, mechanism.actuated, home=mechanism.home)
+
+
+@pytest.mark.parametrize("kind", ALL_KINDS)
+def test_every_closure(kind: str, tmp_path: Path) -> None:
+    for seed in range(3):
+        mechanism = case(seed, kinds=[kind], joints=JOINTS).mechanism
+        assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_damping_springs_and_rotors(seed: int, tmp_path: Path) -> None:
+    mechanism = case(seed, joints=EVEN, effects=True, armature=True).mechanism
+    assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_loops_of_a_plane_with_redundant_rows(seed: int, tmp_path: Path) -> None:
+    mechanism = case(seed, planar=True).mechanism
+    assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
+
+
+@pytest.mark.parametrize("name", [name for name in PACKAGE if name not in ("rps", "delta")])
+def test_read_back_by_the_package(name: str, tmp_path: Path) -> None:
+    mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
+    back = ClosedLoopModel.from_mjcf(mechanism.to_mjcf(tmp_path / "m.xml"))
+    assert back.actuated == mechanism.actuated
+    assert back.describe().mobility == mechanism.describe().mobility
+    driven = list(mechanism.actuated)
+    for what in ("mass_matrix", "gravity_forces"):
+        one = getattr(mechanism, what)(mechanism.home, driven)
+        other = getattr(back, what)(back.home, driven)
+        assert np.abs(one - other).max() < 1e-9 * np.abs(one).max()
+
+
+def test_the_home_is_a_key_frame_and_closed(tmp_path: Path) -> None:
+    mechanism = case(3, kinds=["planar", "universal", "point_on_plane"]).mechanism
+    model = mujoco.MjModel.from_xml_path(str(mechanism.to_mjcf(tmp_path / "m.xml")))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    mujoco.mj_forward(model, data)
+    assert data.nefc > 0
+    assert np.abs(data.efc_pos).max() < 1e-12
+
+
+def four_bar(**changes: object) -> ClosedLoopModel:
+    one = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    options: dict[str, object] = {"home": one.home, "effects": one.effects}
+    return ClosedLoopModel(one.model, one.closures, one.actuated, **(options | changes))
+
+
+def test_limits_motors_and_friction(tmp_path: Path) -> None:
+    model = pin.Model(four_bar().model)
+    model.lowerPositionLimit[:] = [-np.inf, -2.0, -np.inf]
+    model.upperPositionLimit[:] = [np.inf, 3.0, 4.0]
+    model.lowerEffortLimit[:], model.upperEffortLimit[:] = -5.0, 7.0
+    effects = JointEffects.named(model, friction={"crank_joint": 0.4}, damping={"rocker_joint": 2})
+    one = four_bar()
+    mechanism = ClosedLoopModel(model, one.closures, one.actuated, home=one.home, effects=effects)
+    there = mujoco.MjModel.from_xml_path(str(mechanism.to_mjcf(tmp_path / "m.xml")))
+    assert [there.joint(name).limited[0] for name in list(model.names)[1:]] == [0, 1, 1]
+    assert there.joint(model.names[2]).range.tolist() == [-2, 3]
+    assert there.joint(model.names[3]).range.tolist() == [-1e10, 4]
+    assert there.nu == 1
+    assert there.actuator("crank_joint").ctrlrange.tolist() == [-5, 7]
+    assert there.actuator("crank_joint").forcerange.tolist() == [-5, 7]
+    frictions = {n: float(there.joint(n).frictionloss[0]) for n in list(model.names)[1:]}
+    assert frictions == {"crank_joint": 0.4, model.names[2]: 0, "rocker_joint": 0}
+    assert float(there.joint("rocker_joint").damping[0]) == 2
+
+
+def test_a_ball_has_three_motors(tmp_path: Path) -> None:
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Random(), "ball")
+    model.appendBodyToJoint(1, SOLID, pin.SE3.Identity())
+    mechanism = ClosedLoopModel(model, [], ["ball"])
+    there = mujoco.MjModel.from_xml_path(str(mechanism.to_mjcf(tmp_path / "m.xml")))
+    data = mujoco.MjData(there)
+    data.ctrl[:] = [1, 2, 3]
+    mujoco.mj_forward(there, data)
+    assert data.qfrc_actuator.tolist() == [1, 2, 3]
+
+
+def body(inertia: pin.Inertia, joint: object = None, **effects: object) -> ClosedLoopModel:
+    model = pin.Model()
+    model.addJoint(0, joint or pin.JointModelRX(), pin.SE3.Identity(), "joint")
+    model.appendBodyToJoint(1, inertia, pin.SE3.Identity())
+    model.addBodyFrame("arm", 1, pin.SE3.Identity(), 0)
+    given = JointEffects.named(model, **effects)
+    return ClosedLoopModel(model, [], ["joint"], effects=given)
+
+
+POINT = pin.Inertia(2.0, np.array([0.1, 0.2, 0.3]), np.zeros((3, 3)))
+#: A moment that no body has.
+ODD = pin.Inertia(2.0, np.zeros(3), np.diag([1.0, 1.0, 2.5]))
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "said"),
+    [
+        (body(pin.Inertia.Zero()), "link 'arm' has a mass of 0 kg .* --least-mass"),
+        (body(POINT), "link 'arm' has a mass of 2 kg and a least moment of inertia of 0 kg m"),
+        (body(ODD), "link 'arm': no body .* exceeds the sum of the others by 0.5"),
+        (
+            body(SOLID, pin.JointModelSpherical(), damping={"joint": [1, 2, 3]}),
+            "joint 'joint': damping .* MuJoCo has one number for all",
+        ),
+        (
+            body(SOLID, pin.JointModelPlanar(), friction={"joint": 1}),
+            "joint 'joint': friction .* axes of the moving body",
+        ),
+        (body(SOLID, pin.JointModelEllipsoid(1, 2, 3)), "'joint' .Ellipsoid."),
+    ],
+)
+def test_what_mujoco_has_not_is_named(
+    mechanism: ClosedLoopModel, said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(MechanismError) as error:
+        mechanism.to_mjcf(tmp_path / "m.xml")
+    assert re.search(said, str(error.value))
+    assert not list(tmp_path.iterdir())
+
+
+def test_bodies_are_mended_where_asked(tmp_path: Path) -> None:
+    path = tmp_path / "m.xml"
+    body(POINT).to_mjcf(path, least_inertia=1e-6)
+    there = mujoco.MjModel.from_xml_path(str(path))
+    assert there.body("arm").inertia.tolist() == [1e-6] * 3
+    assert float(there.body("arm").mass[0]) == 2
+    body(ODD).to_mjcf(path, mend_inertia=True)
+    assert sorted(mujoco.MjModel.from_xml_path(str(path)).body("arm").inertia) == [1, 1, 2]
+    with pytest.raises(InputError, match="least_mass"):
+        body(POINT).to_mjcf(path, least_mass=-1)
+    with pytest.raises(InputError, match=r"must end in \.xml"):
+        body(POINT).to_mjcf(tmp_path / "m.urdf")
+
+
+def test_links_without_mass_between_two_joints_are_no_bodies(tmp_path: Path) -> None:
+    """A cross and a slide's carriage: three joints of one body, as they turn and slide it."""
+    model = pin.Model()
+    for index, joint in enumerate((pin.JointModelRX(), pin.JointModelPY(), pin.JointModelRZ())):
+        model.addJoint(index, joint, pin.SE3.Random(), f"joint_{index}")
+    model.appendBodyToJoint(3, SOLID, pin.SE3.Identity())
+    mechanism = ClosedLoopModel(model, [], ["joint_0", "joint_1", "joint_2"])
+    path = mechanism.to_mjcf(tmp_path / "m.xml")
+    assert mujoco.MjModel.from_xml_path(str(path)).nbody == 2
+    assert_agrees(agreement(mechanism, path))
+
+
+def test_mujoco_moves_as_the_mechanism_does(tmp_path: Path) -> None:
+    """Its equalities are soft: a second's swing agrees to a thousandth."""
+    mechanism = ClosedLoopModel.load(URDF / "five_bar.yaml")
+    there = mujoco.MjModel.from_xml_path(str(mechanism.to_mjcf(tmp_path / "m.xml")))
+    data = mujoco.MjData(there)
+    mujoco.mj_resetDataKeyframe(there, data, 0)
+    there.opt.timestep = 2e-4
+    while data.time < 0.3:
+        mujoco.mj_step(there, data)
+    run = mechanism.simulate(mechanism.home, duration=0.3)
+    names = list(mechanism.model.names)[1:]
+    found = [float(data.qpos[there.joint(name).qposadr[0]]) for name in names]
+    travelled = np.abs(run.q[-1] - run.q[0]).max()
+    assert travelled > 0.1
+    assert np.abs(run.q[-1] - found).max() < 5e-3 * travelled
