@@ -8,7 +8,13 @@ from typing import Annotated
 
 import typer
 
-from rps_pin.cli.mechanism_options import FileArgument, load_mechanism, shapes_of
+from rps_pin.cli.mechanism_options import (
+    FileArgument,
+    IgnoreLimitsOption,
+    PackagePathOption,
+    load_mechanism,
+    shapes_of,
+)
 
 
 class Format(StrEnum):
@@ -41,6 +47,8 @@ def convert_command(
             help="MuJoCo: lower a moment of inertia that exceeds the sum of the other two.",
         ),
     ] = False,
+    package_path: PackagePathOption = None,
+    ignore_limits: IgnoreLimitsOption = False,
 ) -> None:
     """Write any mechanism for other programs, exactly: closures, joints, inertias, losses, home.
 
@@ -55,13 +63,15 @@ def convert_command(
 
     - `rps-pin convert robot.xml --to urdf -o out` writes *out/robot.urdf* and *out/robot.yaml*
     """
-    mechanism, found = load_mechanism(file)
+    mechanism, found = load_mechanism(file, ignore_limits)
     output.mkdir(parents=True, exist_ok=True)
     if to is Format.URDF:
-        shapes = shapes_of(found, mechanism)
+        shapes, missing = shapes_of(found, mechanism, package_path)
         target = output / f"{found.stem}.urdf"
         description = mechanism.to_urdf(target, shapes=shapes)
         typer.echo(f"wrote {target} and {description}")
+        for note in missing:
+            typer.echo(f"note: {note}", err=True)
         return
     target = mechanism.to_mjcf(
         output / f"{found.stem}.xml",

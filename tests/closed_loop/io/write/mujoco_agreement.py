@@ -197,7 +197,10 @@ def agreement(mechanism: ClosedLoopModel, path: Path, seed: int = 0) -> Agreemen
     still = np.zeros(model.nv)
     u = rng.normal(size=N.shape[1])
     v = N @ u
-    a = mechanism.acceleration(q, v, rng.normal(size=len(mechanism.actuated_indices)))
+    opening = mechanism.loop_errors(q, v, still).acceleration
+    a = N @ rng.normal(size=N.shape[1])
+    if opening.size:
+        a -= np.linalg.lstsq(mechanism.jacobian(q), opening, rcond=None)[0]
     effects = mechanism.effects
     losses = effects.damping * v if effects is not None else 0.0 * v
     twin.data.qvel[:] = T @ u

@@ -10,9 +10,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rps_pin import ClosedLoopModel, InputError, JointEffects, MechanismError
+from rps_pin import (
+    ClosedLoopModel,
+    InputError,
+    JointCoupling,
+    JointEffects,
+    LoopClosure,
+    MechanismError,
+)
 from tests.closed_loop.io.write.mujoco_agreement import Agreement, agreement
-from tests.closed_loop.random_mechanisms import ALL_KINDS, case
+from tests.closed_loop.random_mechanisms import ALL_KINDS, case, random_placement, random_tree
 
 URDF = Path(__file__).resolve().parents[4] / "urdf"
 PACKAGE = sorted(path.stem for path in URDF.glob("*.yaml"))
@@ -63,6 +70,52 @@ def test_every_closure(kind: str, tmp_path: Path) -> None:
         assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
 
 
+@pytest.mark.parametrize("kind", ["spherical", "rigid", "revolute", "planar"])
+def test_closures_at_offsets(kind: str, tmp_path: Path) -> None:
+    """b's closed frame is put where a's is, whatever the frames that are named."""
+    rng = np.random.default_rng(2)
+    model = random_tree(rng, ["revolute"] * 4 + ["free", "ball"], planar=False)
+    q = pin.integrate(model, pin.neutral(model), rng.normal(size=model.nv))
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    a, b = (data.oMf[model.getFrameId(name)] for name in ("body_1", "body_4"))
+    own = random_placement(rng)
+    closure = LoopClosure("body_1", "body_4", kind, placement_a=own, placement_b=b.actInv(a * own))
+    mechanism = ClosedLoopModel(model, [closure], [], home=q)
+    assert mechanism.loop_gap(q) < 1e-12
+    assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
+
+
+def coupled(*couplings: JointCoupling) -> ClosedLoopModel:
+    """Five revolute joints, or more, standing where the couplings hold."""
+    model = random_tree(np.random.default_rng(1), ["revolute"], planar=False)
+    mechanism = ClosedLoopModel(model, couplings, [])
+    q = mechanism.close(np.linspace(0.1, 0.5, model.nq))
+    return ClosedLoopModel(model, couplings, [], home=q)
+
+
+J0, J1, J2, J3, J4 = (f"revolute_{k}" for k in range(5))
+
+
+@pytest.mark.parametrize(
+    "couplings",
+    [
+        [JointCoupling(J0, {J1: 0.5, J2: -2.0, J4: 1.0}, offset=0.1)],
+        [JointCoupling(J1, J3, polynomial=[0.1, 0.5, -0.3, 0.2, 0.1]), JointCoupling(J4, J0, 2.0)],
+        [JointCoupling(J2, {}, offset=0.3), JointCoupling(J0, {J3: -1.5})],
+    ],
+)
+def test_couplings(couplings: list[JointCoupling], tmp_path: Path) -> None:
+    mechanism = coupled(*couplings)
+    assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
+
+
+def test_a_polynomial_above_the_fourth_degree_is_refused(tmp_path: Path) -> None:
+    mechanism = coupled(JointCoupling(J0, J1, name="cam", polynomial=[0, 1, 0, 0, 0, 0.5]))
+    with pytest.raises(MechanismError, match="coupling 'cam' is a polynomial of degree 5"):
+        mechanism.to_mjcf(tmp_path / "m.xml")
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_damping_springs_and_rotors(seed: int, tmp_path: Path) -> None:
     mechanism = case(seed, joints=EVEN, effects=True, armature=True).mechanism
@@ -75,13 +128,19 @@ def test_loops_of_a_plane_with_redundant_rows(seed: int, tmp_path: Path) -> None
     assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
 
 
-@pytest.mark.parametrize("name", [name for name in PACKAGE if name not in ("rps", "delta")])
+UNREAD = ("rps", "delta", "differential", "gripper")
+
+
+@pytest.mark.parametrize("name", [name for name in PACKAGE if name not in UNREAD])
 def test_read_back_by_the_package(name: str, tmp_path: Path) -> None:
     mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
     back = ClosedLoopModel.from_mjcf(mechanism.to_mjcf(tmp_path / "m.xml"))
     assert back.actuated == mechanism.actuated
-    assert back.describe().mobility == mechanism.describe().mobility
+    mobility = mechanism.describe().mobility
+    assert back.describe().mobility == mobility
     driven = list(mechanism.actuated)
+    if len(driven) != mobility:
+        return
     for what in ("mass_matrix", "gravity_forces"):
         one = getattr(mechanism, what)(mechanism.home, driven)
         other = getattr(back, what)(back.home, driven)

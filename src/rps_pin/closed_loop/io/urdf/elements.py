@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -176,11 +177,12 @@ class UrdfFile:
         return self.numbers(element, attribute, 1, None if default is None else [default])[0]
 
     def limit(self, element: Any, attribute: str, default: float) -> float:
-        """Return a limit, which may be infinite."""
+        """Return a limit, which may be infinite; so is the largest number there is."""
         text = get(element, attribute)
         if text is not None and _INFINITE.fullmatch(text.strip()):
             return -math.inf if text.strip().startswith("-") else math.inf
-        return self.number(element, attribute, default)
+        value = self.number(element, attribute, default)
+        return math.copysign(math.inf, value) if abs(value) >= sys.float_info.max else value
 
     def placement(self, element: Any | None) -> pin.SE3:
         """Return the placement in the attributes xyz and rpy or quat_xyzw (or none)."""

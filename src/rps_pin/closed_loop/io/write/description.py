@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.constraints.closures import JointCoupling
+from rps_pin.closed_loop.constraints.closures import JointCoupling, LoopClosure
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
 from rps_pin.closed_loop.io.write.numbers import number
-from rps_pin.closed_loop.io.write.source import Source, coordinates, velocities
+from rps_pin.closed_loop.io.write.source import Source, coordinates, kind_of, velocities
 
 
 def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, Any]]) -> str:
@@ -35,14 +35,16 @@ def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, An
     frames: list[dict[str, Any]] = []
     couplings: list[dict[str, Any]] = []
     for closure in source.closures:
-        entry = {k: v for k, v in vars(closure).items() if v is not None}
-        (couplings if isinstance(closure, JointCoupling) else frames).append(entry)
+        if isinstance(closure, JointCoupling):
+            couplings.append(_coupling(closure))
+        else:
+            frames.append(_closure(closure))
     lines += _list("merge", merges)
     lines += _list("closures", frames)
     lines += _list("couplings", couplings)
     lines.append(f"actuated: {_value(source.actuated)}")
     if source.home is not None:
-        home = {name: coordinates(model, i, source.home) for i, name in _joints(model)}
+        home = {name: _coordinates(model, i, source.home) for i, name in _joints(model)}
         lines += _mapping("home", home)
     lines += _mapping("damping", _by_joint(model, effects.damping))
     lines += _mapping("friction", _by_joint(model, effects.friction))
@@ -62,6 +64,13 @@ def _joints(model: pin.Model) -> list[tuple[int, str]]:
     return [(index, model.names[index]) for index in range(1, model.njoints)]
 
 
+def _coordinates(model: pin.Model, joint: int, q: Array) -> Array:
+    """Return a joint's coordinates as they are read: turns without bounds have an angle."""
+    own = coordinates(model, joint, q)
+    is_turn = kind_of(model.joints[joint]) == "continuous"
+    return np.arctan2(own[1:], own[:1]) if is_turn else own
+
+
 def _idx_v(model: pin.Model, name: str) -> int:
     return int(model.joints[model.getJointId(name)].idx_v)
 
@@ -74,6 +83,27 @@ def _by_joint(model: pin.Model, array: Array) -> dict[str, Any]:
         if values.any():
             found[name] = values[0] if (values == values[0]).all() else values
     return found
+
+
+def _closure(closure: LoopClosure) -> dict[str, Any]:
+    entry = {name: value for name, value in vars(closure).items() if value is not None}
+    for end in ("placement_a", "placement_b"):
+        if end in entry:
+            offset = pin.SE3(np.array(entry[end]))
+            angles = pin.rpy.matrixToRpy(offset.rotation)
+            entry[end] = {"xyz": offset.translation, "rpy": angles}
+    return entry
+
+
+def _coupling(coupling: JointCoupling) -> dict[str, Any]:
+    entry: dict[str, Any] = {"joint": coupling.joint}
+    entry["other" if isinstance(coupling.other, str) else "others"] = coupling.other
+    if coupling.polynomial is not None:
+        entry["polynomial"] = coupling.polynomial
+    else:
+        entry |= {"ratio": coupling.ratio} if isinstance(coupling.other, str) else {}
+        entry["offset"] = coupling.offset
+    return entry | {"name": coupling.name}
 
 
 # YAML ---------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ closure                         in MuJoCo
 ``rigid``                       ``weld`` of two sites
 ``revolute``                    two ``connect``: at the origin, and a length along the axis
 ``distance``                    a spatial tendon between two sites, held at its length
-a coupling                      ``joint``
+a coupling                      ``joint``; of several joints, a fixed tendon held at its length
 the others                      frame b's body is cut in two equal parts that are welded together;
                                 one of them hangs on frame a's body by the joint that the closure
                                 stands for
@@ -32,11 +32,14 @@ from rps_pin.closed_loop.constraints.closures import JointCoupling, LoopClosure
 from rps_pin.closed_loop.constraints.rows import across
 from rps_pin.closed_loop.io.write.mjcf_bodies import Bodies, Body
 from rps_pin.closed_loop.io.write.mjcf_joints import MujocoJoint
-from rps_pin.closed_loop.io.write.numbers import numbers, quaternion
+from rps_pin.closed_loop.io.write.numbers import number, numbers, quaternion
 from rps_pin.closed_loop.io.write.source import Names, Source
+from rps_pin.errors import MechanismError
 
 #: Closures that MuJoCo has no equality for.
 CUT = ("prismatic", "cylindrical", "universal", "planar", "point_on_line", "point_on_plane")
+#: Coefficients of an equality's polynomial.
+_COEFFICIENTS = 5
 #: Mass and moments of a part that is welded to the world, kg and kg m^2: any will do.
 _FIXED_PART = 1.0
 
@@ -59,13 +62,15 @@ class _End:
     placement: pin.SE3
     frame: str
     joint: int
+    offset: bool = False
+    """Whether it stands beside the frame of that name."""
 
 
 def held_joints(source: Source) -> set[int]:
     """Return the joints whose bodies closures hold."""
     model = source.model
     of_frames = [c for c in source.closures if isinstance(c, LoopClosure)]
-    return {int(model.frames[i].parentJoint) for c in of_frames for i in c.frame_ids(model)}
+    return {frame.joint for closure in of_frames for frame in closure.closed_frames(model)}
 
 
 def add_closures(source: Source, bodies: Bodies, q: Array) -> Equalities:
@@ -96,21 +101,21 @@ class _Writer:
         self._cut_bodies()
         for closure in self._source.closures:
             if isinstance(closure, JointCoupling):
-                self._couple(
-                    closure.joint, closure.other, (closure.offset, closure.ratio), closure.name
-                )
+                self._couple(closure)
             else:
                 a, b = self._ends(closure)
                 self._close(closure, a, b)
         for hinge, slide, pitch in self._bodies.screws:
-            self._couple(slide, hinge, (0.0, pitch), f"{hinge}_screw")
+            self._couple(JointCoupling(slide, hinge, pitch, name=f"{hinge}_screw"))
         return self._found
 
     def _ends(self, closure: LoopClosure) -> list[_End]:
-        frames = [self._source.model.frames[i] for i in closure.frame_ids(self._source.model)]
+        names = (closure.frame_a, closure.frame_b)
+        moved = (closure.placement_a is not None, closure.placement_b is not None)
+        frames = closure.closed_frames(self._source.model)
         return [
-            _End(self._bodies.of_joint[f.parentJoint], f.placement, f.name, int(f.parentJoint))
-            for f in frames
+            _End(self._bodies.of_joint[one.joint], one.placement, name, one.joint, offset)
+            for one, name, offset in zip(frames, names, moved, strict=True)
         ]
 
     def _close(self, closure: LoopClosure, a: _End, b: _End) -> None:
@@ -138,21 +143,41 @@ class _Writer:
     def _site(self, end: _End, offset: pin.SE3 = _WHOLE) -> str:
         """Return the site of a frame, or of a placement in it."""
         placement = end.placement * offset
-        if offset is _WHOLE and end.frame in end.body.sites:
+        if offset is _WHOLE and end.frame in end.body.sites and not end.offset:
             return end.frame
         name = self._site_names.fresh(f"{end.frame}_closed")
         end.body.sites[name] = placement
         return name
 
-    def _couple(self, joint: str, other: str, line: Sequence[float], name: str) -> None:
-        etree.SubElement(
-            self._found.equality,
-            "joint",
-            name=self._names.fresh(name),
-            joint1=joint,
-            joint2=other,
-            polycoef=numbers([*line, 0.0, 0.0, 0.0][:5]),
-        )
+    def _couple(self, coupling: JointCoupling) -> None:
+        if len(coupling.others) > 1:
+            self._sum(coupling)
+            return
+        curve = (coupling.constant, *(c for terms in coupling.terms for c in terms))
+        if len(curve) > _COEFFICIENTS:
+            raise MechanismError(
+                f"coupling {coupling.name!r} is a polynomial of degree {len(curve) - 1}; MuJoCo "
+                f"has them up to degree {_COEFFICIENTS - 1}"
+            )
+        joints = {"joint1": coupling.joint}
+        if coupling.others:
+            joints["joint2"] = coupling.others[0]
+        self._equality("joint", coupling.name, curve, **joints)
+
+    def _sum(self, coupling: JointCoupling) -> None:
+        """Hold the sum of joint coordinates that a tendon measures; it is 0 at zero coordinates."""
+        tendon = self._tendon_names.fresh(coupling.name)
+        total = etree.SubElement(self._found.tendon, "fixed", name=tendon)
+        etree.SubElement(total, "joint", joint=coupling.joint, coef="1")
+        for other, (ratio,) in zip(coupling.others, coupling.terms, strict=True):
+            etree.SubElement(total, "joint", joint=other, coef=number(-ratio))
+        self._equality("tendon", coupling.name, [coupling.constant], tendon1=tendon)
+
+    def _equality(self, kind: str, name: str, curve: Sequence[float], **parts: str) -> None:
+        """Add an equality whose first part is a polynomial of its second, or a constant."""
+        coefficients = numbers([*curve, *[0.0] * _COEFFICIENTS][:_COEFFICIENTS])
+        unique = self._names.fresh(name)
+        etree.SubElement(self._found.equality, kind, name=unique, **parts, polycoef=coefficients)
 
     # Rods -----------------------------------------------------------------------------------------
 
@@ -169,13 +194,7 @@ class _Writer:
         ends = [data.oMi[end.joint].act(end.placement.translation) for end in (a, b)]
         assert closure.distance is not None
         rest = closure.distance - float(np.linalg.norm(ends[1] - ends[0]))
-        etree.SubElement(
-            self._found.equality,
-            "tendon",
-            name=self._names.fresh(closure.name),
-            tendon1=tendon,
-            polycoef=numbers([rest, 0.0, 0.0, 0.0, 0.0]),
-        )
+        self._equality("tendon", closure.name, [rest], tendon1=tendon)
 
     # Bodies that are cut --------------------------------------------------------------------------
 

@@ -19,7 +19,7 @@ Several joints of one body act one after the other, from the parent on, as rows 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -32,6 +32,7 @@ from rps_pin.closed_loop.io.write.source import (
     axis_of,
     coordinates,
     kind_of,
+    pitch_of,
     velocities,
 )
 from rps_pin.errors import MechanismError
@@ -105,7 +106,7 @@ def mujoco_joints(
             return [MujocoJoint(name, turns, axis, angle, None, one.idx_v)], []
         found, screws = [MujocoJoint(name, turns, axis, own, *at)], []
         if kind == "helical":
-            screw = Screw(name, names.fresh(f"{name}_slide"), _pitch(one, model.nq))
+            screw = Screw(name, names.fresh(f"{name}_slide"), pitch_of(one, model.nq))
             found.append(MujocoJoint(screw.slide, "slide", axis, screw.pitch * own))
             screws.append(screw)
         return found, screws
@@ -130,13 +131,6 @@ def mujoco_joints(
             MujocoJoint(name, "ball", None, np.roll(own[3:], 1), None, one.idx_v + 3),
         ], []
     raise MechanismError(f"joint {name!r} ({kind}) cannot be written: MuJoCo has none")
-
-
-def _pitch(joint: Any, nq: int) -> float:
-    data = joint.createData()
-    joint.calc(data, np.zeros(nq))
-    subspace = np.asarray(data.S).reshape(6)
-    return float(subspace[:3] @ subspace[3:])
 
 
 def _slides(source: Source, joint: int, own: Array, names: Names) -> list[MujocoJoint]:

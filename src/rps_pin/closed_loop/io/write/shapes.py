@@ -7,7 +7,7 @@ from typing import Any
 import pinocchio as pin
 from lxml import etree
 
-from rps_pin.closed_loop.io.write.numbers import number, numbers, roll_pitch_yaw
+from rps_pin.closed_loop.io.write.numbers import number, numbers
 
 
 def add_visuals(link: Any, shapes: pin.GeometryModel, joint: int) -> None:
@@ -23,7 +23,7 @@ def add_visuals(link: Any, shapes: pin.GeometryModel, joint: int) -> None:
             visual,
             "origin",
             xyz=numbers(shape.placement.translation),
-            rpy=numbers(roll_pitch_yaw(shape.placement.rotation)),
+            rpy=numbers(pin.rpy.matrixToRpy(shape.placement.rotation)),
         )
         tag, attributes = form
         etree.SubElement(etree.SubElement(visual, "geometry"), tag, attributes)

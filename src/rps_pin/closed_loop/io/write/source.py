@@ -175,6 +175,14 @@ def axis_of(joint: Any, nq: int) -> Array:
     return np.asarray(axis / np.linalg.norm(axis)) + 0.0  # no -0.0
 
 
+def pitch_of(joint: Any, nq: int) -> float:
+    """Return the pitch of a screw, m/rad."""
+    data = joint.createData()
+    joint.calc(data, np.zeros(nq))
+    subspace = np.asarray(data.S).reshape(6)
+    return float(subspace[:3] @ subspace[3:])
+
+
 def axes_of(joint: Any) -> tuple[Array, Array]:
     """Return the two axes of a universal joint."""
     one = joint.extract()

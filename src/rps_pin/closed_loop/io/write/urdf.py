@@ -4,11 +4,12 @@
 joint                           in the URDF
 ==============================  =================================================================
 revolute, prismatic             the same, with limits, damping and friction
-turn without bounds             ``continuous``
+a turn without limits           ``continuous``
 free-flyer, planar              ``floating``, ``planar``
-spherical, universal            three or two ``revolute`` joints, which the description merges
+spherical, universal            three or two revolute joints, which the description merges
 translation, Z-Y-X, composite   a row of single joints
-helical, ellipsoid, mimic       refused
+helical                         ``screw``, of Drake's dialect
+ellipsoid, mimic                refused
 ==============================  =================================================================
 """
 
@@ -21,7 +22,7 @@ import pinocchio as pin
 from lxml import etree
 
 from rps_pin.closed_loop.io.write.links import Hung, Links
-from rps_pin.closed_loop.io.write.numbers import finite, number, numbers, roll_pitch_yaw
+from rps_pin.closed_loop.io.write.numbers import number, numbers
 from rps_pin.closed_loop.io.write.shapes import add_visuals
 from rps_pin.closed_loop.io.write.source import (
     Names,
@@ -30,6 +31,7 @@ from rps_pin.closed_loop.io.write.source import (
     axis_of,
     is_cardan,
     kind_of,
+    pitch_of,
 )
 from rps_pin.errors import MechanismError
 
@@ -39,7 +41,11 @@ _TYPES = {
     "prismatic": "prismatic",
     "planar": "planar",
     "free": "floating",
+    "helical": "screw",
 }
+_DRAKE = "http://drake.mit.edu"
+#: What stands for no limit where URDF demands one, and for a limit of 0, which is read as none.
+_LARGEST, _LEAST = float(np.finfo(np.float64).max), float(np.finfo(np.float64).tiny)
 #: Joints that a description merges from several, and the kind it merges them into.
 _MERGED = {"ball": "spherical", "universal": "universal"}
 
@@ -64,7 +70,7 @@ def urdf_text(
     Raises
     ------
     MechanismError
-        If a joint is helical; names it.
+        If URDF has no such joint; names it.
     """
     return _Urdf(source, shapes).text()
 
@@ -76,7 +82,9 @@ class _Urdf:
         self._names = Names(
             [*source.model.names, *(f.name for f in source.model.frames), *self._links.moved]
         )
-        self._robot = etree.Element("robot", name=source.name or "mechanism")
+        kinds = [kind_of(joint) for joint in list(source.model.joints)[1:]]
+        spaces = {"drake": _DRAKE} if "helical" in kinds else {}
+        self._robot = etree.Element("robot", name=source.name or "mechanism", nsmap=spaces)
         self._merges: list[dict[str, Any]] = []
 
     def text(self) -> tuple[str, list[dict[str, Any]]]:
@@ -116,11 +124,18 @@ class _Urdf:
         if kind in _MERGED:
             self._add_row(name, kind, one, below, link)
         elif kind in _TYPES:
+            if kind == "revolute" and not np.isfinite(self._range(one.idx_q)).any():
+                kind = "continuous"
             element = self._joint(name, _TYPES[kind], below, link)
-            if kind in ("revolute", "continuous", "prismatic"):
+            if kind == "planar":
+                etree.SubElement(element, "axis", xyz="0 0 1")
+            elif kind != "free":
                 etree.SubElement(element, "axis", xyz=numbers(axis_of(one, self._model.nq)))
                 self._add_limit(element, one.idx_q, one.idx_v, bounded=kind != "continuous")
                 self._add_losses(element, one.idx_v)
+            if kind == "helical":
+                pitch = number(2 * np.pi * pitch_of(one, self._model.nq))
+                etree.SubElement(element, f"{{{_DRAKE}}}screw_thread_pitch", value=pitch)
         else:
             raise MechanismError(f"joint {name!r} ({kind}) cannot be written: URDF has none")
 
@@ -132,9 +147,10 @@ class _Urdf:
             part = self._names.fresh(f"{name}_{place + 1}")
             last = place == len(axes) - 1
             moved = link if last else self._names.fresh(f"{part}_link")
-            element = self._joint(part, "revolute", below, moved)
+            bounded = kind != "ball"
+            element = self._joint(part, "revolute" if bounded else "continuous", below, moved)
             etree.SubElement(element, "axis", xyz=numbers(axis))
-            self._add_limit(element, one.idx_q + place, one.idx_v + place, bounded=kind != "ball")
+            self._add_limit(element, one.idx_q + place, one.idx_v + place, bounded=bounded)
             if not last:
                 etree.SubElement(self._robot, "link", name=moved)
             below = Hung(moved, pin.SE3.Identity())
@@ -142,7 +158,8 @@ class _Urdf:
         self._merges.append({"joints": row, "into": _MERGED[kind], "name": name})
 
     def _joint(self, name: str, kind: str, below: Hung, link: str) -> Any:
-        joint = etree.SubElement(self._robot, "joint", name=name, type=kind)
+        tag = f"{{{_DRAKE}}}joint" if kind == "screw" else "joint"
+        joint = etree.SubElement(self._robot, tag, name=name, type=kind)
         etree.SubElement(joint, "parent", link=below.link)
         etree.SubElement(joint, "child", link=link)
         add_origin(joint, below.placement)
@@ -153,11 +170,20 @@ class _Urdf:
         model = self._model
         effort = min(model.upperEffortLimit[idx_v], -model.lowerEffortLimit[idx_v])
         speed = model.upperVelocityLimit[idx_v]  # Pinocchio's reader has no sign for the lower one
-        limits = {"effort": number(finite(effort)), "velocity": number(finite(speed))}
+        limits = {"effort": effort or _LEAST, "velocity": speed or _LEAST}
         if bounded:
-            limits["lower"] = number(finite(model.lowerPositionLimit[idx_q]))
-            limits["upper"] = number(finite(model.upperPositionLimit[idx_q]))
-        etree.SubElement(element, "limit", limits)
+            limits["lower"], limits["upper"] = self._range(idx_q)
+            if limits["lower"] == limits["upper"] == 0:
+                limits["upper"] = _LEAST
+        if bounded or np.isfinite([effort, speed]).any():
+            finite = {name: np.clip(value, -_LARGEST, _LARGEST) for name, value in limits.items()}
+            texts = {name: number(value) for name, value in finite.items()}
+            etree.SubElement(element, "limit", texts)
+
+    def _range(self, idx_q: int) -> tuple[float, float]:
+        """Return a coordinate's lower and upper limit."""
+        model = self._model
+        return float(model.lowerPositionLimit[idx_q]), float(model.upperPositionLimit[idx_q])
 
     def _add_losses(self, element: Any, idx_v: int) -> None:
         effects = self._source.effects
@@ -172,7 +198,5 @@ def add_origin(element: Any, placement: pin.SE3) -> None:
     """Add an ``origin``, unless it is the identity."""
     if np.array_equal(placement.homogeneous, np.eye(4)):
         return
-    angles = (0.0, 0.0, 0.0)
-    if not np.array_equal(placement.rotation, np.eye(3)):
-        angles = roll_pitch_yaw(placement.rotation)
-    etree.SubElement(element, "origin", xyz=numbers(placement.translation), rpy=numbers(angles))
+    angles = numbers(pin.rpy.matrixToRpy(placement.rotation))
+    etree.SubElement(element, "origin", xyz=numbers(placement.translation), rpy=angles)
