@@ -44,7 +44,7 @@ PARTS = (
     Part("clarabel", "clarabel", "shortest times"),
     Part("scipy", "scipy", "solvers, rotations"),
     Part("yourdfpy", "yourdfpy", "writing URDF"),
-    Part("lxml", "lxml", "reading URDF and MJCF"),
+    Part("lxml", "lxml", "reading URDF"),
     Part("trimesh", "trimesh", "meshes"),
     Part("meshcat", "meshcat", "the viewer"),
     Part("tornado", "tornado", "the viewer's server"),
@@ -67,7 +67,7 @@ PARTS = (
     Part("pillow", "PIL", "pictures and films", "pictures"),
     Part("imageio", "imageio", "films", "pictures"),
     Part("imageio-ffmpeg", "imageio_ffmpeg", "films as MP4", "pictures"),
-    Part("mujoco", "mujoco", "only to compare with", ""),
+    Part("mujoco", "mujoco", "reading MuJoCo's files", "mjcf"),
 )
 
 

@@ -227,8 +227,12 @@ class ClosedLoopModel:
     ) -> ClosedLoopModel:
         """Build a mechanism from a MuJoCo file: its path, or its text (which begins with ``<``).
 
-        Its ``equality`` elements (connect, weld, joint) are the closures, its ``actuator`` elements
-        are the actuated joints. MuJoCo itself is not needed.
+        MuJoCo compiles it (``pip install 'rps-pin[mjcf]'``). Its ``equality`` elements (connect,
+        weld, joint, tendon) are the closures; the joints and fixed tendons that its actuators act
+        on are the actuated joints. Coordinates are MuJoCo's ``qpos`` in its order, quaternions as
+        (x, y, z, w), and then the lengths of fixed tendons that have actuators, forces or limits:
+        each is a slide without mass, whose force is the tendon's. What cannot be an actuated joint
+        (an actuator on a site, say) is told in a warning.
 
         Parameters
         ----------
@@ -244,7 +248,9 @@ class ClosedLoopModel:
         Raises
         ------
         InputError, MechanismError
-            As `load`; also for elements that have no counterpart here.
+            As `load`; also for forces and closures that have no counterpart here.
+        RPSPinError
+            If MuJoCo is not installed.
         ClosureError
             As `load`.
         """

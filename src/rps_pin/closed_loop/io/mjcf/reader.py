@@ -1,0 +1,80 @@
+"""A mechanism of an MJCF: tree, closures, actuated joints, effects at joints, home."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rps_pin.closed_loop.constraints.closures import Closure
+from rps_pin.closed_loop.io.mjcf.actuators import Actuator, read_actuators
+from rps_pin.closed_loop.io.mjcf.closures import read_equalities
+from rps_pin.closed_loop.io.mjcf.effects import joint_effects, refuse_other_forces
+from rps_pin.closed_loop.io.mjcf.source import MjcfSource
+from rps_pin.closed_loop.io.mjcf.tendons import Tendons
+from rps_pin.closed_loop.io.mjcf.tree import MjcfTree
+from rps_pin.closed_loop.io.parts import MechanismParts
+
+
+def parts_from_mjcf(
+    path_or_xml: str | os.PathLike[str],
+    *,
+    actuated: Sequence[str] | None = None,
+    closures: Sequence[Closure] = (),
+) -> MechanismParts:
+    """Read a mechanism from an MJCF: a file's path, or its text (which begins with ``<``).
+
+    MuJoCo compiles the file. The home configuration is that of the key frame called ``home``, or
+    else ``qpos0``. What is in the file and is not part of the mechanism (actuators on sites, say)
+    is told in a warning; contacts, sensors and appearance are not mentioned.
+
+    Parameters
+    ----------
+    path_or_xml
+        The file, or its text.
+    actuated
+        Names of the actuated joints. Left out, those joints and fixed tendons that the file's
+        actuators act on, in their order.
+    closures
+        Further closures; they come after those of the file's ``equality`` elements.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    MechanismError
+        If MuJoCo refuses it, or it has forces or closures that are not read here; with the line.
+    RPSPinError
+        If MuJoCo is not installed (``rps-pin[mjcf]``).
+    """
+    source = MjcfSource(path_or_xml)
+    refuse_other_forces(source)
+    asked = (actuated,) if isinstance(actuated, str) else tuple(actuated or ())
+    actuators = read_actuators(source)
+    tree = MjcfTree(source)
+    tendons = Tendons(tree, {one.target for one in actuators if one.kind == "tendons"}, asked)
+    equalities = read_equalities(tree, tendons)
+    effects: Mapping[str, Any] = joint_effects(tree, tendons, actuators)
+    driven = asked if actuated is not None else _driven(tree, tendons, actuators)
+    home = tree.add_key_frames()
+    for what, places in source.told.items():
+        warnings.warn(f"{'; '.join(places)}: {what}", UserWarning, stacklevel=3)
+    return MechanismParts(
+        tree.model,
+        (*equalities, *tendons.couplings, *closures),
+        driven,
+        home,
+        **effects,
+        name=source.name,
+    )
+
+
+def _driven(tree: MjcfTree, tendons: Tendons, actuators: Sequence[Actuator]) -> tuple[str, ...]:
+    """Return the joints that actuators act on, each once, in the order of the actuators."""
+    names = [
+        tendons.names[one.target] if one.kind == "tendons" else tree.joints[one.target]
+        for one in actuators
+        if one.active
+    ]
+    return tuple(dict.fromkeys(names))

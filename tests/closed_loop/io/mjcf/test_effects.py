@@ -1,0 +1,121 @@
+"""Damping, dry friction and springs of joints, what switches them off, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rps_pin import MechanismError
+from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
+from tests.closed_loop.io.mjcf.twin import BODY, Twin, fourbar, mujoco_file
+from tests.each import each
+from tests.worst import worst
+
+DEFAULTS = """<default><joint axis="0 1 0" damping="0.3" armature="0.01"/>
+    <geom type="box" size="0.1 0.2 0.3" quat="1 1 0 0"/><site pos="0.1 0 0"/>
+    <default class="arm"><joint damping="2" frictionloss="0.4"/><geom size="0.2" euler="10 0 0"/>
+      <default class="hand"><joint type="slide" stiffness="3" springref="0.2"/></default>
+    </default></default>"""
+
+
+def defaults(*others: str) -> str:
+    return mujoco_file(
+        """<body name="a" childclass="arm"><joint name="ja"/><geom/>
+          <body name="b"><joint name="jb" class="hand"/><geom class="main"/><site name="s"/>
+            <body name="c" childclass="hand"><joint name="jc" range="-1 2"/><geom/></body></body>
+        </body><body name="e"><joint name="je" stiffness="2" springref="30"/><geom/></body>
+        <body name="f"><joint name="jf" springdamper="0.1 1"/><geom/></body>""",
+        DEFAULTS,
+        *others,
+    )
+
+
+def flags(**values: str) -> str:
+    words = " ".join(f'{name}="{value}"' for name, value in values.items())
+    return f"<option><flag {words}/></option>"
+
+
+@each(
+    "settings",
+    [
+        "",
+        flags(spring="disable"),
+        flags(damper="disable"),
+        flags(spring="disable", damper="disable"),
+    ],
+)
+def test_springs_and_dampers_are_mujocos(settings: str) -> None:
+    twin = Twin(defaults(settings))
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        twin.random(rng)
+        own, right = twin.passive()
+        assert worst(own - right) < 1e-12 * max(1.0, worst(right))
+        assert (worst(right) == 0) == ("spring" in settings and "damper" in settings)
+
+
+@each(("settings", "friction"), [("", 0.4), (flags(frictionloss="disable"), None)])
+def test_dry_friction_is_mujocos(settings: str, friction: float | None) -> None:
+    found = parts_from_mjcf(defaults(settings)).friction
+    assert found == ({} if friction is None else dict.fromkeys(("ja", "jb", "jc"), friction))
+
+
+def test_damping_of_balls_and_free_joints_is_mujocos() -> None:
+    text = mujoco_file(
+        BODY.replace('"j"', '"j" type="ball" damping="0.3"')
+        + BODY.replace('"b"', '"c"').replace('"j"', '"k" type="free" damping="0.7"')
+    )
+    twin = Twin(text)
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        twin.random(rng)
+        assert worst(twin.passive()[0] - twin.passive()[1]) < 1e-12
+
+
+MEDIUM = "forces of a medium are not read; a mechanism in vacuum has 0"
+FLEX = """<body><joint axis="0 1 0"/><geom size="0.1"/></body>
+    <flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" radius=".01" dim="2"/>"""
+
+
+def joint(options: str) -> str:
+    return mujoco_file(BODY.replace('"j"', f'"j" {options}'))
+
+
+REFUSED: dict[str, Any] = {
+    "density": (mujoco_file(BODY, '<option density="1.2"/>'), "option has density = 1.2: "),
+    "viscosity": (mujoco_file(BODY, '<option viscosity="0.1"/>'), MEDIUM),
+    "flex": (mujoco_file(FLEX), "flexcomp is flexible, which is not read"),
+    "spring of a ball": (
+        joint('type="ball" stiffness="1"'),
+        "joint 'j' has a spring on several coordinates",
+    ),
+    "spring of a free joint": (
+        joint('type="free" stiffness="1"'),
+        "joint 'j' has a spring on several coordinates",
+    ),
+    "stiffness": (joint('stiffness="1 2"'), "joint 'j' has a stiffness that is not linear"),
+    "damping": (joint('damping="1 2"'), "joint 'j' has a damping that is not linear"),
+    "negative": (joint('damping="-1"'), "joint 'j' has a negative damping"),
+    "yield": (joint('stiffness="1" springyield="3"'), "joint 'j' has a spring that yields"),
+    "armature": (joint('armature="-1"'), "joint 'j' has a negative armature"),
+}
+
+
+@each(("text", "why"), REFUSED.values(), ids=REFUSED)
+def test_forces_that_are_not_read_are_refused_with_their_line(text: str, why: str) -> None:
+    with pytest.raises(MechanismError, match=rf"the MJCF text, line \d: .*{why}"):
+        parts_from_mjcf(text)
+
+
+def test_no_medium_acts_where_all_passive_forces_are_off() -> None:
+    off = flags(spring="disable", damper="disable")
+    text = mujoco_file(BODY, '<option density="1.2"/>', off)
+    twin = Twin(text)
+    twin.random(np.random.default_rng(0))
+    assert not twin.d.qfrc_passive.any()
+
+
+def test_wind_without_a_medium_is_nothing() -> None:
+    assert parts_from_mjcf(fourbar('<option wind="1 2 3"/>')).model.nv == 3

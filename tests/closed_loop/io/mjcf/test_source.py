@@ -1,0 +1,192 @@
+"""Files that MuJoCo refuses, included and attached files, and the lines that messages name."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rps_pin import ClosedLoopModel, InputError, MechanismError
+from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
+from tests.closed_loop.io.mjcf.twin import BODY, fourbar, mujoco_file, read
+from tests.each import each
+
+BAD = 'stiffness="1 2"'
+WHY = "a stiffness that is not linear"
+
+
+@each(
+    ("text", "why"),
+    [
+        ("<robot/>", "its root element is <robot>, not <mujoco>"),
+        ("<mujocoinclude/>", "its root element is <mujocoinclude>"),
+        ("<!DOCTYPE mujoco []><mujoco/>", "declares a document type"),
+        ("<mujoco/>", "has no joints"),
+        ("<mujoco", "is not a valid MJCF"),
+        ("<mujoco>" + "<body>" * 5000 + "</body>" * 5000 + "</mujoco>", "is not a valid MJCF"),
+        (mujoco_file(BODY.replace("axis", "axi")).replace("name=", "nam=", 1), "line 1"),
+        (mujoco_file(BODY, "\n<equaliti/>"), "unrecognized element Element 'equaliti', line 2"),
+        (mujoco_file(BODY.replace('mass="1.3"', 'mass="1_3"')), "bad format in attribute 'mass'"),
+        (mujoco_file(BODY.replace('"j"', '"j" class="x"')), "'x'"),
+        (fourbar('<equality><weld body1="crnk"/></equality>'), "unknown element 'crnk'"),
+        (fourbar('<actuator><motor joint="j9"/></actuator>'), "'j9'"),
+        (mujoco_file(BODY, '<include file="none.xml"/>'), "Error opening file 'none.xml'"),
+        (fourbar('<keyframe><key qpos="1 2 3 4"/></keyframe>'), "invalid qpos size, expected 3"),
+    ],
+)
+def test_what_mujoco_refuses_is_refused_with_its_reason(text: str, why: str) -> None:
+    with pytest.raises(MechanismError) as caught:
+        parts_from_mjcf(text)
+    assert why in str(caught.value)
+    assert str(caught.value).startswith("the MJCF text ")
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"cannot read the MJCF .*none\.xml: No such file"):
+        parts_from_mjcf(tmp_path / "none.xml")
+    (tmp_path / "binary.xml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match=r"binary\.xml: not a UTF-8 text"):
+        parts_from_mjcf(tmp_path / "binary.xml")
+
+
+def test_text_that_only_mujoco_takes_is_taken() -> None:
+    """Two hyphens in a comment, a version of XML that there is not, a byte-order mark."""
+    text = mujoco_file(BODY, "<!-- a -- b -->")
+    assert parts_from_mjcf(f'\ufeff<?xml version="0.0"?>{text}').model.nv == 1
+
+
+def test_nothing_is_written_where_the_program_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MuJoCo writes its warnings to a file there."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(MechanismError, match="mass and inertia of moving bodies"):
+        parts_from_mjcf(mujoco_file(BODY.replace('mass="1.3"', 'mass="nan"')))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_warnings_of_mujoco_are_told() -> None:
+    """Two joints about one axis without rotors: a singular mass matrix."""
+    text = mujoco_file(BODY.replace("<joint", '<joint name="k"/><joint'))
+    _, told = read(text)
+    assert len(told) == 1
+    assert told[0].startswith("the MJCF text: MuJoCo warns: Inertia matrix is too close to sing")
+
+
+# Lines --------------------------------------------------------------------------------------------
+
+
+@each(
+    ("text", "where"),
+    [
+        (mujoco_file("\n" + BODY.replace('"j"', f'"j" {BAD}')), "line 2: joint 'j'"),
+        (mujoco_file("\n\n" + BODY.replace('name="j"', BAD)), "line 3: joint has"),
+        (
+            mujoco_file(BODY, f'<default>\n<default class="x">\n<joint {BAD}/></default></default>')
+            .replace("<body", "\n<body")
+            .replace('"j"', '"j" class="x"'),
+            "line 4: joint 'j'",
+        ),
+        (
+            mujoco_file(
+                f'\n<replicate count="2">\n{BODY.replace("<joint", f"<joint {BAD}")}'
+            ).replace("</worldbody>", "</replicate></worldbody>"),
+            "line 3: joint 'j0'",
+        ),
+        (mujoco_file(f"\n<frame>\n{BODY}</frame>").replace('"j"', f'"j" {BAD}'), "line 3: joint"),
+    ],
+)
+def test_the_line_is_that_of_the_element(text: str, where: str, tmp_path: Path) -> None:
+    with pytest.raises(MechanismError, match=f"the MJCF text, {where}.*{WHY}"):
+        parts_from_mjcf(text)
+    file = tmp_path / "robot.xml"
+    file.write_text(text)
+    with pytest.raises(MechanismError, match=rf"robot\.xml, {where}.*{WHY}"):
+        parts_from_mjcf(file)
+
+
+def written(folder: Path, **files: str) -> Path:
+    for name, text in files.items():
+        path = folder / f"{name.replace('__', '/')}.xml"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+    return folder / "main.xml"
+
+
+def test_lines_of_included_files_are_theirs(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        main='<mujoco><include file="parts/one.xml"/></mujoco>',
+        parts__one='<mujoco>\n<include file="two.xml"/></mujoco>',
+        parts__two=mujoco_file("\n\n\n" + BODY.replace('"j"', f'"j" {BAD}')),
+    )
+    with pytest.raises(MechanismError, match=rf"two\.xml, line 4: joint 'j' has {WHY}"):
+        parts_from_mjcf(path)
+
+
+def test_lines_of_elements_without_names_in_included_files_are_theirs(tmp_path: Path) -> None:
+    two = BODY.replace(' name="j"', "") + BODY.replace(' name="j"', f" {BAD}")
+    path = written(
+        tmp_path,
+        main=f'<mujoco><include file="one.xml"/><worldbody>\n{BODY}</worldbody></mujoco>',
+        one=mujoco_file(two.replace(' name="b"', "").replace("<body", "\n<body")),
+    )
+    with pytest.raises(MechanismError, match=rf"one\.xml, line 3: joint has {WHY}"):
+        parts_from_mjcf(path)
+
+
+def test_lines_of_attached_files_are_theirs(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        main="""<mujoco><asset><model name="leg" file="leg.xml"/></asset><worldbody>
+            <body name="b"><joint name="other"/><geom size="1"/></body>
+            <attach model="leg" body="b" prefix="left_"/></worldbody></mujoco>""",
+        leg=mujoco_file("\n\n\n\n" + BODY.replace('"j"', f'"j" {BAD}')),
+    )
+    with pytest.raises(MechanismError, match=rf"leg\.xml, line 5: joint 'left_j' has {WHY}"):
+        parts_from_mjcf(path)
+
+
+def test_a_setting_is_named_where_it_stands(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        main=mujoco_file(BODY, '<option gravity="0 0 1"/><include file="more.xml"/>'),
+        more='<mujoco>\n\n<option density="3"/></mujoco>',
+    )
+    with pytest.raises(MechanismError, match=r"more\.xml, line 3: option has density = 3"):
+        parts_from_mjcf(path)
+
+
+# MuJoCo itself ------------------------------------------------------------------------------------
+
+
+def test_without_mujoco_a_sentence_names_the_extra(tmp_path: Path) -> None:
+    """In a process of its own: the package itself is imported without MuJoCo."""
+    path = written(tmp_path, main=mujoco_file(BODY))
+    program = f"""
+import sys
+sys.modules["mujoco"] = None
+from rps_pin import ClosedLoopModel, RPSPinError
+try:
+    ClosedLoopModel.from_mjcf({str(path)!r})
+except RPSPinError as error:
+    print(error)
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert run.stdout == "MuJoCo's files are read by MuJoCo: pip install 'rps-pin[mjcf]'\n"
+
+
+def test_importing_the_package_does_not_import_mujoco() -> None:
+    program = "import sys, rps_pin; rps_pin.ClosedLoopModel; print('mujoco' in sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert run.stdout == "False\n"
+
+
+def test_the_name_is_the_models() -> None:
+    assert ClosedLoopModel.from_mjcf(mujoco_file(BODY)).name == "m"
