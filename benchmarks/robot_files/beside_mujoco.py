@@ -176,7 +176,7 @@ class Twin:
                 found[int(place)] = model.qpos0[place] + model.eq_data[row][0]
         return found
 
-    def _put(self, q: Array) -> Array:
+    def put(self, q: Array) -> Array:
         """Set qpos; return P with MuJoCo's velocity = P times Pinocchio's."""
         tree, model, data = self.mechanism.model, self.model, self.data
         mujoco.mj_resetData(model, data)
@@ -201,7 +201,7 @@ class Twin:
 
     def mass_and_forces(self, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
         """Return the mass matrix and the forces of a motion in Pinocchio's coordinates."""
-        transform = self._put(q)
+        transform = self.put(q)
         model, data = self.model, self.data
         off = mujoco.mjtDisableBit.mjDSBL_EQUALITY
         model.opt.disableflags |= off
@@ -221,7 +221,7 @@ class Twin:
 
     def equalities(self, q: Array) -> tuple[Array, Array]:
         """Return residual and Jacobian of the equalities between joints that move."""
-        transform = self._put(q)
+        transform = self.put(q)
         model, data = self.model, self.data
         mujoco.mj_fwdPosition(model, data)
         kinds = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
