@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from rps_pin import ClosedLoopModel, RPSRobot, SingularityError
+from rps_pin import ClosedLoopModel, RPSRobot
 from rps_pin.closed_loop.dynamics.inverse_dynamics import NullSpaceSolution, null_space_solution
 from rps_pin.numerics.linear_algebra import Decomposition, null_space
 from tests import strategies
@@ -78,10 +78,13 @@ def test_what_too_few_actuators_leave_is_told() -> None:
     assert np.linalg.norm(remaining) > 0.1
 
 
-def test_actuators_that_cannot_move_the_mechanism_are_refused() -> None:
+def test_actuators_that_cannot_move_the_mechanism_leave_a_residual_force() -> None:
     """One coordinate, held by the closure, is driven; the free one is not."""
-    with pytest.raises(SingularityError):
-        solution(np.array([[1.0, 0.0]]), np.array([0]), np.ones(2), np.ones(2))
+    jacobian, force = np.array([[1.0, 0.0]]), np.array([2.0, 3.0])
+    tau, multipliers, remaining = solution(jacobian, np.array([0]), force, np.ones(2))
+    assert tau == 0.0  # which the closure carries in any case
+    np.testing.assert_allclose(multipliers, [2.0], rtol=1e-15)
+    np.testing.assert_allclose(remaining, [0.0, 3.0], rtol=1e-15)
 
 
 # The solutions agree ------------------------------------------------------------------------------

@@ -16,15 +16,12 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.assembly.closing import close
+from rps_pin.closed_loop import kinematics
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
-from rps_pin.closed_loop.kinematics import allowed_motions
-from rps_pin.errors import ClosureError
-from rps_pin.numerics.linear_algebra import rank, singular_values
-
-#: Where a regular configuration is looked for: so many random steps of this length (rad).
-_TRIES, _STEP = 10, 0.15
+from rps_pin.closed_loop.freedoms import Freedom, freedoms, left_open, open_motions
+from rps_pin.closed_loop.regular import actuated_rank, regular_near
+from rps_pin.numerics.linear_algebra import Decomposition, rank, singular_values
 
 _JOINT_KINDS = {
     "JointModelR": "revolute",
@@ -59,7 +56,8 @@ class JointDescription(NamedTuple):
     kind: str
     nq: int
     nv: int
-    actuated: bool
+    actuated: int
+    """How many of its velocities are driven."""
     lower: tuple[float, ...]
     """Limits of its coordinates, rad or m; ``-inf`` and ``inf`` where there are none."""
     upper: tuple[float, ...]
@@ -109,12 +107,15 @@ class MechanismDescription:
         Joints' names.
     actuated_velocities, actuated_rank : int
         How many velocities are driven, and how many allowed motions they determine.
+    idle, lacking : tuples of Freedom
+        Idle freedoms (see `freedoms`), and motions that no actuator drives though something needs
+        them; each with its size, joints and links.
     actuation : str
-        ``"sufficient"``: as many as the mobility, and they determine the motion; ``"redundant"``:
-        more than that; ``"underactuated"``: mobility - actuated_rank motions have no actuator.
+        ``"sufficient"``: the actuators determine all but idle freedoms, and none is superfluous;
+        ``"redundant"``: some are; ``"underactuated"``: there are `lacking` motions.
         (Compares equal to ``"lacking"``, its former name, too.)
     condition : float
-        Condition number of the passive joints' Jacobian there.
+        Condition number of the passive joints' Jacobian there, idle freedoms left out.
     notes : tuple of str
         What the reader of its file has decided.
     """
@@ -133,6 +134,8 @@ class MechanismDescription:
     actuated_rank: int
     condition: float
     notes: tuple[str, ...] = ()
+    idle: tuple[Freedom, ...] = ()
+    lacking: tuple[Freedom, ...] = ()
 
     @property
     def mobility(self) -> int:
@@ -152,9 +155,9 @@ class MechanismDescription:
     @property
     def actuation(self) -> Actuation:
         """``"sufficient"``, ``"redundant"`` or ``"underactuated"``."""
-        if self.actuated_rank < self.mobility:
+        if self.lacking:
             return Actuation("underactuated")
-        redundant = self.actuated_velocities > self.mobility
+        redundant = self.actuated_velocities > self.actuated_rank
         return Actuation("redundant" if redundant else "sufficient")
 
     def as_dict(self) -> dict[str, Any]:
@@ -164,10 +167,7 @@ class MechanismDescription:
         return {name: _plain(getattr(self, name)) for name in names}
 
     def __str__(self) -> str:
-        joints = [
-            (j.name, j.kind, "actuated" if j.actuated else "passive", _limits(j))
-            for j in self.joints
-        ]
+        joints = [(j.name, j.kind, _driven(j), _limits(j)) for j in self.joints]
         closures = [
             (c.name, c.kind, c.ends(), f"{c.rows} ({c.needed} needed)") for c in self.closures
         ]
@@ -184,6 +184,8 @@ class MechanismDescription:
             + " ".join(f"{value:.3g}" for value in self.singular_values),
             f"condition number of the passive joints' part: {self.condition:.4g}",
         ]
+        lines += [f"idle: {_in_words(freedom)}" for freedom in self.idle]
+        lines += [f"without actuator: {_in_words(freedom)}" for freedom in self.lacking]
         if self.home_is_singular:
             lines.append("the home configuration is singular: all this holds next to it")
         lines += [f"note: {note}" for note in self.notes]
@@ -191,14 +193,17 @@ class MechanismDescription:
 
     def verdict(self) -> str:
         """Return the actuation in words."""
-        driven, left = self.actuated_velocities, self.mobility - self.actuated_rank
+        driven, left = self.actuated_velocities, sum(freedom.size for freedom in self.lacking)
         if not driven:
             return f"{self.actuation}: nothing driven"
         if self.actuation == "underactuated":
             return f"underactuated: {left} of {self.mobility} motions have no actuator"
+        idle = sum(freedom.size for freedom in self.idle)
+        beside = f", {_counted(idle, 'idle freedom')}" if idle else ""
         if self.actuation == "redundant":
-            return f"redundant: {driven} actuators, {driven - self.mobility} more than needed"
-        return f"sufficient: {driven} actuator{'s' if driven > 1 else ''}"
+            more = driven - self.actuated_rank
+            return f"redundant: {driven} actuators, {more} more than needed{beside}"
+        return f"sufficient: {_counted(driven, 'actuator')}{beside}"
 
 
 def describe(
@@ -209,55 +214,34 @@ def describe(
     notes: tuple[str, ...] = (),
 ) -> MechanismDescription:
     """Return the description of a mechanism at q, or at a regular configuration near home."""
-    at, singular = (q, False) if q is not None else _regular(system, home())
+    at, singular = (q, False) if q is not None else regular_near(system, home())
     model, equations, actuated = system.model, system.equations, system.actuated
     jacobian = equations.jacobian(at).copy()
     scaled = system.scaled(jacobian)
-    values = singular_values(scaled)
-    motions = allowed_motions(system, jacobian)[actuated]
-    motions = motions / system.column_scale[actuated][:, None]
-    found = rank(values)
+    factors = Decomposition(scaled)
+    motions = open_motions(system, at, left_open(system, jacobian, actuated))
     return MechanismDescription(
         name=name,
-        joints=tuple(_joint(model, i, system.actuated_names) for i in range(1, model.njoints)),
-        closures=tuple(_closure(system, c, scaled, found) for c in equations.closures),
+        joints=tuple(_joint(system, i) for i in range(1, model.njoints)),
+        closures=tuple(_closure(system, c, scaled, factors.rank) for c in equations.closures),
         configuration=at,
         home_is_singular=singular,
         nv=model.nv,
         rows=equations.size,
-        rank=found,
-        singular_values=values,
+        rank=factors.rank,
+        singular_values=factors.values,
         actuated=system.actuated_names,
         actuated_velocities=actuated.size,
-        actuated_rank=rank(singular_values(motions)),
-        condition=system.condition(jacobian),
+        actuated_rank=actuated_rank(system, factors),
+        condition=kinematics.condition(system, at, jacobian),
+        idle=freedoms(system, at, motions.idle),
+        lacking=freedoms(system, at, motions.lacking),
         notes=notes,
     )
 
 
-def _regular(system: ConstraintSystem, home: Array) -> tuple[Array, bool]:
-    """Return a closed configuration near home of the largest rank met, and if home's is lower."""
-    q, rng = home, np.random.default_rng(0)
-    places, ranks = [home], [_rank_at(system, home)]
-    for _ in range(_TRIES):
-        motions = allowed_motions(system, system.equations.jacobian(q))
-        step = _STEP * rng.normal(size=motions.shape[1]) * system.equations.length
-        moved = pin.integrate(system.model, q, motions @ step)
-        try:
-            q = close(system, system.normalised(moved, "q"), restarts=0)
-        except ClosureError:  # a step too far: go on from where it stood
-            continue
-        places.append(q)
-        ranks.append(_rank_at(system, q))
-    best = int(np.argmax(ranks))
-    return places[best], ranks[0] < ranks[best]
-
-
-def _rank_at(system: ConstraintSystem, q: Array) -> int:
-    return rank(singular_values(system.scaled(system.equations.jacobian(q))))
-
-
-def _joint(model: pin.Model, index: int, actuated: tuple[str, ...]) -> JointDescription:
+def _joint(system: ConstraintSystem, index: int) -> JointDescription:
+    model = system.model
     joint = model.joints[index]
     name, short = model.names[index], joint.shortname()
     bounds = np.array([model.lowerPositionLimit, model.upperPositionLimit])
@@ -266,7 +250,9 @@ def _joint(model: pin.Model, index: int, actuated: tuple[str, ...]) -> JointDesc
     bounded = joint.nq == joint.nv  # quaternions and full turns have none
     bounded = bounded & (np.abs(bounds) < 0.5 * np.finfo(np.float64).max)
     limits = np.where(bounded, bounds, [[-np.inf], [np.inf]]).tolist()
-    return JointDescription(name, kind, joint.nq, joint.nv, name in actuated, *map(tuple, limits))
+    own = np.arange(joint.idx_v, joint.idx_v + joint.nv)
+    driven = int(np.isin(own, system.actuated).sum())
+    return JointDescription(name, kind, joint.nq, joint.nv, driven, *map(tuple, limits))
 
 
 def _closure(
@@ -298,13 +284,29 @@ def _plain(value: Any) -> Any:
     """Return a value of a description as plain data; infinities and NaN as None."""
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
-    if isinstance(value, (JointDescription, ClosureDescription)):
+    if isinstance(value, (JointDescription, ClosureDescription, Freedom)):
         return {name: _plain(part) for name, part in value._asdict().items()}
     if isinstance(value, (list, tuple)):
         return [_plain(part) for part in value]
     if isinstance(value, float):
         return value if np.isfinite(value) else None
     return str(value) if isinstance(value, str) else value
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" + ("" if number == 1 else "s")
+
+
+def _driven(joint: JointDescription) -> str:
+    if 0 < joint.actuated < joint.nv:
+        return f"{joint.actuated} of {joint.nv} actuated"
+    return "actuated" if joint.actuated else "passive"
+
+
+def _in_words(freedom: Freedom) -> str:
+    """Return what moves in a freedom."""
+    links = ", ".join(freedom.links)
+    return f"{_counted(freedom.size, 'motion')} of {links} (joints: {', '.join(freedom.joints)})"
 
 
 def _limits(joint: JointDescription) -> str:

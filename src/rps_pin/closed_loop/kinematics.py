@@ -11,6 +11,7 @@ import numpy as np
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.closed_loop.freedoms import in_words, left_open, open_motions
 from rps_pin.errors import ClosureError, SingularityError
 from rps_pin.numerics import linear_algebra
 
@@ -32,19 +33,81 @@ def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
             return actuated_basis(system, solved)
     motions = allowed_motions(system, jacobian)
     of_chosen = motions[chosen]
+    if of_chosen.shape[0] < of_chosen.shape[1]:
+        return _basis_without_idle(system, q, jacobian, chosen)
     if of_chosen.shape[0] != of_chosen.shape[1]:
-        raise SingularityError(
-            f"{of_chosen.shape[0]} independent velocities are named, for a mobility of "
-            f"{of_chosen.shape[1]} at this configuration",
-            np.inf,
-            system.max_condition,
-        )
+        reason = _named(*of_chosen.shape)
+        raise SingularityError(reason, np.inf, system.max_condition)
     # N is orthonormal in one unit: joints that take part in all motions have a block of size 1.
     scale = system.column_scale[chosen]
     reason = "these joints do not determine the motion here"
     scaled = of_chosen / scale[:, None]
     solved = linear_algebra.solve_transposed(scaled, motions.T, system.max_condition, reason)
     return solved.T / scale
+
+
+def _basis_without_idle(
+    system: ConstraintSystem, q: Array, jacobian: Array, chosen: Indices
+) -> Array:
+    """Return T where only idle freedoms are left open, of least norm: J_r T_r = -J_c."""
+    named = _named(chosen.size, allowed_motions(system, jacobian).shape[1])
+    factors, rest = _factors_of_rest(system, q, jacobian, chosen, named)
+    right = -system.row_scale[:, None] * jacobian[:, chosen]
+    scaled = factors.least_norm(right)
+    opening = np.abs(system.scaled(jacobian)[:, rest] @ scaled - right).max(initial=0.0)
+    if opening > _CONSISTENT * np.abs(right).max(initial=0.0):
+        raise SingularityError(
+            "these joints do not move independently here: the loops would open",
+            np.inf,
+            system.max_condition,
+        )
+    basis = np.zeros((system.model.nv, chosen.size))
+    basis[chosen] = np.eye(chosen.size)
+    basis[rest] = system.column_scale[rest][:, None] * scaled
+    return basis
+
+
+def condition(system: ConstraintSystem, q: Array, jacobian: Array) -> float:
+    """Return the condition number of J_p, idle freedoms left out; see `ClosedLoopModel`."""
+    motions = left_open(system, jacobian, system.actuated)
+    idle = open_motions(system, q, motions).idle.shape[1]
+    return system.factorisation.condition(jacobian[:, system.passive], idle)
+
+
+def _named(count: int, mobility: int) -> str:
+    return f"{count} independent velocities are named, for a mobility of {mobility} here"
+
+
+def _factors_of_rest(
+    system: ConstraintSystem,
+    q: Array,
+    jacobian: Array,
+    given: Indices,
+    reason: str = "the actuated joints do not determine the motion here",
+) -> tuple[linear_algebra.Decomposition, Indices]:
+    """Return the factors of J_r in one unit, and r: all velocities but the given ones.
+
+    Raises
+    ------
+    SingularityError
+        If they leave motions open that are not idle, or nearly so.
+    """
+    rest = np.setdiff1d(np.arange(system.model.nv), given)
+    factors = linear_algebra.Decomposition(system.scaled(jacobian)[:, rest])
+    if factors.rank < rest.size:
+        left_open = np.zeros((system.model.nv, rest.size - factors.rank))
+        left_open[rest] = factors.null_space()
+        lacking = open_motions(system, q, left_open).lacking
+        if lacking.size:
+            raise SingularityError(
+                f"{reason}: {in_words(system, lacking)} can move while these stand still",
+                np.inf,
+                system.max_condition,
+            )
+    if factors.rank:
+        condition = float(factors.values[0] / factors.values[factors.rank - 1])
+        system.refuse_singular(condition)
+    return factors, rest
 
 
 def actuated_basis(system: ConstraintSystem, solved: Array) -> Array:
@@ -57,7 +120,7 @@ def actuated_basis(system: ConstraintSystem, solved: Array) -> Array:
 def velocity(system: ConstraintSystem, q: Array, given: Indices, rates: Array) -> Array:
     """Return v with J v = 0 and given entries; see `ClosedLoopModel.velocity`."""
     still = np.zeros(system.equations.size)
-    return _completed(system, system.equations.jacobian(q), given, rates, still)
+    return _completed(system, q, system.equations.jacobian(q), given, rates, still)
 
 
 def acceleration(
@@ -72,29 +135,28 @@ def acceleration(
         raise ClosureError(
             f"v opens the loops at {opening:.3g} m/s; complete it with velocity() first", opening
         )
-    return _completed(system, jacobian, given, accelerations, bias)
+    return _completed(system, q, jacobian, given, accelerations, bias)
 
 
 def _completed(
-    system: ConstraintSystem, jacobian: Array, given: Indices, values: Array, bias: Array
+    system: ConstraintSystem, q: Array, jacobian: Array, given: Indices, values: Array, bias: Array
 ) -> Array:
-    """Return x with x_g given and J x + bias = 0 for the rest: J_r x_r = -J_g x_g - bias."""
+    """Return x with x_g given and J x + bias = 0 for the rest: J_r x_r = -J_g x_g - bias.
+
+    Of least norm in one unit where idle freedoms are left open.
+    """
     full = np.empty(system.model.nv)
     full[given] = values
     right = jacobian.take(given, axis=1) @ values + bias
-    rest = system.passive
     if given is system.actuated:
         solved = system.factorisation.passive_motion(jacobian, right[:, None])
         if solved is not None:
-            full[rest] = -solved[:, 0]
+            full[system.passive] = -solved[:, 0]
             return full
-    else:
-        rest = np.setdiff1d(np.arange(system.model.nv), given)
-    left = system.scaled(jacobian)[:, rest]
-    system.refuse_singular(linear_algebra.condition_number(left))
+    factors, rest = _factors_of_rest(system, q, jacobian, given)
     right = -system.row_scale * right
-    scaled = linear_algebra.Decomposition(left).least_norm(right)
-    opening = float(np.abs(left @ scaled - right).max(initial=0.0))
+    scaled = factors.least_norm(right)
+    opening = float(np.abs(system.scaled(jacobian)[:, rest] @ scaled - right).max(initial=0.0))
     size = float(np.abs(right).max(initial=0.0))
     if opening > _CONSISTENT * max(size, 1e-3):
         raise ClosureError(

@@ -742,7 +742,8 @@ class ClosedLoopModel:
         constraint singularity). Its inverse is the relative distance to the nearest singular
         matrix, a number between 0 and 1.
         """
-        return self.system.condition(self.system.equations.jacobian(self._configuration(q)))
+        q_ = self._configuration(q)
+        return kinematics.condition(self.system, q_, self.system.equations.jacobian(q_).copy())
 
     # Inverse dynamics -----------------------------------------------------------------------------
 

@@ -107,21 +107,29 @@ def null_space(matrix: Array) -> Array:
     return right[rank(values) :].T
 
 
-def condition_number(matrix: Array) -> float:
+def condition_number(matrix: Array, lost: int = 0) -> float:
     """Return the largest singular value over the smallest of a matrix that must not lose a column.
 
     ``inf`` where A x = 0 for some x other than 0: fewer rows than columns, a singular value of
     zero, or nothing but rounding error. 1 without columns.
+
+    Parameters
+    ----------
+    matrix
+        A.
+    lost
+        So many independent x with A x = 0 are left out.
     """
     rows, columns = matrix.shape
-    if columns == 0:
+    needed = columns - lost
+    if needed <= 0:
         return 1.0
-    if rows < columns:
+    if rows < needed:
         return math.inf
     values = singular_values(matrix)
-    if rank(values) == 0 or not values[-1] > 0:
+    if rank(values) == 0 or not values[needed - 1] > 0:
         return math.inf
-    return float(values[0] / values[-1])
+    return float(values[0] / values[needed - 1])
 
 
 def refuse_condition(condition: float, limit: float, reason: str) -> None:

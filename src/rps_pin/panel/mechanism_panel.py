@@ -49,6 +49,9 @@ class MechanismPanel:
     ) -> None:
         self.mechanism, self._visual = mechanism, visual
         model = mechanism.model
+        parts = [name for name in mechanism.actuated if not model.existJointName(name)]
+        if parts:
+            raise InputError(f"{parts[0]!r} is a part of a joint; a slider moves a whole joint")
         self._joints = [model.joints[model.getJointId(name)] for name in mechanism.actuated]
         for name, joint in zip(mechanism.actuated, self._joints, strict=True):
             if joint.nq != 1:

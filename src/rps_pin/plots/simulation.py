@@ -46,7 +46,8 @@ def plot_simulation(
 
 def _plot_positions(axes: Axes, simulation: Simulation, mechanism: ClosedLoopModel) -> None:
     model = mechanism.model
-    joints = [(name, model.joints[model.getJointId(name)]) for name in mechanism.actuated]
+    names = filter(model.existJointName, mechanism.actuated)  # whole joints
+    joints = [(name, model.joints[model.getJointId(name)]) for name in names]
     simple = [(name, joint) for name, joint in joints if joint.nq == joint.nv == 1]
     _lines(axes, simulation.time, {name: simulation.q[:, joint.idx_q] for name, joint in simple})
     prismatic = {joint.shortname().startswith("JointModelP") for _, joint in simple}

@@ -13,7 +13,7 @@ from rps_pin.closed_loop.assembly.approach import approached
 from rps_pin.closed_loop.assembly.closing import close, closed_gap
 from rps_pin.closed_loop.assembly.continuation import Followed, Path, coordinates_of
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
-from rps_pin.errors import ClosureError, SingularityError
+from rps_pin.errors import ClosureError, InputError, SingularityError
 from rps_pin.validation import real_vector
 
 #: How far outside a limit rounding error may leave a joint, rad or m.
@@ -72,6 +72,8 @@ def with_values(system: ConstraintSystem, q: Array, values: Mapping[str, ArrayLi
     model, changed = system.model, q.copy()
     system.velocity_indices(list(values), "to give a value")
     for name, value in values.items():
+        if not model.existJointName(name):
+            raise InputError(f"{name!r} is a part of a joint: give all of its coordinates in q")
         joint = model.joints[model.getJointId(name)]
         numbers = real_vector(np.atleast_1d(value), joint.nq, f"the value of joint {name!r}")
         changed[joint.idx_q : joint.idx_q + joint.nq] = numbers

@@ -14,11 +14,12 @@ Near a singularity, and with more or fewer actuators than mobility, there is no 
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 import eigenpy
 import numpy as np
 from scipy.linalg.blas import dasum, dtrsm
-from scipy.linalg.lapack import dgeqp3, dormqr
+from scipy.linalg.lapack import dgecon, dgeqp3, dgetrf, dgetrs, dormqr
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, condition_number, rank
@@ -48,7 +49,7 @@ class PassiveFactorisation:
         columns: Array,
         max_condition: float,
     ) -> None:
-        self._passive, self._actuated, self._max_condition = passive, actuated, max_condition
+        self.passive, self._actuated, self._max_condition = passive, actuated, max_condition
         #: Scaling of J_p to one unit, shapes (nc, 1) and (np,).
         self.scales = rows[:, None], columns[passive]
         self._rows = rows[:, None]
@@ -59,15 +60,30 @@ class PassiveFactorisation:
         # in the 1-norm, without scaling, and rarely off by more than a factor of 3 (Higham). The
         # norms differ by at most a factor of the size, the scaling by at most the ratios of its
         # factors; one of 100 is for the estimate.
-        self._harmless_rcond = 0.0
-        if self._square:
+        self._harmless_rcond, self._norm = 0.0, 0.0
+        if rows.size == passive.size > 0:
             spread = math.exp(sum(float(np.ptp(np.log(scale))) for scale in self.scales))
             self._harmless_rcond = min(100 * passive.size * spread / max_condition, 1.0)
 
-    def condition(self, passive_jacobian: Array) -> float:
-        """Return the condition number of J_p, shape (nc, np), in one unit."""
+    def factors(self, jacobian: Array) -> Factors | None:
+        """Return factors of J_p for any number of solutions, or None near a singularity."""
+        passive_jacobian = jacobian.take(self.passive, axis=1)
+        if not self.passive.size:
+            return _NoFactors(jacobian.shape[0])
+        if self._rows.size != self.passive.size:
+            return self._tall_factors(jacobian, passive_jacobian)
+        found = _SquareFactors(passive_jacobian)
+        if not self._norm:  # that of J_p at any configuration is of this size
+            self._norm = float(np.abs(passive_jacobian).sum(axis=0).max())
+        return found if found.rcond(self._norm) > self._harmless_rcond else None
+
+    def condition(self, passive_jacobian: Array, idle: int = 0) -> float:
+        """Return the condition number of J_p, shape (nc, np), in one unit, idle freedoms left out.
+
+        ``idle`` is how many these are.
+        """
         rows, columns = self.scales
-        return condition_number(rows * passive_jacobian * columns)
+        return condition_number(rows * passive_jacobian * columns, idle)
 
     def multipliers(self, jacobian: Array, passive_jacobian: Array, force: Array) -> Array | None:
         """Return lambda (nc,), of least norm in one unit, with J_p' lambda = f_p.
@@ -83,10 +99,10 @@ class PassiveFactorisation:
         """
         if not self._square:
             factors = self._tall_factors(jacobian, passive_jacobian)
-            return None if factors is None else factors.multipliers(force.take(self._passive))
+            return None if factors is None else factors.multipliers(force.take(self.passive))
         lu = self._lu
         lu.compute(passive_jacobian.T)
-        multipliers: Array = lu.solve(force.take(self._passive))
+        multipliers: Array = lu.solve(force.take(self.passive))
         if not lu.rcond() > self._harmless_rcond and not (
             self.condition(passive_jacobian) <= self._max_condition
         ):
@@ -98,7 +114,7 @@ class PassiveFactorisation:
 
         Of a b that no x_p solves, the least-squares solution.
         """
-        passive_jacobian = jacobian.take(self._passive, axis=1)
+        passive_jacobian = jacobian.take(self.passive, axis=1)
         if not self._square:
             factors = self._tall_factors(jacobian, passive_jacobian)
             return None if factors is None else factors.passive_motion(right)[0]
@@ -127,6 +143,52 @@ class PassiveFactorisation:
         return factors
 
 
+class Factors(Protocol):
+    """Factors of a J_p, shape (nc, np)."""
+
+    def solve(self, right: Array) -> Array:
+        """Return x_p (np, k) with J_p x_p = b (nc, k), in the least-squares sense."""
+
+    def multipliers(self, force: Array) -> Array:
+        """Return lambda (nc,) of least norm (in one unit) with J_p' lambda = f_p (np,)."""
+
+
+class _SquareFactors:
+    """L, U and the permutation of a J_p, shape (np, np)."""
+
+    __slots__ = ("_lu", "_pivots", "_zero")
+
+    def __init__(self, jacobian: Array) -> None:
+        self._lu, self._pivots, self._zero = dgetrf(jacobian)
+
+    def rcond(self, norm: float) -> float:
+        """Return an estimate of the reciprocal condition number, given the 1-norm of J_p."""
+        return 0.0 if self._zero else float(dgecon(self._lu, norm)[0])
+
+    def solve(self, right: Array) -> Array:
+        solved: Array = dgetrs(self._lu, self._pivots, right)[0]
+        return solved
+
+    def multipliers(self, force: Array) -> Array:
+        solved: Array = dgetrs(self._lu, self._pivots, force, trans=1)[0]
+        return solved
+
+
+class _NoFactors:
+    """Of a J_p without columns."""
+
+    __slots__ = ("_rows",)
+
+    def __init__(self, rows: int) -> None:
+        self._rows = rows
+
+    def solve(self, right: Array) -> Array:
+        return np.zeros((0, *right.shape[1:]))
+
+    def multipliers(self, force: Array) -> Array:
+        return np.zeros(self._rows)
+
+
 class _TallFactors:
     """Q, R and the permutation of a J_p, shape (nc, np), nc >= np > 0; scaled to one unit."""
 
@@ -150,6 +212,11 @@ class _TallFactors:
         right[: self._size] = self._solve((self._columns * force)[self._order, None], transposed=1)
         turned: Array = self._turn(right, "N")[:, 0]
         return self._rows * turned
+
+    def solve(self, right: Array) -> Array:
+        """Return x_p (np, k) with J_p x_p = b (nc, k) in the least-squares sense."""
+        solved, _ = self.passive_motion(right.reshape(right.shape[0], -1))
+        return solved.reshape(self._size, *right.shape[1:])
 
     def passive_motion(self, right: Array) -> tuple[Array, float]:
         """Return x_p (np, k) with J_p x_p = b (nc, k) in the least-squares sense, and the rest.

@@ -16,13 +16,19 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.assembly.joint_limits import JointLimits
-from rps_pin.closed_loop.constraints.closures import Closure, frame_id
+from rps_pin.closed_loop.column_names import joint_coordinates, named_velocities
+from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, frame_id
+from rps_pin.closed_loop.constraints.completion import (
+    CompletedFactorisation,
+    PassiveVelocities,
+    choose,
+)
 from rps_pin.closed_loop.constraints.equations import OPEN, ClosureEquations, refuse_twice
 from rps_pin.closed_loop.constraints.factorisation import PassiveFactorisation
 from rps_pin.closed_loop.dynamics import passive_joint_forces
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.errors import ClosureError, InputError, MechanismError
-from rps_pin.numerics.linear_algebra import refuse_condition
+from rps_pin.numerics.linear_algebra import Decomposition, refuse_condition
 from rps_pin.validation import real_vector
 
 #: Beyond this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
@@ -83,9 +89,11 @@ class ConstraintSystem:
         self.row_scale, self.column_scale = equations.row_scale, equations.column_scale
         self._scale = self.row_scale[:, None] * self.column_scale
         self.max_condition = max_condition
-        self.factorisation = PassiveFactorisation(
-            self.passive, self.actuated, self.row_scale, self.column_scale, max_condition
-        )
+        self.factorisation = self.factorisation_of(self.passive, self.actuated)
+        #: Of J and of the actuators at regular configurations, once they were asked for.
+        self.ranks: tuple[int, int] | None = None
+        #: For actuators that are more or fewer than the motions, or not independent, once needed.
+        self.completion: CompletedFactorisation | None = None
         self.effects, self.coordinates = effects, passive_joint_forces.coordinate_indices(model)
         self.limits = JointLimits(model)
         self._frame_ids: dict[str, int] = {}
@@ -105,15 +113,30 @@ class ConstraintSystem:
         return normal
 
     def velocity_indices(self, joints: Sequence[str], purpose: str) -> Indices:
-        """Return the indices of joints' velocities, or say which joints there are."""
+        """Return the indices of the velocities of joints, or of their coordinates (``ball.x``).
+
+        Raises
+        ------
+        MechanismError
+            If there is no such joint or coordinate (says which there are), or one comes twice.
+        """
         indices: list[int] = []
         for name in joints:
-            if not self.model.existJointName(name) or name == "universe":
-                names = ", ".join(list(self.model.names)[1:])
-                raise MechanismError(f"no joint {name!r} {purpose}; there are: {names}")
-            joint = self.model.joints[self.model.getJointId(name)]
-            indices.extend(range(joint.idx_v, joint.idx_v + joint.nv))
+            found = named_velocities(self.model, name)
+            if found is None:
+                raise MechanismError(f"no joint {name!r} {purpose}; {self._possible(name)}")
+            if not set(found).isdisjoint(indices):
+                raise MechanismError(f"a coordinate of {name!r} {purpose} is named twice")
+            indices.extend(found)
         return np.array(indices, dtype=np.intp)
+
+    def _possible(self, name: str) -> str:
+        """Return what could have been named: the coordinates of a joint, or all joints."""
+        owner = name.rpartition(".")[0]
+        if owner and self.model.existJointName(owner):
+            one = joint_coordinates(self.model, owner)
+            return f"joint {owner!r} has " + (", ".join(one) or "one coordinate: name the joint")
+        return f"there are: {', '.join(list(self.model.names)[1:])}"
 
     def independent(self, joints: Sequence[str] | None) -> Indices:
         """Return the velocities of joints, each named once; the actuated ones if left out."""
@@ -145,6 +168,50 @@ class ConstraintSystem:
                 f"most {OPEN * length:.3g} m is accepted; close it first with close()",
                 self.equations.largest_gap(gaps),
             )
+
+    # Factorisations -------------------------------------------------------------------------------
+
+    def factorisation_of(self, dependent: Indices, independent: Indices) -> PassiveFactorisation:
+        """Return the factorisation of J_d for some partition of the velocities."""
+        return PassiveFactorisation(
+            dependent, independent, self.row_scale, self.column_scale, self.max_condition
+        )
+
+    def completed(self, factors: Decomposition, idle: int) -> CompletedFactorisation:
+        """Return one for velocities that are chosen here, and keep it as `completion`.
+
+        Parameters
+        ----------
+        factors
+            Of J, all entries in one unit.
+        idle
+            Number of idle freedoms.
+        """
+        chosen = choose(factors, self.actuated)
+        independent = np.concatenate([chosen.driven, chosen.passive])
+        dependent = np.setdiff1d(np.arange(self.model.nv), independent)
+        self.completion = CompletedFactorisation(
+            chosen,
+            self.factorisation_of(dependent, independent),
+            self.actuated,
+            PassiveVelocities(self.passive, idle),
+            self._unmoving(),
+            self.column_scale,
+        )
+        return self.completion
+
+    def _unmoving(self) -> Indices:
+        """Return velocities whose columns of J are zero: they move both frames of each closure."""
+        model, moving = self.model, np.zeros(self.model.nv, dtype=bool)
+        for closed in self.equations.closed_frames:
+            for index in set(model.supports[closed.a.joint]) ^ set(model.supports[closed.b.joint]):
+                joint = model.joints[index]
+                moving[joint.idx_v : joint.idx_v + joint.nv] = True
+        for closure in self.equations.closures:
+            if isinstance(closure, JointCoupling):
+                names = (closure.joint, *closure.others)
+                moving[self.velocity_indices(names, "to couple")] = True
+        return np.flatnonzero(~moving)
 
     # Jacobian -------------------------------------------------------------------------------------
 

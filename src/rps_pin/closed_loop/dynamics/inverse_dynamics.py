@@ -8,9 +8,10 @@ The passive rows have no actuator: J_p' lambda = f_p. With as many actuators as 
 follows from one factorisation of J_p (see `factorisation`; of least norm where rows are redundant),
 and the actuated rows give tau.
 
-In every other case the null space N of J is used: J N = 0 leaves (S N)' tau = N' f. With as many
-independent actuators as motions that has one solution; otherwise see `least_effort`. Then lambda
-of least norm follows from the rest.
+With more or fewer actuators, or dependent ones, some velocities are chosen that determine the
+motion (see `completion`). Where that fails, the null space N of J is used: J N = 0 leaves
+(S N)' tau = N' f (see `least_effort`), and lambda of least norm follows from the rest. Both give
+the same forces.
 """
 
 from __future__ import annotations
@@ -23,11 +24,14 @@ from pinocchio import computeJointJacobians, getConstraintsJacobian, rnea
 from scipy.linalg.blas import dgemv, dnrm2
 
 from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.constraints.completion import PassiveVelocities
 from rps_pin.closed_loop.constraints.factorisation import HUGE
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.dynamics.generalised_forces import required_force, resisting_force
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.closed_loop.freedoms import left_open, open_motions
+from rps_pin.closed_loop.regular import actuated_rank, refuse_irregular
 from rps_pin.errors import InputError
 from rps_pin.numerics import linear_algebra
 
@@ -56,6 +60,7 @@ class InverseDynamics:
     """
 
     __slots__ = (
+        "_passive",
         "_passive_jacobian",
         "_scales",
         "constraint_forces",
@@ -72,6 +77,7 @@ class InverseDynamics:
         scales: tuple[Array, Array],
         passive_jacobian: Array,
         unproduced: Array | None = None,
+        passive: PassiveVelocities | None = None,
     ) -> None:
         self.tau = tau
         self.constraint_forces = constraint_forces
@@ -79,6 +85,7 @@ class InverseDynamics:
         self._scales = scales
         self._passive_jacobian = passive_jacobian
         self.unproduced = unproduced
+        self._passive = passive  # if the Jacobian has other columns too
 
     @property
     def condition(self) -> float:
@@ -86,7 +93,8 @@ class InverseDynamics:
 
         Computed when asked for.
         """
-        return linear_algebra.condition_number(self._scaled_jacobian())
+        idle = self._passive.idle if self._passive else 0
+        return linear_algebra.condition_number(self._scaled_jacobian(), idle)
 
     @property
     def orientation(self) -> int:
@@ -99,7 +107,8 @@ class InverseDynamics:
     def _scaled_jacobian(self) -> Array:
         """Return J_p with all entries in one unit, shape (nc, np)."""
         rows, columns = self._scales
-        return rows * self._passive_jacobian * columns
+        jacobian = self._passive_jacobian
+        return rows * (jacobian[:, self._passive.indices] if self._passive else jacobian) * columns
 
     def __repr__(self) -> str:
         return (
@@ -149,11 +158,18 @@ def inverse_dynamics(
     if system.effects is not None or wrenches:
         force = force + resisting_force(system, q, v, wrenches)
 
+    if system.completion is not None:
+        found = system.completion.forces(jacobian, force)
+        if found is not None:
+            scales, passive = system.factorisation.scales, system.completion.passive
+            return InverseDynamics(*found[:3], scales, jacobian, found[3], passive)
+        system.state(q, v, a)
+        return _of_any_actuators(system, q, jacobian, force)
     passive_jacobian = jacobian.take(system.passive, axis=1)
     multipliers = system.factorisation.multipliers(jacobian, passive_jacobian, force)
     if multipliers is None:
         system.state(q, v, a)
-        return _by_null_space(system, jacobian, force)
+        return _of_any_actuators(system, q, jacobian, force)
     # f - J' lambda, the passive rows first: they are the residual, the actuated ones tau.
     rest = dgemv(-1.0, jacobian.T, multipliers, 1.0, force).take(system.order)
     size = system.passive_size
@@ -162,7 +178,7 @@ def inverse_dynamics(
     # rounding errors.
     if not (residual < _INFINITY and dnrm2(multipliers) <= HUGE * dnrm2(force)):
         system.state(q, v, a)
-        return _by_null_space(system, jacobian, force)
+        return _of_any_actuators(system, q, jacobian, force)
     scales = system.factorisation.scales
     return InverseDynamics(rest[size:], multipliers, residual, scales, passive_jacobian)
 
@@ -182,13 +198,31 @@ def constraint_forces(
     return system.row_scale * factors.transposed_least_norm(system.column_scale * rest)
 
 
-def _by_null_space(system: ConstraintSystem, jacobian: Array, force: Array) -> InverseDynamics:
+def _of_any_actuators(
+    system: ConstraintSystem, q: Array, jacobian: Array, force: Array
+) -> InverseDynamics:
+    """Return the forces near a singularity, or of actuators that are not those of `factorisation`.
+
+    Raises
+    ------
+    SingularityError
+        If the configuration is singular, or nearly.
+    """
     if not np.isfinite(force).all():
         raise InputError("q, v and a must be finite")
-    jacobian = jacobian.reshape(system.equations.size, system.model.nv)
+    jacobian = jacobian.reshape(system.equations.size, system.model.nv).copy()
     factors = linear_algebra.Decomposition(system.scaled(jacobian))
-    if system.model.nv - factors.rank == system.actuated.size:
+    ranks, mobility = (factors.rank, actuated_rank(system, factors)), system.model.nv - factors.rank
+    refuse_irregular(system, q, ranks)
+    scales = system.factorisation.scales
+    idle = open_motions(system, q, left_open(system, jacobian, system.actuated)).idle.shape[1]
+    passive = PassiveVelocities(system.passive, idle)
+    if mobility == system.actuated.size == ranks[1]:
         system.refuse_singular(system.condition(jacobian))
+    else:
+        found = system.completed(factors, idle).forces(jacobian, force)
+        if found is not None:
+            return InverseDynamics(*found[:3], scales, jacobian, found[3], passive)
     tau, scaled, unproduced = null_space_solution(
         factors, system.actuated, force, system.column_scale, system.max_condition
     )
@@ -197,8 +231,7 @@ def _by_null_space(system: ConstraintSystem, jacobian: Array, force: Array) -> I
     if unproduced is not None:
         error -= unproduced
     residual = float(np.linalg.norm(error[system.passive]))
-    scales, passive_jacobian = system.factorisation.scales, jacobian.take(system.passive, axis=1)
-    return InverseDynamics(tau, multipliers, residual, scales, passive_jacobian, unproduced)
+    return InverseDynamics(tau, multipliers, residual, scales, jacobian, unproduced, passive)
 
 
 class NullSpaceSolution(NamedTuple):
@@ -237,22 +270,15 @@ def null_space_solution(
     Raises
     ------
     SingularityError
-        If as many actuators as motions do not move all of the mechanism, or others hardly do.
+        If the actuators move a motion, but hardly.
     """
     motions = scale[:, None] * factors.null_space()
     of_actuators, reduced = motions[actuated], motions.T @ force
+    effort = least_effort.least_effort(of_actuators, reduced, weights=scale[actuated])
+    least_effort.refuse_nearly_singular(effort.values, max_condition)
     remaining = None
-    if of_actuators.shape[0] == of_actuators.shape[1]:
-        scaled = of_actuators / scale[actuated][:, None]
-        reason = "the actuated joints do not move all of the mechanism here"
-        solved = linear_algebra.solve_transposed(scaled, reduced, max_condition, reason)
-        tau = solved / scale[actuated]
-    else:
-        effort = least_effort.least_effort(of_actuators, reduced, weights=scale[actuated])
-        least_effort.refuse_nearly_singular(effort.values, max_condition)
-        tau = effort.tau
-        if np.linalg.norm(effort.missing) > least_effort.RESIDUAL * np.linalg.norm(reduced):
-            remaining = least_effort.residual_force(motions, effort.missing, scale)
+    if np.linalg.norm(effort.missing) > least_effort.RESIDUAL * np.linalg.norm(reduced):
+        remaining = least_effort.residual_force(motions, effort.missing, scale)
     rest = force.copy() if remaining is None else force - remaining
-    rest[actuated] -= tau
-    return NullSpaceSolution(tau, factors.transposed_least_norm(scale * rest), remaining)
+    rest[actuated] -= effort.tau
+    return NullSpaceSolution(effort.tau, factors.transposed_least_norm(scale * rest), remaining)

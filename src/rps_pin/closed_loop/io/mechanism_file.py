@@ -21,6 +21,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.column_names import named_velocities
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure, frame_id
 from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
 from rps_pin.closed_loop.io.mechanism_schema import ClosureEntry, CouplingEntry, Description
@@ -67,7 +68,8 @@ def parts_from_yaml(
     parts = _with_effects(file, description, parts)
     actuated = parts.actuated if description.actuated is None else tuple(description.actuated)
     for index, name in enumerate(actuated):
-        _check_joint(file, ("actuated", index), name, parts.model)
+        if named_velocities(parts.model, name) is None:
+            _check_joint(file, ("actuated", index), name, parts.model)
     added = _closures(file, description, parts.model)
     return replace(
         parts,

@@ -297,6 +297,10 @@ class CompiledMechanism:
         def answer(m: ClosedLoopModel, q: Array, wanted: Array) -> Sequence[Any]:
             return (m.complete(wanted[at], q, **given),)
 
+        if not all(map(self.model.existJointName, self.actuated)):  # a part of a joint
+            return self._by_one(
+                lambda m, q, x: (m.complete(x, q, **given),), (guess, asked), **options
+            )
         joints = [self.model.joints[self.model.getJointId(name)] for name in self.actuated]
         at = np.array([joint.idx_q for joint in joints])
         batch = np.broadcast_shapes(asked.shape[:-1], guess.shape[:-1])
