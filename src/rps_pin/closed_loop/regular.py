@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pinocchio as pin
 
@@ -9,8 +11,13 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.assembly.closing import close
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.kinematics import allowed_motions
-from rps_pin.errors import ClosureError, SingularityError
-from rps_pin.numerics.linear_algebra import Decomposition, rank, singular_values
+from rps_pin.errors import ClosureError
+from rps_pin.numerics.linear_algebra import (
+    Decomposition,
+    rank,
+    refuse_condition,
+    singular_values,
+)
 
 #: Where a regular configuration is looked for: so many random steps of this length (rad).
 _TRIES, _STEP = 10, 0.15
@@ -47,15 +54,16 @@ def refuse_irregular(system: ConstraintSystem, q: Array, ranks: tuple[int, int])
         system.ranks = ranks_at(system, regular_near(system, q)[0])
     if ranks == system.ranks:
         return
+    condition = system.condition(system.equations.jacobian(q))
     regular, singular = regular_near(system, q)
     if singular:
         rows, driven = ranks_at(system, regular)
-        raise SingularityError(
+        reason = (
             f"the configuration is singular: the closures have rank {ranks[0]} and the actuators "
-            f"rank {ranks[1]}, and {rows} and {driven} next to it",
-            np.inf,
-            system.max_condition,
+            f"rank {ranks[1]}, and {rows} and {driven} next to it"
         )
+        limit = system.max_condition
+        refuse_condition(condition if condition > limit else math.inf, limit, reason)
 
 
 def ranks_at(system: ConstraintSystem, q: Array) -> tuple[int, int]:
