@@ -105,6 +105,11 @@ class ClosedManifold:
         if self._rcond * _WORSE < self._chosen_rcond:
             self._choose(q)
 
+    @property
+    def basis(self) -> Array:
+        """T, shape (nv, m), at the last `acceleration`; written over by the next."""
+        return self._basis
+
     # Dynamics -------------------------------------------------------------------------------------
 
     def acceleration(

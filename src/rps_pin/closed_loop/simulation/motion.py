@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.closed_loop.simulation.damped import Damping, stiff_damping
 from rps_pin.closed_loop.simulation.manifold import ClosedManifold
 from rps_pin.errors import ClosureError, InputError, SingularityError
 from rps_pin.validation import real_vector
@@ -61,7 +62,7 @@ class Motion:
 
     def __init__(self, system: ConstraintSystem, start: State, drive: Drive, gain: float) -> None:
         self.model, self._drive, self._gain = system.model, drive, gain
-        self._manifold = ClosedManifold(system, start[0])
+        self._system, self._manifold = system, ClosedManifold(system, start[0])
         self.gap = self._manifold.gap
         #: Of the applied forces (see `ClosedManifold.acceleration`) at the last acceleration, W.
         self.power = 0.0
@@ -78,6 +79,10 @@ class Motion:
         wrenches = self._drive.wrenches(t, q, v)
         a, self.power = self._manifold.acceleration(q, v, self._drive.tau, wrenches, self._gain)
         return a
+
+    def stiff_damping(self, q: Array, v: Array, step: float) -> Damping | None:
+        """Return the damping if it is stiff for a step from q, v; after `acceleration` there."""
+        return stiff_damping(self._system, q, v, self._manifold.basis, step)
 
     def finish(self, state: State) -> tuple[State, float]:
         """Return the state, projected unless Baumgarte's method was chosen, and its largest gap.

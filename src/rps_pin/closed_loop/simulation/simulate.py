@@ -22,6 +22,7 @@ from rps_pin.closed_loop.dynamics.generalised_forces import energy
 from rps_pin.closed_loop.dynamics.inverse_dynamics import constraint_forces
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation import integrators
+from rps_pin.closed_loop.simulation.fixed_step import fixed_step
 from rps_pin.closed_loop.simulation.motion import (
     Controller,
     Drive,
@@ -76,7 +77,8 @@ def simulate(
         ``"rk4"``, also the length of the steps.
     method
         ``"rk4"``: fixed steps of order 4 (see `integrators.rk4_step`); a mode of circular frequency
-        omega loses about (omega step)^6 / 72 of its energy in each. ``"adaptive"``: steps of
+        omega loses about (omega step)^6 / 72 of its energy in each. Where damping is too stiff for
+        them, they are implicit in it, of the same order (see `damped`). ``"adaptive"``: steps of
         order 8 as long as `tolerance` allows, over several `step` where there is no controller;
         rows between are interpolated to order 7 and projected.
     controller
@@ -185,16 +187,8 @@ def fixed_steps(motion: Motion) -> _Advance:
     def advance(
         time: float, state: State, following: float, a: Array
     ) -> tuple[State, float, float]:
-        powers = [motion.power]  # at the start, where a comes from
-
-        def acceleration(t: float, q: Array, v: Array) -> Array:
-            a = motion.acceleration(t, q, v)
-            powers.append(motion.power)
-            return a
-
-        step = following - time
-        moved = integrators.rk4_step(motion.model, acceleration, time, state, step, a)
-        return *motion.finish(moved), step * float(np.dot(integrators.RK4_WEIGHTS, powers))
+        moved, work = fixed_step(motion, time, state, following - time, a)
+        return *motion.finish(moved), work
 
     return advance
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.closed_loop.constraints.system import Mechanism
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
-from rps_pin.closed_loop.simulation.integrators import rk4_step
+from rps_pin.closed_loop.simulation.fixed_step import fixed_step
 from rps_pin.closed_loop.simulation.motion import Drive, Motion, WrenchesInTime, closed_start
 from rps_pin.validation import positive_number, real_vector, whole_number
 
@@ -83,6 +83,8 @@ class Stepper:
         start, state, gap = self.time, (self.q, self.v), self.gap
         with np.errstate(over="ignore", invalid="ignore"):  # refused in words
             for k in range(steps):
-                moved = rk4_step(motion.model, motion.acceleration, start + k * step, state, step)
+                time = start + k * step
+                a = motion.acceleration(time, *state)
+                moved, _ = fixed_step(motion, time, state, step, a)
                 state, gap = motion.finish(moved)
         (self.q, self.v), self.gap, self.time = state, gap, start + duration

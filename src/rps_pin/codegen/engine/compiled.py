@@ -11,7 +11,7 @@ import copy
 import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -31,6 +31,7 @@ from rps_pin.closed_loop.dynamics.derivatives import (
 from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
+from rps_pin.closed_loop.simulation.damped import STIFF, viscous_rate
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.stepper import Stepper
 from rps_pin.codegen.engine.applied import with_parameters
@@ -40,7 +41,7 @@ from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.simulation import simulate
 from rps_pin.codegen.expressions.functions import UNDER_WRENCHES
 from rps_pin.codegen.expressions.routines import BLOCK
-from rps_pin.errors import InputError, SingularityError
+from rps_pin.errors import InputError, RPSPinError, SingularityError
 from rps_pin.numerics.linear_algebra import condition_number
 from rps_pin.validation import (
     choice,
@@ -786,9 +787,13 @@ class CompiledMechanism:
         """Return closed q (..., nq) and v (..., nv) after one step under constant actuator forces.
 
         Of order 4, as `Stepper.advance` takes it; the dependent joints are closed, the independent
-        ones stay.
+        ones stay. Where the damping at home is stiff for the step, the Pinocchio engine takes it.
         """
-        if duration.__class__ is float and not (wrenches or options):
+        longest: Any = duration
+        if duration.__class__ is not float:
+            longest = np.max(np.asarray(duration, dtype=np.float64), initial=0.0)
+        stiff = bool(longest * self._damping_rate > 0.5 * STIFF)
+        if duration.__class__ is float and not (wrenches or options or stiff):
             single = self._single.step(q, v, tau, _length(duration))
             if single and not single[-1]:
                 return single[0], single[1]
@@ -805,8 +810,21 @@ class CompiledMechanism:
             if h.ndim == 1:
                 positive_number(duration, "duration", "s")
             raise InputError("duration: all must be positive numbers of s, finite")
-        found = self._run("step", (q, v, tau, h), answer, wrenches, **options)
+        if stiff:
+            shapes = [(self.model.nq,), (self.model.nv,), ()]
+            given = (q, v, tau, h)
+            found = self._by_samples(answer, given, shapes, True, wrenches=wrenches, **options)
+        else:
+            found = self._run("step", (q, v, tau, h), answer, wrenches, **options)
         return found[0], found[1]
+
+    @cached_property
+    def _damping_rate(self) -> float:
+        """Largest rate at which viscous damping takes speeds away at home, 1/s, or 0."""
+        try:
+            return viscous_rate(self.reference().system, self.home)
+        except RPSPinError:
+            return 0.0
 
     def steps(
         self,
@@ -839,7 +857,7 @@ class CompiledMechanism:
         states: list[tuple[Array, Array]] = []
         left = whole_number(count, "count")
         while left:
-            whole = left >= BLOCK and not options
+            whole = left >= BLOCK and not options and duration * self._damping_rate <= 0.5 * STIFF
             found = self.generated("steps", wrenches, None, q, v, tau, h) if whole else None
             if found is not None and not np.any(found[-1]):
                 qs, vs = (one.reshape(*one.shape[:-1], BLOCK, -1) for one in found[:2])

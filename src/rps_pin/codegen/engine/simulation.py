@@ -2,7 +2,8 @@
 
 Fixed steps with projection, under a controller or constant forces and under constant wrenches, are
 generated; everything else that `rps_pin.closed_loop.simulation.simulate` can do is left to it. A
-step that the code flags is taken by the Pinocchio engine.
+step that the code flags is taken by the Pinocchio engine. So are those under stiff damping, which
+is looked at before every block of steps.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation import simulate as pinocchio_engine
+from rps_pin.closed_loop.simulation.damped import is_stiff
 from rps_pin.closed_loop.simulation.integrators import times
 from rps_pin.closed_loop.simulation.motion import (
     Controller,
@@ -143,6 +145,7 @@ class _Run:
         self._tau, self._work = np.empty((rows, system.actuated.size)), np.zeros(rows)
         self._q[0], self._v[0] = closed_start(system, q, v)
         self._row = 0  # that the motion has come to
+        self._stiff_until = self._checked_until = 0  # rows
         self._known = 0  # rows whose state and tau are known
 
     def simulation(self) -> Simulation:
@@ -165,11 +168,23 @@ class _Run:
             if progress and fraction >= shown + 0.005:
                 shown = fraction
                 progress(float(fraction))
-            if not self._controlled and last - self._row >= BLOCK and self._block():
+            if self._row >= self._checked_until:
+                self._look_at_damping()
+            stiff = self._row < self._stiff_until
+            if not (stiff or self._controlled) and last - self._row >= BLOCK and self._block():
                 continue
-            self._single()
+            self._single(stiff)
         if progress:
             progress(1.0)
+
+    def _look_at_damping(self) -> None:
+        """Leave the next rows to the Pinocchio engine if damping is stiff here."""
+        k, system = self._row, self._reference.system
+        self._checked_until = k + BLOCK
+        if system.effects is not None:
+            step = float(self._time[k + 1] - self._time[k])
+            if is_stiff(system, self._q[k], self._v[k], step):
+                self._stiff_until = k + BLOCK
 
     def _command(self, row: int) -> None:
         self._row = row
@@ -192,11 +207,13 @@ class _Run:
         self._known = self._row + 1
         return True
 
-    def _single(self) -> None:
-        """Take one step; what the code flags is the Pinocchio engine's matter."""
+    def _single(self, stiff: bool) -> None:
+        """Take one step; what the code flags, or is stiff, is the Pinocchio engine's matter."""
         k = self._row
-        q, v, work, status = self._taken("step", k, np.diff(self._time[k : k + 2]))
-        done = float(work[0])
+        status = stiff
+        if not stiff:
+            q, v, work, status = self._taken("step", k, np.diff(self._time[k : k + 2]))
+            done = float(work[0])
         if status:
             (q, v), done = self._by_pinocchio((self._q[k], self._v[k]), k)
         self._q[k + 1], self._v[k + 1] = q, v
