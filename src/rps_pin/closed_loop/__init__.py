@@ -15,6 +15,7 @@ from rps_pin.closed_loop.dynamics.inverse_dynamics import InverseDynamics
 from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.editing.compose import Part, body, compose
 from rps_pin.closed_loop.editing.merge import JointMerge, merged
+from rps_pin.closed_loop.editing.replace import replace_joints
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import JointLimitPassed, Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
@@ -40,5 +41,6 @@ __all__ = [
     "compose",
     "friction_pyramid",
     "merged",
+    "replace_joints",
     "simulate",
 ]

@@ -33,6 +33,11 @@ from rps_pin.closed_loop.dynamics.inverse_dynamics import (
 from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
 from rps_pin.closed_loop.editing.present_pose import closure_at
+from rps_pin.closed_loop.editing.replace import (
+    replace_joints,
+    replaced_configuration,
+    replaced_effects,
+)
 from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts, with_effects, without_position_limits
@@ -41,7 +46,7 @@ from rps_pin.closed_loop.io.write.files import write_mjcf, write_urdf
 from rps_pin.closed_loop.io.write.source import Source
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
-from rps_pin.errors import ClosureError, CompileError
+from rps_pin.errors import ClosureError, CompileError, MechanismError
 from rps_pin.validation import choice, real_vector
 
 _REFERENCES = {
@@ -373,6 +378,44 @@ class ClosedLoopModel:
             If a joint is unknown or named twice.
         """
         return self._with(self.closures, joints)
+
+    def with_joints(
+        self, kinds: Mapping[str, Any], *, home: ArrayLike | None = None
+    ) -> ClosedLoopModel:
+        """Return the same mechanism with joints of other types: a ball in the place of a hinge.
+
+        Parameters
+        ----------
+        kinds
+            New types by joint, as for `rps_pin.closed_loop.replace_joints`:
+            ``{"knee": "spherical", "rod": "universal_xy", "brake": "fixed"}``.
+        home
+            Its home, shape (nq,) of the new model; if left out, this mechanism's, as far as the
+            new joints can take it over. Its loops are closed if they are open.
+
+        Raises
+        ------
+        MechanismError
+            As `replace_joints`; or if a replaced joint is coupled, actuated or has damping,
+            friction or a spring, and the new one has another number of velocities.
+        InputError, ClosureError
+            As the class.
+        """
+        model = replace_joints(self.model, kinds)
+        for name in self.actuated:
+            old = self.model.joints[self.model.getJointId(name)]
+            count = model.joints[model.getJointId(name)].nv if model.existJointName(name) else 0
+            if name in kinds and count != old.nv:
+                raise MechanismError(
+                    f"joint {name!r} is actuated and would have {count} velocities in place of "
+                    f"{old.nv}; choose other actuated joints first, by with_actuated()"
+                )
+        if home is None and self._home is not None:
+            home = replaced_configuration(self.model, kinds, self._home)
+        options = self._options()
+        if self.effects is not None:
+            options["effects"] = replaced_effects(self.model, model, kinds, self.effects)
+        return type(self)(model, self.closures, self.actuated, home=home, **options)
 
     def _with(
         self, closures: Sequence[Closure], actuated: Sequence[str], home: ArrayLike | None = None

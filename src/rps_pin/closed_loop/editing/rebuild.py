@@ -22,6 +22,8 @@ _OF_VELOCITY = (
     "rotorInertia",
     "rotorGearRatio",
 )
+#: The bounds among them.
+LIMITS = tuple(name for name in _OF_POSITION + _OF_VELOCITY if name.endswith("Limit"))
 
 
 class NewJoint(NamedTuple):
@@ -102,17 +104,19 @@ def _add_frames(model: pin.Model, result: pin.Model, new_ids: Mapping[int, int])
 
 
 def copy_joint_properties(
-    source: pin.Model, joints: Sequence[int], target: pin.Model, joint: int
+    source: pin.Model, joints: Sequence[int], target: pin.Model, joint: int, limits: bool = True
 ) -> None:
     """Copy limits, friction, damping, armature and rotors of joints of `source` to `target`.
 
     The coordinates of `joints`, one after the other, are those of `target` from `joint` on.
+    Without `limits`, those of positions are left out, whose coordinates may differ then.
     """
+    of_position = _OF_POSITION if limits else ()
     place = target.joints[joint]
     idx_q, idx_v = place.idx_q, place.idx_v
     for one in (source.joints[i] for i in joints):
         for names, size, start, index in (
-            (_OF_POSITION, one.nq, idx_q, one.idx_q),
+            (of_position, one.nq, idx_q, one.idx_q),
             (_OF_VELOCITY, one.nv, idx_v, one.idx_v),
         ):
             for name in names:

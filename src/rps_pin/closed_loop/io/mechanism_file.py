@@ -24,6 +24,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.column_names import named_velocities
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure, frame_id
 from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
+from rps_pin.closed_loop.editing.replace import replace_joints, replaced_configuration
 from rps_pin.closed_loop.io.mechanism_schema import ClosureEntry, CouplingEntry, Description
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts, without_position_limits
@@ -60,6 +61,8 @@ def parts_from_yaml(
     tree = _tree(file, description, Path(path))
     if not (description.within_limits if within_limits is None else within_limits):
         tree = without_position_limits(tree)
+    if description.joint_types:
+        tree = _of_other_joints(file, description, tree)
     merges = []
     for i, entry in enumerate(description.merge):
         with file.at("merge", i):
@@ -106,6 +109,37 @@ def _tree(file: YamlFile, description: Description, path: Path) -> MechanismPart
         if description.mjcf:
             return parts_from_mjcf(target, actuated=description.actuated)
         return parts_from_urdf(target, description.root or "fixed")
+
+
+def _of_other_joints(
+    file: YamlFile, description: Description, tree: MechanismParts
+) -> MechanismParts:
+    """Replace joints by others, and leave out what they cannot keep, if the file says so."""
+    kinds, model = description.joint_types, tree.model
+    for name in kinds:
+        _check_joint(file, ("joint_types", name), name, model)
+    new = model
+    for name, kind in kinds.items():
+        with file.at("joint_types", name):
+            replace_joints(model, {name: kind})  # whose fault it is
+    new = replace_joints(model, kinds)
+    home = None if tree.home is None else replaced_configuration(model, kinds, tree.home)
+    changes: dict[str, Any] = {"model": new, "home": home}
+    for effect in EFFECTS:
+        values = dict(getattr(tree, effect))
+        lost = [name for name in kinds if values.pop(name, None) and new.existJointName(name)]
+        for name in lost:
+            if name not in getattr(description, effect):
+                raise MechanismError(
+                    f"{file.place(('joint_types', name))}: joint {name!r} has {effect} in its "
+                    f"file; say what it has as a {kinds[name]} joint, in {effect}"
+                )
+        changes[effect] = values
+    for closure in tree.closures:
+        if isinstance(closure, JointCoupling):
+            with file.at("joint_types"):
+                closure.joint_ids(new)
+    return replace(tree, **changes)
 
 
 def _merged(

@@ -54,7 +54,8 @@ class MergeEntry(Entry):
 class Description(Entry):
     """A mechanism file; it has one of `urdf` and `mjcf`.
 
-    Joint names in `home` may be those before or after merging; all others are those after.
+    Joints are of the `joint_types` before they are merged. Joint names in `home` may be those
+    before or after merging; all others are those after.
     `closures` and `couplings` are added to those of `mjcf`, `actuated` and `gravity` replace its
     own, and the other keys do so joint by joint, as they do for the damping and friction of a
     URDF's ``dynamics`` elements.
@@ -70,6 +71,7 @@ class Description(Entry):
     couplings: list[CouplingEntry] = Field(default_factory=list)
     actuated: list[Text] | None = None
     home: dict[str, Finite | list[Finite]] = Field(default_factory=dict)
+    joint_types: dict[Text, Text] = Field(default_factory=dict)
     merge: list[MergeEntry] = Field(default_factory=list)
     damping: dict[str, NonNegative | list[NonNegative]] = Field(default_factory=dict)
     friction: dict[str, NonNegative | list[NonNegative]] = Field(default_factory=dict)
