@@ -20,11 +20,11 @@ from hatchling.builders.wheel import WheelBuilder
 import rps_pin
 
 ROOT = Path(__file__).resolve().parent.parent
-#: The package's files; its folder urdf is a link to the one at the top.
-FILES = [*(ROOT / "src").rglob("*"), *(ROOT / "urdf").rglob("*")]
+#: The package's files, as named in it; its folder urdf is a link to the one at the top.
 PACKAGE = {
-    path.relative_to(ROOT).as_posix().removeprefix("src/").replace("urdf/", "rps_pin/urdf/", 1)
-    for path in FILES
+    (into / path.relative_to(folder)).as_posix()
+    for folder, into in ((ROOT / "src", Path()), (ROOT / "urdf", Path("rps_pin/urdf")))
+    for path in folder.rglob("*")
     if path.is_file() and "__pycache__" not in path.parts
 }
 JOB = """
