@@ -139,6 +139,9 @@ def test_rotors_and_dampers_that_are_not_passive_are_refused(option: str) -> Non
         (('<position joint="j1" ctrlrange="-1 2"/>',), "", (-np.inf, np.inf)),
         (('<motor joint="j1" ctrlrange="-1 2"/>', '<motor joint="j1"/>'), "", (-np.inf, np.inf)),
         (('<motor joint="j1" ctrlrange="-1 2"/>',) * 2, "", (-2, 4)),
+        (('<motor joint="j1" ctrlrange="-1 2" ctrllimited="false"/>',), "", (-np.inf, np.inf)),
+        (('<motor joint="j1" forcerange="-1 2" forcelimited="false"/>',), "", (-np.inf, np.inf)),
+        (('<motor joint="j1" ctrlrange="-1 2" gear="0"/>',), "", (0, 0)),
         (('<motor joint="j1" ctrlrange="-1 2" gear="9"/>',), 'actuatorfrcrange="-5 6"', (-5, 6)),
         (('<motor joint="j2" ctrlrange="-1 2"/>',), "", (-np.inf, np.inf)),
     ],
@@ -156,6 +159,13 @@ def test_limits_of_forces_are_those_that_mujoco_clamps_at(
             d.ctrl[:] = sign * 1e6 * np.sign(m.actuator_gear[:, 0])
             mujoco.mj_forward(m, d)
             assert d.qfrc_actuator[0] == pytest.approx(limit)
+
+
+def test_a_range_of_controls_can_be_off() -> None:
+    motor = actuators('<motor joint="j1" ctrlrange="-1 2"/>')
+    off = '<option><flag clampctrl="disable"/></option>'
+    assert parts_from_mjcf(fourbar(motor)).model.upperEffortLimit[0] == 2
+    assert parts_from_mjcf(fourbar(motor, off)).model.upperEffortLimit[0] == np.inf
 
 
 # Disabled -----------------------------------------------------------------------------------------
