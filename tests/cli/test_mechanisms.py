@@ -219,6 +219,22 @@ def test_bad_options_are_told_in_one_line(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_folder_of_example_parallel_robots(tmp_path: Path) -> None:
+    folder = tmp_path / "linkage"
+    folder.mkdir()
+    shutil.copy(URDF / "five_bar.urdf", folder / "robot.urdf")
+    (folder / "robot.yaml").write_text(
+        "closed_loop: [[left_tip, right_tip]]\ntype: [3d]\nname_mot: [left_joint, right_joint]\n"
+    )
+    run = rps_pin("describe", "linkage", "--json", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    found = json.loads(run.stdout)
+    assert (found["name"], found["mobility"]) == ("linkage", 2)
+    run = rps_pin("convert", "linkage", "--to", "urdf", "-o", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == "wrote out/linkage.urdf and out/linkage.yaml\n"
+
+
 def test_convert_writes_what_describe_reads(tmp_path: Path) -> None:
     run = rps_pin("convert", "stewart", "--to", "urdf", "-o", "out", folder=tmp_path)
     assert run.returncode == 0, run.stderr

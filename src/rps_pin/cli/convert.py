@@ -64,17 +64,18 @@ def convert_command(
     - `rps-pin convert robot.xml --to urdf -o out` writes *out/robot.urdf* and *out/robot.yaml*
     """
     mechanism, found = load_mechanism(file, ignore_limits)
+    stem = file.resolve().name if file.is_dir() else found.stem
     output.mkdir(parents=True, exist_ok=True)
     if to is Format.URDF:
         shapes, missing = shapes_of(found, mechanism, package_path)
-        target = output / f"{found.stem}.urdf"
+        target = output / f"{stem}.urdf"
         description = mechanism.to_urdf(target, shapes=shapes)
         typer.echo(f"wrote {target} and {description}")
         for note in missing:
             typer.echo(f"note: {note}", err=True)
         return
     target = mechanism.to_mjcf(
-        output / f"{found.stem}.xml",
+        output / f"{stem}.xml",
         least_mass=least_mass,
         least_inertia=least_inertia,
         mend_inertia=mend_inertia,

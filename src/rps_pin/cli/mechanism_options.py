@@ -12,12 +12,14 @@ import typer
 
 from rps_pin.cli.completion import MECHANISMS, mechanism_names, names_or_files
 from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.closed_loop.io.gepetto import FILE
 from rps_pin.errors import InputError
 
 _FILE = typer.Argument(
     metavar="FILE|NAME",
-    help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), a URDF, or the name of "
-    "one that comes with the package, such as **delta**.",
+    help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), a URDF, a folder of "
+    "Gepetto's example-parallel-robots, or the name of one that comes with the package, such as "
+    "**delta**.",
     show_default=False,
     autocompletion=names_or_files(mechanism_names),
 )
@@ -57,7 +59,8 @@ PackagePathOption = Annotated[
 def load_mechanism(file: Path, ignore_limits: bool = False) -> tuple[ClosedLoopModel, Path]:
     """Return the mechanism of a file, told by its suffix, or of a name; and its file.
 
-    Of a URDF nothing is driven, and only the loops that it states itself are closed.
+    Of a URDF nothing is driven, and only the loops that it states itself are closed. A folder is
+    one of Gepetto's example-parallel-robots.
 
     Raises
     ------
@@ -65,6 +68,8 @@ def load_mechanism(file: Path, ignore_limits: bool = False) -> tuple[ClosedLoopM
         If there is no mechanism of that name (lists those there are), or the suffix is of no kind
         that is read.
     """
+    if file.is_dir():
+        file /= FILE
     if not (file.suffix or file.is_file()):
         names = mechanism_names()
         if str(file) not in names:

@@ -38,6 +38,7 @@ from rps_pin.closed_loop.editing.replace import (
     replaced_configuration,
     replaced_effects,
 )
+from rps_pin.closed_loop.io.gepetto import parts_from_gepetto
 from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts, with_effects, without_position_limits
@@ -220,6 +221,34 @@ class ClosedLoopModel:
             If the loops do not close from there; says by how much, and which.
         """
         return cls._from_parts(parts_from_yaml(path, within_limits))
+
+    @classmethod
+    def from_gepetto(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        root: Literal["fixed", "free"] = "fixed",
+        within_limits: bool = True,
+    ) -> ClosedLoopModel:
+        """Build a mechanism from a folder of Gepetto's example-parallel-robots.
+
+        `load` reads these too, with a fixed root; whether the root floats is not in the files.
+
+        Parameters
+        ----------
+        path
+            The folder with ``robot.yaml`` and its URDF, or the YAML file.
+        root
+            ``"free"``: the root link is on a free-flyer called ``"root_joint"``.
+        within_limits
+            Whether the URDF's position limits count.
+
+        Raises
+        ------
+        InputError, MechanismError, ClosureError
+            As `load`.
+        """
+        return cls._from_parts(parts_from_gepetto(path, root, within_limits))
 
     @classmethod
     def from_mjcf(

@@ -12,13 +12,14 @@ import pinocchio as pin
 from pinocchio import coal
 
 from rps_pin.closed_loop.constraints.closures import LoopClosure
+from rps_pin.closed_loop.io.gepetto import gepetto_urdf, is_gepetto
 from rps_pin.closed_loop.io.mechanism_schema import Description
 from rps_pin.closed_loop.io.urdf.elements import few
 from rps_pin.closed_loop.io.urdf.normal_form import Shapes, normal_form
 from rps_pin.closed_loop.io.urdf.packages import file_of
 from rps_pin.closed_loop.io.urdf.tree import urdf_file
 from rps_pin.closed_loop.model import ClosedLoopModel
-from rps_pin.config import read_config
+from rps_pin.config import read_yaml
 from rps_pin.errors import InputError
 
 PackagePath = Sequence[str | os.PathLike[str]]
@@ -54,10 +55,14 @@ def visual_model(
     """
     urdf = Path(path)
     if urdf.suffix.lower() != ".urdf":
-        _, description = read_config(path, "mechanism", Description)
-        if description.urdf is None:
-            return None
-        urdf = urdf.parent / Path(description.urdf).expanduser()
+        file = read_yaml(path, "mechanism file")
+        if is_gepetto(file):
+            urdf = gepetto_urdf(urdf)
+        else:
+            description = file.validated(Description, "a mechanism")
+            if description.urdf is None:
+                return None
+            urdf = urdf.parent / Path(description.urdf).expanduser()
     shapes, missing = urdf_shapes(urdf, model, package_path)
     if missing:
         warnings.warn(f"{urdf}: not drawn: {few(missing)}", stacklevel=2)

@@ -25,11 +25,12 @@ from rps_pin.closed_loop.column_names import named_velocities
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure, frame_id
 from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
 from rps_pin.closed_loop.editing.replace import replace_joints, replaced_configuration
+from rps_pin.closed_loop.io.gepetto import is_gepetto, parts_from_gepetto
 from rps_pin.closed_loop.io.mechanism_schema import ClosureEntry, CouplingEntry, Description
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts, without_position_limits
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
-from rps_pin.config import YamlFile, read_config
+from rps_pin.config import YamlFile, read_yaml
 from rps_pin.errors import InputError, MechanismError, shown
 
 #: How far a joint's given coordinates may be from a rotation's (norm of a quaternion, of a cosine
@@ -41,6 +42,8 @@ def parts_from_yaml(
     path: str | os.PathLike[str], within_limits: bool | None = None
 ) -> MechanismParts:
     """Read a mechanism from its description, a YAML file.
+
+    Descriptions of Gepetto's example-parallel-robots, and their folders, are read too.
 
     Parameters
     ----------
@@ -57,7 +60,12 @@ def parts_from_yaml(
         If what it describes does not hold together (unknown frame, joint or kind; a bad URDF or
         MJCF).
     """
-    file, description = read_config(path, "mechanism", Description)
+    if Path(path).is_dir():
+        return parts_from_gepetto(path, within_limits=within_limits is not False)
+    file = read_yaml(path, "mechanism file")
+    if is_gepetto(file):
+        return parts_from_gepetto(path, within_limits=within_limits is not False)
+    description = file.validated(Description, "a mechanism")
     tree = _tree(file, description, Path(path))
     if not (description.within_limits if within_limits is None else within_limits):
         tree = without_position_limits(tree)
