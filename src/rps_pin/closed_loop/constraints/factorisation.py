@@ -122,8 +122,9 @@ class PassiveFactorisation:
         solved: Array = self._lu.solve(right).reshape(right.shape)  # one column comes flat
         # The estimate does not see a pivot that is exactly zero, nor a matrix of rounding errors;
         # the solution does.
-        well = self._lu.rcond() > self._harmless_rcond and dasum(solved.ravel("K")) <= HUGE * (
-            1.0 + dasum(right.ravel("K"))
+        well = self._lu.rcond() > self._harmless_rcond and (
+            not right.size  # of no columns BLAS has no sum
+            or dasum(solved.ravel("K")) <= HUGE * (1.0 + dasum(right.ravel("K")))
         )
         return solved if well else None
 

@@ -303,7 +303,7 @@ class CompiledMechanism:
                 lambda m, q, x: (m.complete(x, q, **given),), (guess, asked), **options
             )
         joints = [self.model.joints[self.model.getJointId(name)] for name in self.actuated]
-        at = np.array([joint.idx_q for joint in joints])
+        at = np.array([joint.idx_q for joint in joints], dtype=np.intp)
         batch = np.broadcast_shapes(asked.shape[:-1], guess.shape[:-1])
         wanted = np.broadcast_to(guess, (*batch, self.model.nq)).copy()
         wanted[..., at] = asked

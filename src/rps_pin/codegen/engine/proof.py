@@ -337,7 +337,8 @@ class Proof:
         model = self._m.model
         # Moves of a ball about two of its axes add up to one about the third.
         simple = [joint.idx_v for joint in list(model.joints)[1:] if joint.nq == 1]
-        moved = pin.difference(model, s.near, q)[np.intersect1d(self._independent, simple)]
+        chosen = np.isin(self._independent, simple)
+        moved = pin.difference(model, s.near, q)[self._independent[chosen]]
         return np.asarray(q + np.abs(moved).max(initial=self._m.loop_gap(q)))
 
     def _slope(self, s: Sample, name: str, found: Array) -> Array:
