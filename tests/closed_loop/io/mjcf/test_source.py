@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import struct
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rps_pin import ClosedLoopModel, InputError, MechanismError
@@ -124,6 +126,32 @@ def test_lines_of_included_files_are_theirs(tmp_path: Path) -> None:
     )
     with pytest.raises(MechanismError, match=rf"two\.xml, line 4: joint 'j' has {WHY}"):
         parts_from_mjcf(path)
+
+
+def test_files_of_any_suffix_are_read_with_what_they_include(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        main="""<mujoco><compiler meshdir="meshes"/><include file="parts/one.xml"/>
+            <asset><model name="leg" file="parts/leg.xml"/><mesh name="t" file="t.stl"/></asset>
+            <worldbody><body><joint name="k"/><geom type="mesh" mesh="t"/></body>
+            <attach model="leg" prefix="left_"/></worldbody></mujoco>""",
+        parts__one='<mujoco><include file="parts/two.xml"/></mujoco>',
+        parts__two=mujoco_file(BODY),
+        parts__leg=mujoco_file(BODY),
+    )
+    (tmp_path / "meshes").mkdir()
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    faces = b"".join(
+        struct.pack("<12fH", 0, 0, 0, *corners[face].ravel(), 0)
+        for face in ([0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2])
+    )
+    (tmp_path / "meshes" / "t.stl").write_bytes(b"\0" * 80 + struct.pack("<I", 4) + faces)
+    right = parts_from_mjcf(path)
+    assert set(right.model.names) == {"universe", "j", "k", "left_j"}
+    for suffix in (".mjcf", ".XML", ".txt", ""):
+        other = path.with_suffix(suffix)
+        other.write_text(path.read_text())
+        assert parts_from_mjcf(other).model == right.model
 
 
 def test_lines_of_elements_without_names_in_included_files_are_theirs(tmp_path: Path) -> None:

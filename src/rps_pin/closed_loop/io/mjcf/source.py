@@ -38,6 +38,15 @@ class _Place(NamedTuple):
     xml: Any
 
 
+class _File(NamedTuple):
+    """A file that another one includes or attaches."""
+
+    name: str
+    """As it is written there."""
+    path: str
+    text: str
+
+
 class MjcfSource:
     """A file, compiled.
 
@@ -91,10 +100,7 @@ class MjcfSource:
         try:
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                if self._path is None:
-                    spec = mujoco.MjSpec.from_string(self._text)
-                else:
-                    spec = mujoco.MjSpec.from_file(str(self._path))
+                spec = self._parsed()
                 model = spec.compile()
         except ValueError as error:
             why = " ".join(str(error).split())
@@ -105,6 +111,18 @@ class MjcfSource:
         for words in found:
             self.told[f"MuJoCo warns: {' '.join(words.split())}"] = [self.origin]
         return spec, model
+
+    def _parsed(self) -> Any:
+        """Return MuJoCo's specification; it reads files only whose names end in .xml by itself."""
+        spec = self.mujoco.MjSpec
+        if self._path is not None and self._path.suffix == ".xml":
+            return spec.from_file(str(self._path))
+        if self._path is None:
+            return spec.from_string(self._text)
+        parts = {one.name: one.text.encode() for one in self._parts()}
+        found = spec.from_string(self._text, include=parts)
+        found.modelfiledir = str(self._path.absolute().parent)
+        return found
 
     def read(self, name: str, number: int) -> Any:
         """Return an entry of an array of the model, or 0 where this MuJoCo has no such array."""
@@ -187,20 +205,26 @@ class MjcfSource:
 
     def _places(self) -> Iterator[_Place]:
         """Yield all elements of the file and of those that it includes or attaches."""
-        yield from _places(self._text, self.origin, [self._path.parent if self._path else Path()])
+        files = [_File("", self.origin, self._text), *self._parts()]
+        for one in files:
+            root = _root(one.text)
+            for xml in () if root is None else root.iter(etree.Element):
+                yield _Place(one.path, xml.sourceline, xml)
+
+    def _parts(self) -> Iterator[_File]:
+        """Yield the files that the file includes or attaches."""
+        yield from _parts(self._text, [self._path.parent if self._path else Path()])
 
 
-def _places(text: str, file: str, folders: list[Path]) -> Iterator[_Place]:
+def _parts(text: str, folders: list[Path]) -> Iterator[_File]:
     root = _root(text)
-    for xml in () if root is None else root.iter(etree.Element):
-        yield _Place(file, xml.sourceline, xml)
-        if xml.tag in ("include", "model") and "file" in xml.attrib:
-            for folder in folders:
-                path = folder / xml.get("file")
-                if path.is_file():
-                    found = path.read_text("utf-8", "replace")
-                    yield from _places(found, str(path), [*folders, path.parent])
-                    break
+    for xml in () if root is None else root.iter("include", "model"):
+        name = xml.get("file", "")
+        path = next((f / name for f in folders if name and (f / name).is_file()), None)
+        if path is not None:
+            found = path.read_text("utf-8", "replace")
+            yield _File(name, str(path), found)
+            yield from _parts(found, [*folders, path.parent])
 
 
 def _root(text: str) -> Any:
