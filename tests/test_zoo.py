@@ -58,7 +58,7 @@ def test_a_folder_is_tried(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     robots = tmp_path / "robots"
     robots.mkdir()
     texts = {
-        "hinges.txt": HINGES,
+        "hinges.xml": HINGES,
         "arm": ARM,
         "arm.yaml": "urdf: arm\nactuated: [turn]\n",
         "prism.urdf": ARM.replace('type="continuous"', 'type="prism"'),
@@ -75,7 +75,7 @@ def test_a_folder_is_tried(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert written["apart"] == {"SDF": 1}
     outcomes = {one["file"]: (one["outcome"], one["agrees"]) for one in written["files"]}
     assert outcomes == {
-        "hinges.txt": ("loads", True),
+        "hinges.xml": ("loads", True),
         "arm": ("loads", True),
         "arm.yaml": ("loads", None),
         "no_mass.xml": ("apart", None),

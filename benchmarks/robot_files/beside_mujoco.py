@@ -82,22 +82,22 @@ def differences(mechanism: ClosedLoopModel, model: Any, seed: int = 1) -> dict[s
     q = random_closed(mechanism, rng)
     motions = mechanism.allowed_motions(q)
     v = motions @ rng.normal(size=motions.shape[1])
-    a = rng.normal(size=v.size)
+    a = twin.lengths @ rng.normal(size=v.size)
     mass, forces = twin.mass_and_forces(q, v, a)
     tree, effects = mechanism.model, mechanism.effects
     ours = mechanism.generalised_force(q, v, a)
     if effects is not None:
         ours = ours - effects.friction * np.tanh(v / effects.friction_speed)
     found = {
-        "mass matrix": _relative(_mass(tree, q), mass),
-        "forces": _relative(ours, forces),
+        "mass matrix": _relative(twin.lengths.T @ _mass(tree, q) @ twin.lengths, mass),
+        "forces": _relative(twin.lengths.T @ ours, forces),
     }
     residual, rows = twin.equalities(q)
     if rows.size:
         found["equality residual"] = float(np.abs(residual).max())
         found["allowed motions"] = _relative(rows @ motions + 1.0, np.ones((len(rows), 1)))
     rank = int(np.linalg.matrix_rank(rows, rtol=1e-8)) if rows.size else 0
-    found["rank"] = float(abs(v.size - motions.shape[1] - rank))
+    found["rank"] = float(abs(model.nv - motions.shape[1] - rank))
     tau = rng.normal(size=mechanism.actuated_indices.size)
     still = np.zeros(v.size)
     try:
@@ -131,7 +131,11 @@ def _relative(ours: Array, theirs: Array) -> float:
 
 
 class Twin:
-    """MuJoCo's model with the coordinates of a mechanism."""
+    """MuJoCo's model with the coordinates of a mechanism.
+
+    A fixed tendon may be a joint of the mechanism, whose coordinate is its length. `lengths`
+    expresses a velocity by that without tendons, shape (nv, nv): the identity if there are none.
+    """
 
     def __init__(self, mechanism: ClosedLoopModel, model: Any) -> None:
         self.mechanism, self.model = mechanism, model
@@ -140,63 +144,83 @@ class Twin:
         model.opt.enableflags = 0
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         self.data = mujoco.MjData(model)
-        self.pairs = self._pairs()
-        self.fixed = self._fixed()
+        self.pairs, tendons = self._pairs()
+        self.lengths = self._lengths(tendons)
 
-    def _pairs(self) -> list[tuple[int, int]]:
-        """Return MuJoCo's and Pinocchio's index of each joint: by name, the unnamed in order."""
+    def _pairs(self) -> tuple[list[tuple[int, list[int]]], list[tuple[int, int]]]:
+        """Return MuJoCo's and Pinocchio's indices of joints, and of tendons that are joints.
+
+        Joints are told by name, the unnamed by their order. A free joint may be two of
+        Pinocchio's: a translation and a ball.
+        """
         tree, model = self.mechanism.model, self.model
         names = {name: index for index, name in enumerate(tree.names) if index}
-        pairs, unnamed = [], []
-        for joint in range(model.njnt):
-            index = names.pop(model.joint(joint).name, None)
-            if index is not None:
-                pairs.append((joint, index))
-            elif not model.joint(joint).name:
-                unnamed.append(joint)
-        if len(unnamed) < len(names):
-            raise NotComparableError(f"MuJoCo has no joint for {', '.join(names)}")
-        pairs += zip(unnamed, names.values(), strict=False)
-        for joint, index in pairs:
-            size = tree.joints[index].nq, tree.joints[index].nv
-            size = (1, 1) if size == _CONTINUOUS else size
-            if size != _SIZES[mujoco.mjtJoint(model.jnt_type[joint]).name]:
+        given = [model.joint(joint).name for joint in range(model.njnt)]
+        tendons = []
+        for tendon in range(model.ntendon):
+            name = model.tendon(tendon).name or f"tendon_{tendon + 1}"
+            name = f"{name}_tendon" if name in given else name
+            if name in names and tree.nvs[names[name]] == 1:
+                tendons.append((tendon, names.pop(name)))
+        own = [[names.pop(name)] if name in names else [] for name in given]
+        for name, indices in zip(given, own, strict=True):
+            if indices and tree.nqs[indices[0]] == 4 and f"{name}_position" in names:
+                indices.insert(0, names.pop(f"{name}_position"))
+        unnamed = iter(names.values())
+        pairs = []
+        for joint, indices in enumerate(own):
+            size = _SIZES[mujoco.mjtJoint(model.jnt_type[joint]).name]
+            while not given[joint] and sum(tree.nvs[i] for i in indices) < size[1]:
+                indices.append(next(unnamed, 0))
+            if not indices:
+                continue  # it does not move in the mechanism
+            place = tree.joints[indices[0]]
+            ours = sum(tree.nqs[i] for i in indices), sum(tree.nvs[i] for i in indices)
+            if size != ((1, 1) if (place.nq, place.nv) == _CONTINUOUS else ours):
                 raise NotComparableError(
-                    f"joint {tree.names[index]!r} has other coordinates in MuJoCo"
+                    f"joint {tree.names[indices[0]]!r} has other coordinates in MuJoCo"
                 )
-        return pairs
+            pairs.append((joint, indices))
+        if left := list(unnamed):
+            raise NotComparableError(
+                f"MuJoCo has no joint for {', '.join(tree.names[i] for i in left)}"
+            )
+        return pairs, tendons
 
-    def _fixed(self) -> dict[int, float]:
-        """Return the coordinates that equalities of one joint fix, by address."""
-        model, found = self.model, {}
-        for row in range(model.neq):
-            alone = model.eq_obj2id[row] < 0 and model.eq_active0[row]
-            if model.eq_type[row] == mujoco.mjtEq.mjEQ_JOINT and alone:
-                place = model.jnt_qposadr[model.eq_obj1id[row]]
-                found[int(place)] = model.qpos0[place] + model.eq_data[row][0]
+    def _lengths(self, tendons: list[tuple[int, int]]) -> Array:
+        tree, model = self.mechanism.model, self.model
+        found = np.eye(tree.nv)
+        places = {joint: tree.idx_vs[indices[0]] for joint, indices in self.pairs}
+        for tendon, index in tendons:
+            row = tree.idx_vs[index]
+            found[row] = 0.0
+            for wrap in range(
+                model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon]
+            ):
+                found[row, places[model.wrap_objid[wrap]]] += model.wrap_prm[wrap]
         return found
 
     def put(self, q: Array) -> Array:
         """Set qpos; return P with MuJoCo's velocity = P times Pinocchio's."""
         tree, model, data = self.mechanism.model, self.model, self.data
         mujoco.mj_resetData(model, data)
-        for place, value in self.fixed.items():
-            data.qpos[place] = value
         transform = np.zeros((model.nv, tree.nv))
-        for number, index in self.pairs:
-            joint = tree.joints[index]
-            own = q[joint.idx_q :][: joint.nq]
-            turn = np.eye(joint.nv)
-            if joint.nq == 7:  # linear velocity in world axes
-                own = own[[0, 1, 2, 6, 3, 4, 5]]
-                turn[:3, :3] = pin.Quaternion(q[joint.idx_q :][3:7]).matrix()
-            elif joint.nq == 4:
-                own = own[[3, 0, 1, 2]]
-            elif (joint.nq, joint.nv) == _CONTINUOUS:
-                own = np.arctan2(own[1:], own[:1])
+        for number, indices in self.pairs:
             place, dof = model.jnt_qposadr[number], model.jnt_dofadr[number]
-            data.qpos[place : place + own.size] = own
-            transform[dof : dof + joint.nv, joint.idx_v : joint.idx_v + joint.nv] = turn
+            for index in indices:
+                joint = tree.joints[index]
+                own = q[joint.idx_q :][: joint.nq]
+                turn = np.eye(joint.nv)
+                if joint.nq == 7:  # linear velocity in world axes
+                    own = own[[0, 1, 2, 6, 3, 4, 5]]
+                    turn[:3, :3] = pin.Quaternion(q[joint.idx_q :][3:7]).matrix()
+                elif joint.nq == 4:
+                    own = own[[3, 0, 1, 2]]
+                elif (joint.nq, joint.nv) == _CONTINUOUS:
+                    own = np.arctan2(own[1:], own[:1])
+                data.qpos[place : place + own.size] = own
+                transform[dof : dof + joint.nv, joint.idx_v : joint.idx_v + joint.nv] = turn
+                place, dof = place + own.size, dof + joint.nv
         return transform
 
     def mass_and_forces(self, q: Array, v: Array, a: Array) -> tuple[Array, Array]:
@@ -207,8 +231,7 @@ class Twin:
         model.opt.disableflags |= off
         data.qvel[:] = transform @ v
         drift = a.copy()  # of the linear velocity: w x v in body axes
-        for _, index in self.pairs:
-            joint = self.mechanism.model.joints[index]
+        for joint in self.mechanism.model.joints:
             if joint.nq == 7:
                 twist = v[joint.idx_v :][:6]
                 drift[joint.idx_v : joint.idx_v + 3] += np.cross(twist[3:], twist[:3])
