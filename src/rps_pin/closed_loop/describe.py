@@ -172,7 +172,7 @@ class MechanismDescription:
             (c.name, c.kind, c.ends(), f"{c.rows} ({c.needed} needed)") for c in self.closures
         ]
         lines = [
-            f"{self.name}: mobility {self.mobility}, actuation {self.verdict()}",
+            f"{self.name or 'mechanism'}: mobility {self.mobility}, actuation {self.verdict()}",
             "",
             *_table(("joint", "kind", "", "limits (rad, m)"), joints),
             "",
@@ -199,11 +199,11 @@ class MechanismDescription:
         if self.actuation == "underactuated":
             return f"underactuated: {left} of {self.mobility} motions have no actuator"
         idle = sum(freedom.size for freedom in self.idle)
-        beside = f", {_counted(idle, 'idle freedom')}" if idle else ""
+        beside = f", {counted(idle, 'idle freedom')}" if idle else ""
         if self.actuation == "redundant":
             more = driven - self.actuated_rank
             return f"redundant: {driven} actuators, {more} more than needed{beside}"
-        return f"sufficient: {_counted(driven, 'actuator')}{beside}"
+        return f"sufficient: {counted(driven, 'actuator')}{beside}"
 
 
 def describe(
@@ -293,7 +293,8 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, str) else value
 
 
-def _counted(number: int, what: str) -> str:
+def counted(number: int, what: str) -> str:
+    """Return a number of things in words."""
     return f"{number} {what}" + ("" if number == 1 else "s")
 
 
@@ -306,7 +307,7 @@ def _driven(joint: JointDescription) -> str:
 def _in_words(freedom: Freedom) -> str:
     """Return what moves in a freedom."""
     links = ", ".join(freedom.links)
-    return f"{_counted(freedom.size, 'motion')} of {links} (joints: {', '.join(freedom.joints)})"
+    return f"{counted(freedom.size, 'motion')} of {links} (joints: {', '.join(freedom.joints)})"
 
 
 def _limits(joint: JointDescription) -> str:

@@ -47,6 +47,7 @@ from rps_pin.closed_loop.io.write.files import write_mjcf, write_urdf
 from rps_pin.closed_loop.io.write.source import Source
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
+from rps_pin.closed_loop.summary import in_lines, in_one_line
 from rps_pin.errors import ClosureError, CompileError, MechanismError
 from rps_pin.validation import choice, real_vector
 
@@ -314,6 +315,13 @@ class ClosedLoopModel:
         home = self._home if self._home is self._start else None  # as given
         rebuilt = partial(type(self), home=home, **self._options())
         return rebuilt, (self.model, self.closures, self.actuated)
+
+    def __repr__(self) -> str:
+        return in_one_line(type(self).__name__, self.name, self.system)
+
+    def __str__(self) -> str:
+        """Mobility, actuation, joints, closures; `describe` tells more."""
+        return in_lines(self.name, self.system, self.describe)
 
     def _options(self) -> dict[str, Any]:
         """Return what it was made with, but for model, closures, actuated joints and home."""

@@ -34,6 +34,7 @@ from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation.damped import STIFF, viscous_rate
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.stepper import Stepper
+from rps_pin.closed_loop.summary import in_one_line
 from rps_pin.codegen.engine.applied import with_parameters
 from rps_pin.codegen.engine.batches import Errors, by_samples, settled
 from rps_pin.codegen.engine.forces import GeneratedForces, each, kept
@@ -86,6 +87,14 @@ class CompiledMechanism:
         self._is_actuated = code.partition.is_actuated
         self._chosen: dict[tuple[str, ...], bool] = {}  # whether these are the independent joints
         self._underactuated = actuated < code.partition.independent.size
+
+    def __repr__(self) -> str:
+        return in_one_line(type(self).__name__, self.name, self.mechanism.system)
+
+    def __str__(self) -> str:
+        """Of the mechanism, and what compiled its functions."""
+        built = ", ".join(f"{group} by {by}" for group, by in self.compilers.items())
+        return f"{self.reference()}\ncompiled: {built or 'nothing yet'}"
 
     # Structure ------------------------------------------------------------------------------------
 
