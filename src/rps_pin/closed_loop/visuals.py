@@ -89,7 +89,8 @@ def urdf_shapes(
         return found
 
     missing: list[str] = []
-    text = normal_form(urdf_file(urdf), Shapes(mesh, missing))
+    links = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
+    text = normal_form(urdf_file(urdf), Shapes(mesh, missing, links))
     try:
         shapes = pin.buildGeomFromUrdfString(
             model, text, pin.GeometryType.VISUAL, mesh_loader=loader

@@ -31,9 +31,11 @@ from rps_pin.validation import real_vector
 MergedKind = Literal["spherical", "universal"]
 
 _JOINTS_OF = {"spherical": 3, "universal": 2}
-#: Origins count as coincident below this distance, m; and masses as none below this, kg.
+#: Origins count as coincident below this distance, m.
 _COINCIDENT = 1e-9
-_MASSLESS = 1e-12
+#: Links between joints may have this share of the mass, and of the moments of inertia about the
+#: joint, of what the last one carries: many files give them 1e-9 kg for want of 0.
+PLACEHOLDER = 1e-5
 #: Axes count as perpendicular below this cosine, and as parallel below this sine.
 _PERPENDICULAR = 1e-6
 _PARALLEL = 1e-3
@@ -84,7 +86,8 @@ def merged(model: pin.Model, merges: Sequence[JointMerge]) -> pin.Model:
     reference configurations. A universal joint has the coordinates, limits, ... of its two joints.
     A spherical joint has no limits, since those of three angles are not limits of a rotation.
     Frames on the links between are left out; the frame of the last joint has the merged joint's
-    name.
+    name. The links between must be massless but for a `PLACEHOLDER`, which is added, as it is at
+    zero angles, to the link that the last joint carries.
 
     Raises
     ------
@@ -98,6 +101,8 @@ def merged(model: pin.Model, merges: Sequence[JointMerge]) -> pin.Model:
         row[-1]: _merged_joint(model, merge, row) for merge, row in zip(merges, rows, strict=True)
     }
     result = rebuilt(model, joints, {joint for row in rows for joint in row[:-1]})
+    for merge, row in zip(merges, rows, strict=True):
+        result.inertias[result.getJointId(merge.name)] += _between(model, row)
     for entry in model.referenceConfigurations:
         result.referenceConfigurations[entry.key()] = merged_configuration(
             model, merges, entry.data()
@@ -139,6 +144,25 @@ def merged_configuration(model: pin.Model, merges: Sequence[JointMerge], q: Arra
     return np.concatenate(values) if values else np.empty(0)
 
 
+def placeholder_notes(model: pin.Model, merges: Sequence[JointMerge]) -> list[str]:
+    """Return a sentence for each merge whose links between have a mass."""
+    masses = [(merge, _between(model, _row(model, merge)).mass) for merge in merges]
+    return [
+        f"merge {merge.name!r}: {mass:.6g} kg of the links between is added to the link it carries"
+        for merge, mass in masses
+        if mass
+    ]
+
+
+def _between(model: pin.Model, row: list[int]) -> pin.Inertia:
+    """Return the inertia of the links between, at zero angles, in the frame of the last joint."""
+    total, to_last = pin.Inertia.Zero(), pin.SE3.Identity()
+    for joint, before in zip(row[:0:-1], row[-2::-1], strict=True):
+        to_last = model.jointPlacements[joint] * to_last
+        total += to_last.actInv(model.inertias[before])
+    return total
+
+
 def _turned(model: pin.Model, row: list[int], q: Array) -> Array:
     """Return R of a row of three joints, as in the module docstring; shape (3, 3)."""
     straight, turned = np.eye(3), np.eye(3)
@@ -177,12 +201,13 @@ def _row(model: pin.Model, merge: JointMerge) -> list[int]:
         _axis(model, joint, what)
     for first, second in pairwise(row):
         _check_link(model, what, first, second)
+    _check_masses(model, what, row)
     _check_axes(model, what, merge, row)
     return row
 
 
 def _check_link(model: pin.Model, what: str, first: int, second: int) -> None:
-    """Refuse a link between two joints that has mass, other joints, or a length."""
+    """Refuse a link between two joints that has other joints, or a length."""
     before, after = model.names[first], model.names[second]
     if model.parents[second] != first:
         raise MechanismError(
@@ -201,14 +226,31 @@ def _check_link(model: pin.Model, what: str, first: int, second: int) -> None:
             f"{what}: the origins of {before!r} and {after!r} are {offset:.6g} m apart; "
             "joints are merged where they meet in a point"
         )
-    inertia = model.inertias[first]
-    largest = float(np.abs(inertia.inertia).max())
-    if inertia.mass > _MASSLESS or largest > _MASSLESS:
+
+
+def _check_masses(model: pin.Model, what: str, row: list[int]) -> None:
+    """Refuse links between that weigh more than a `PLACEHOLDER` of what the last joint carries."""
+    data = model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    last, carried = row[-1], pin.Inertia.Zero()
+    for joint in model.subtrees[last]:
+        carried += data.oMi[last].actInv(data.oMi[joint]).act(model.inertias[joint])
+    for first, second in pairwise(row):
+        inertia = model.inertias[first]
+        shares = (inertia.mass, carried.mass), (_moments(inertia), _moments(carried))
+        if all(part <= PLACEHOLDER * whole for part, whole in shares):
+            continue
         raise MechanismError(
-            f"{what}: the link between {before!r} and {after!r} has a mass of "
-            f"{inertia.mass:.6g} kg and a moment of inertia of {largest:.6g} kg m^2; only massless "
-            "links can be left out"
+            f"{what}: the link between {model.names[first]!r} and {model.names[second]!r} has a "
+            f"mass of {inertia.mass:.6g} kg and a moment of inertia of "
+            f"{np.abs(inertia.inertia).max():.6g} kg m^2; only links can be left out that are "
+            f"massless, or have at most {PLACEHOLDER:g} of what they carry ({carried.mass:.6g} kg)"
         )
+
+
+def _moments(inertia: pin.Inertia) -> float:
+    """Return the sum of the moments of inertia about the joint's point, kg m^2."""
+    return float(np.trace(inertia.matrix()[3:, 3:]))
 
 
 def _check_axes(model: pin.Model, what: str, merge: JointMerge, row: list[int]) -> None:

@@ -23,7 +23,12 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.column_names import named_velocities
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure, frame_id
-from rps_pin.closed_loop.editing.merge import JointMerge, merged, merged_configuration
+from rps_pin.closed_loop.editing.merge import (
+    JointMerge,
+    merged,
+    merged_configuration,
+    placeholder_notes,
+)
 from rps_pin.closed_loop.editing.replace import replace_joints, replaced_configuration
 from rps_pin.closed_loop.io.gepetto import is_gepetto, parts_from_gepetto
 from rps_pin.closed_loop.io.mechanism_schema import ClosureEntry, CouplingEntry, Description
@@ -156,7 +161,8 @@ def _merged(
     """Merge joints, and leave out the effects at those that are merged."""
     with file.at("merge"):
         model = merged(tree.model, merges)
-    changes: dict[str, Any] = {"model": model}
+        notes = placeholder_notes(tree.model, merges)
+    changes: dict[str, Any] = {"model": model, "notes": (*tree.notes, *notes)}
     for effect in EFFECTS:
         values = getattr(tree, effect)
         for merge in merges:

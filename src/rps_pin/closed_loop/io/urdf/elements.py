@@ -33,7 +33,8 @@ VELOCITIES = dict.fromkeys(SIMPLE, 1) | {
     "ball": 3,
     "floating": 6,
 }
-_INERTIAS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+#: Attributes of an ``inertia`` element.
+INERTIAS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
 #: Moments of inertia below this, negative, are rounding, kg m^2; and axes below this, zero.
@@ -163,7 +164,7 @@ class UrdfFile:
             if default is None:
                 self.refuse(element, f"<{tag_of(element)}> has no {attribute}")
             return list(default)
-        parts = text.split()
+        parts = text.split() if text.isascii() else [text]
         if len(parts) != count or not all(_NUMBER.fullmatch(part) for part in parts):
             wanted = "a finite number" if count == 1 else f"{count} finite numbers"
             self.refuse(element, f"{tag_of(element)} {attribute} = {text!r} must be {wanted}")
@@ -277,12 +278,12 @@ def _check_inertial(file: UrdfFile, inertial: Any) -> None:
         file.refuse(inertial, f"{link}: its inertial has no mass value")
     if inertia is None:
         file.refuse(inertial, f"{link}: its inertial has no inertia")
-    missing = [name for name in _INERTIAS if get(inertia, name) is None]
+    missing = [name for name in INERTIAS if get(inertia, name) is None]
     if missing:
         file.refuse(inertia, f"{link}: its inertia has no {', '.join(missing)}")
     if file.number(mass, "value") < 0:
         file.refuse(mass, f"{link}: mass = {get(mass, 'value')} kg is negative")
-    xx, xy, xz, yy, yz, zz = (file.number(inertia, name) for name in _INERTIAS)
+    xx, xy, xz, yy, yz, zz = (file.number(inertia, name) for name in INERTIAS)
     for name in ("ixx", "iyy", "izz"):
         if file.number(inertia, name) < -_ROUNDING:
             value = get(inertia, name)

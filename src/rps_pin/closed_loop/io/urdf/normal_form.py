@@ -1,20 +1,20 @@
 """The plain URDF that Pinocchio's parser is given, from a file of any of the dialects.
 
-It has links, their inertias and shapes, and joints of the types that Pinocchio reads well. Names,
-numbers and order are the file's. Every moving joint has stand-in limits, and a joint of another
-type stands in as a revolute one: `tree` sets limits and types in the model.
+It has links, their inertias and shapes, and joints of the types that Pinocchio reads well. Names
+and order are the file's, and its numbers to the last digit. Every moving joint has stand-in limits,
+and a joint of another type stands in as a revolute one: `tree` sets limits and types in the model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from lxml import etree
 
-from rps_pin.closed_loop.io.urdf.elements import UrdfFile, UrdfJoint
+from rps_pin.closed_loop.io.urdf.elements import INERTIAS, UrdfFile, UrdfJoint
 from rps_pin.closed_loop.io.urdf.vocabulary import child, children, get, tag_of
 from rps_pin.errors import InputError
 
@@ -36,6 +36,8 @@ class Shapes(NamedTuple):
     """The path of a mesh by its attributes; raises `InputError` where it cannot be drawn."""
     missing: list[str]
     """Here come the reasons why shapes are left out."""
+    links: Collection[str]
+    """Names of the links that the model has."""
 
 
 def normal_form(file: UrdfFile, shapes: Shapes | None = None) -> str:
@@ -68,8 +70,9 @@ def normal_form(file: UrdfFile, shapes: Shapes | None = None) -> str:
 
 def _inertial(file: UrdfFile, element: Any, inertial: Any) -> None:
     _origin(file, child(element, "origin"), inertial)
-    for tag in ("mass", "inertia"):
-        etree.SubElement(inertial, tag, _attributes(child(element, tag)))
+    for tag, names in (("mass", ("value",)), ("inertia", INERTIAS)):
+        given = child(element, tag)
+        etree.SubElement(inertial, tag, {n: _text(file.number(given, n)) for n in names})
 
 
 def _joint(file: UrdfFile, joint: UrdfJoint, robot: Any) -> None:
@@ -88,7 +91,7 @@ def _visual(file: UrdfFile, element: Any, link: Any, shapes: Shapes) -> None:
     """Copy a visual whose shape can be drawn; say why another cannot."""
     geometry = child(element, "geometry")
     inside = [] if geometry is None else list(geometry.iterchildren("*"))
-    if len(inside) != 1:
+    if len(inside) != 1 or get(link, "name") not in shapes.links:
         shapes.missing.append(f"a visual of {get(link, 'name')!r} (line {element.sourceline})")
         return
     tag, attributes = tag_of(inside[0]).removeprefix("drake:"), _attributes(inside[0])
@@ -133,10 +136,12 @@ def _origin(file: UrdfFile, element: Any | None, parent: Any) -> None:
     """Copy an origin; its rotation as rpy."""
     if element is None:
         return
-    pose = {name: get(element, name) for name in ("xyz", "rpy") if get(element, name) is not None}
-    if get(element, "quat_xyzw") is not None:
-        pose["rpy"] = _text(pin.rpy.matrixToRpy(file.placement(element).rotation))
-    etree.SubElement(parent, "origin", pose)
+    if get(element, "quat_xyzw") is None:
+        rpy = file.numbers(element, "rpy", 3, (0, 0, 0))
+    else:
+        rpy = pin.rpy.matrixToRpy(file.placement(element).rotation)
+    xyz = file.numbers(element, "xyz", 3, (0, 0, 0))
+    etree.SubElement(parent, "origin", xyz=_text(xyz), rpy=_text(rpy))
 
 
 def _attributes(element: Any) -> dict[str, str]:

@@ -58,6 +58,8 @@ def _in_package(
         if _is_file(folder / inside):
             return folder / inside
         folders.append(folder)
+    if _is_file(urdf.parent / inside):
+        return urdf.parent / inside
     if folders:
         raise InputError(f"{name!r}: package {package!r} has no file {inside!r} ({folders[0]})")
     raise InputError(
@@ -81,7 +83,6 @@ def _folders(
         for prefix in _entries(variable):
             if (prefix / "share" / package).is_dir():
                 yield prefix / "share" / package
-    yield urdf.parent
 
 
 def _entries(variable: str) -> list[Path]:
