@@ -77,7 +77,7 @@ def urdf_shapes(
 
     def mesh(attributes: dict[str, str]) -> str:
         name = attributes.get("filename", "")
-        found = str(file_of(name, urdf, package_path))
+        found = str(file_of(name, urdf, package_path).absolute())
         try:
             scale = np.array(attributes.get("scale", "1 1 1").split(), dtype=np.float64)
             triangles = loader.load(found, np.broadcast_to(scale, 3).copy())

@@ -19,6 +19,9 @@ from rps_pin.files import opened
 #: The longest XML text that is read, bytes. (Meshes are files of their own.)
 LARGEST_XML = 64 * 2**20
 
+#: Binary USD files begin with this.
+BINARY_USD = b"PXR-USDC"
+
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -67,6 +70,8 @@ def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
 
 def _decoded(content: bytes) -> str:
     """Return a file's text by its byte-order mark or declared encoding; else it is UTF-8."""
+    if content.startswith(BINARY_USD):
+        return BINARY_USD.decode()  # enough to be told
     for mark, encoding in _MARKS:
         if content.startswith(mark):
             return content.decode(encoding)
@@ -87,13 +92,20 @@ def xml_root(text: str, origin: str, form: str) -> Any:
     MechanismError
         If it is not XML, or declares a document type.
     """
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, encoding="utf-8"
-    )
+    content, parser = text.encode("utf-8", "surrogatepass"), _parser()
     try:
-        root = etree.fromstring(text.encode("utf-8", "surrogatepass"), parser)
+        root = etree.fromstring(content, parser)
     except etree.XMLSyntaxError as error:
-        raise MechanismError(f"{origin} is not a valid {form}: {error}") from None
+        if any(entry.domain != etree.ErrorDomains.NAMESPACE for entry in parser.error_log):
+            raise MechanismError(f"{origin} is not a valid {form}: {error}") from None
+        # A prefix that the file does not declare, as most readers of robots do not ask for.
+        root = etree.fromstring(content, _parser(recover=True))
     if root.getroottree().docinfo.doctype:
         raise MechanismError(f"{origin} declares a document type, which no {form} needs: refused")
     return root
+
+
+def _parser(recover: bool = False) -> etree.XMLParser:
+    return etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, encoding="utf-8", recover=recover
+    )

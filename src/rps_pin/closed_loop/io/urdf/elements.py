@@ -25,6 +25,7 @@ JOINT_TYPES = {
 }
 #: Joints of one coordinate.
 SIMPLE = ("revolute", "continuous", "prismatic", "screw")
+_WITH_AXIS = (*SIMPLE, "planar")
 #: How many velocities a joint has.
 VELOCITIES = dict.fromkeys(SIMPLE, 1) | {
     "fixed": 0,
@@ -327,9 +328,7 @@ def _joint(file: UrdfFile, element: Any) -> UrdfJoint:
         kind=kind,
         parent=ends[0],
         child=ends[1],
-        axis=file.axis(None if kind in ("fixed", "floating", "ball") else child(element, "axis"))
-        if not planar
-        else np.array([0.0, 0.0, 1.0]),
+        axis=file.axis(child(element, "axis") if kind in _WITH_AXIS else None),
         lower=lower,
         upper=upper,
         effort=_largest(file, name, None if kind == "fixed" else limit, "effort"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from rps_pin.closed_loop.io.xml_file import BINARY_USD
 from rps_pin.errors import MechanismError
 
 _XACRO_ELEMENT = re.compile(r"<xacro:\w+")
@@ -29,7 +30,7 @@ _KINDS = {
 def refuse_other_formats(text: str, origin: str) -> None:
     """Raise `MechanismError` if a text is not a URDF but a file of another kind that is known."""
     start = text.lstrip()
-    if start.startswith(("#usda", "PXR-USDC")):
+    if start.startswith(("#usda", BINARY_USD.decode())):
         raise MechanismError(
             f"{origin} is a USD file, not a URDF; convert it with Isaac Sim's URDF exporter"
         )

@@ -75,8 +75,18 @@ def closures_of(file: UrdfFile) -> list[Closure]:
     for element in file.robot.iterchildren("*"):
         read = readers.get(tag_of(element))
         if read is not None:
-            found.append(read(file, element, len(found) + 1))
+            closure = read(file, element, len(found) + 1)
+            _refuse_one_link(file, element, closure)
+            found.append(closure)
     return found
+
+
+def _refuse_one_link(file: UrdfFile, element: Any, closure: Closure) -> None:
+    if isinstance(closure, LoopClosure):
+        links = {frame.name: frame.link for frame in file.frames}
+        a, b = (links.get(name, name) for name in (closure.frame_a, closure.frame_b))
+        if a == b:
+            file.refuse(element, f"{tag_of(element)} {closure.name!r} joins link {a!r} to itself")
 
 
 def _loop(file: UrdfFile, element: Any, _: int) -> Closure:
@@ -132,7 +142,7 @@ def _closure(
         options["axis"] = axes[0].tolist()
         if kind in _WITH_TWO_AXES:
             options["axis_b"] = axes[1].tolist()
-    if frames[0] == frames[1]:
+    if frames[0] == frames[1]:  # which no LoopClosure can have
         file.refuse(element, f"{tag_of(element)} {name!r} joins link {frames[0]!r} to itself")
     return LoopClosure(frames[0], frames[1], kind, name, **options)  # type: ignore[arg-type]
 

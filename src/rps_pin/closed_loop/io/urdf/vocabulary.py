@@ -14,8 +14,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from lxml import etree
-
 from rps_pin.errors import MechanismError
 
 _DRAKE = "http://drake.mit.edu"
@@ -193,7 +191,7 @@ def check_words(robot: Any, origin: str) -> list[str]:
 
     def note(words: str, element: Any) -> None:
         unknown[words] += 1
-        lines.setdefault(words, element.sourceline)
+        lines[words] = min(lines.get(words, element.sourceline), element.sourceline)
 
     todo = [(robot, "robot")]
     while todo:
@@ -253,11 +251,12 @@ def _one_slip(word: str, right: str) -> bool:
 
 
 def _plain(name: Any, element: Any) -> str:
-    qualified = etree.QName(name)
-    if qualified.namespace is None:
-        return str(name)
-    if qualified.namespace == _DRAKE:
-        return f"drake:{qualified.localname}"
-    prefixes = [key for key, uri in element.nsmap.items() if uri == qualified.namespace]
+    text = str(name)
+    if not text.startswith("{"):
+        return text
+    uri, _, local = text[1:].partition("}")
+    if uri == _DRAKE:
+        return f"drake:{local}"
+    prefixes = [key for key, value in element.nsmap.items() if value == uri]
     prefix = "" if None in prefixes or not prefixes else f"{prefixes[0]}:"
-    return f"{prefix}{qualified.localname}"
+    return f"{prefix}{local}"

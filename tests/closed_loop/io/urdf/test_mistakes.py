@@ -13,7 +13,7 @@ from rps_pin.closed_loop.io.urdf import model_from_urdf
 from rps_pin.errors import MechanismError
 from tests.each import each
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 FILE = ROOT / "urdf" / "four_bar.urdf"
 TEXT = FILE.read_text("utf-8")
 
