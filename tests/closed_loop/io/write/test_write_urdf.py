@@ -298,8 +298,8 @@ def test_a_home_that_does_not_close_is_not_written(tmp_path: Path) -> None:
 
 def test_every_key_of_a_description_is_written_or_known_not_to_be() -> None:
     """A key that is added to descriptions has to be written too: add it to the writer, and here."""
-    # The tree is in the URDF: its free-flyer, and the limits that count.
-    elsewhere = {"mjcf", "root", "within_limits"}
+    # The tree is in the URDF: its free-flyer, the limits that count, and the joints replaced.
+    elsewhere = {"mjcf", "root", "within_limits", "joint_types"}
     written = {
         *("name", "urdf", "gravity", "closures", "couplings", "actuated", "home", "merge"),
         *("damping", "friction", "stiffness", "rest", "armature", "friction_speed"),
