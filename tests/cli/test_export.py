@@ -86,7 +86,7 @@ def test_a_name_that_c_does_not_take_gives_way_to_the_file_s(tmp_path: Path) -> 
     ("arguments", "status", "words"),
     [
         (["four_bar"], 2, "Missing option"),
-        (["for_bar", "-o", "c"], 1, "those are: delta"),
+        (["for_bar", "-o", "c"], 1, "those are: ankle, "),
         (["four_bar", "-o", "c", "--real", "half"], 2, "half"),
         (["four_bar", "-o", "c", "--functions", "gap"], 1, "did you mean gaps?"),
         (["four_bar", "-o", "c", "--frames", "gap"], 1, "'gap'"),

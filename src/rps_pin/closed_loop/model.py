@@ -1129,7 +1129,7 @@ class ClosedLoopModel:
         path
             The URDF, ``NAME.urdf``; the description is ``NAME.yaml``.
         shapes
-            Shapes for its ``visual`` elements, such as `rps_pin.closed_loop.visuals.visual_model`
+            Shapes for its ``visual`` elements, such as ``rps_pin.closed_loop.visuals.visual_model``
             returns; meshes are named by the paths of their files.
 
         Returns
