@@ -15,6 +15,9 @@ In independent coordinates y the rest of the mechanism follows them:
     J V_y = -(J v)_q T,    J A_y = -(c_q T + c_v V_y),    J A_y' = -c_v T,
 
 the independent joints' rows of V_y, A_y and A_y' being zero.
+
+Where idle freedoms are left open, T is of least norm, and `idle_slopes` tells how that changes: it
+is added to V_y, to A_y, and to dtau = T' dF + dT' r, r the residual force.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from rps_pin.closed_loop.constraints import derivatives
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.forward_dynamics import forward_dynamics
+from rps_pin.closed_loop.dynamics.idle_slopes import IdleSlopes
 from rps_pin.closed_loop.dynamics.inverse_dynamics import constraint_forces, inverse_dynamics
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
 from rps_pin.closed_loop.editing.split import split
@@ -107,10 +111,14 @@ class DynamicsDerivatives:
         """Return the derivatives of tau; the independent joints are the actuated ones."""
         system = self._system
         T = motion_basis(system, q, system.actuated)
-        multipliers = inverse_dynamics(system, q, v, a, wrenches).constraint_forces
-        force, rows = self._force_derivatives((q, v, a), multipliers, wrenches)
-        V_y, A_y, A_dy = following(T, system.actuated, self._solution(q), rows)
+        solved, idle = self._solution(q, system.actuated)
+        forces = inverse_dynamics(system, q, v, a, wrenches)
+        force, rows = self._force_derivatives((q, v, a), forces.constraint_forces, wrenches)
+        bent = idle.slope(v) @ T, idle.slope(a) @ T
+        V_y, A_y, A_dy = following(T, system.actuated, solved, rows, bent)
         by_q, by_v, by_a = (T.T @ derivative for derivative in force)
+        if forces.unproduced is not None:
+            by_q += np.array([forces.unproduced @ idle.slope(motion) for motion in T.T])
         return InverseDynamicsDerivatives(
             by_q,
             by_v,
@@ -129,19 +137,20 @@ class DynamicsDerivatives:
         multipliers = constraint_forces(system, q, v, a, tau, wrenches)
         T = motion_basis(system, q, chosen)
         (F_q, F_v, M), rows = self._force_derivatives((q, v, a), multipliers, wrenches)
-        solved = self._solution(q)
-        V_y, _, _ = following(T, chosen, solved, rows)
-        mass = T.T @ M @ T
+        solved, idle = self._solution(q, chosen)
+        V_y, _, _ = following(T, chosen, solved, rows, (idle.slope(v) @ T, 0.0))
+        every = np.concatenate([T, idle.motions], axis=1)
+        mass = every.T @ M @ every
 
         def response(of_force: Array, opening: Array) -> Array:
             """Return da of dF and dc, shapes (nv, k) and (nc, k)."""
             x = -solved(opening)
-            along = np.linalg.solve(mass, -T.T @ (of_force + M @ x))
-            return T @ along + x
+            along = np.linalg.solve(mass, -every.T @ (of_force + M @ x))
+            return every @ along + x
 
         by_q = response(F_q, rows.acceleration_q)
         by_v = response(F_v, rows.acceleration_v)
-        by_tau = T @ np.linalg.solve(mass, T[system.actuated].T)
+        by_tau = every @ np.linalg.solve(mass, every[system.actuated].T)
         return ForwardDynamicsDerivatives(
             by_q,
             by_v,
@@ -174,15 +183,19 @@ class DynamicsDerivatives:
             by_v += np.diag(damping)
         return (by_q, by_v, mass), rows
 
-    def _solution(self, q: Array) -> Solved:
-        """Return a solver of J x = b at q: x has passive rows only, if they determine it."""
+    def _solution(self, q: Array, chosen: Indices) -> tuple[Solved, IdleSlopes]:
+        """Return a solver of J x = b at q, and the slopes of what the chosen velocities leave open.
+
+        x has passive rows only, if they determine it.
+        """
         system = self._system
         jacobian = system.equations.jacobian(q).copy()
         solve = system.factorisation.passive_motion
         if solve(jacobian, np.zeros((system.equations.size, 1))) is None:
             factors = Decomposition(system.scaled(jacobian))
             rows, columns = system.row_scale[:, None], system.column_scale[:, None]
-            return lambda right: columns * factors.least_norm(rows * right)
+            idle = IdleSlopes(system, self._equations, q, chosen)
+            return lambda right: columns * factors.least_norm(rows * right), idle
 
         def solved(right: Array) -> Array:
             x = np.zeros((system.model.nv, right.shape[1]))
@@ -191,11 +204,15 @@ class DynamicsDerivatives:
             x[system.passive] = found
             return x
 
-        return solved
+        return solved, IdleSlopes.none(system)
 
 
 def following(
-    basis: Array, chosen: Indices, solved: Solved, rows: derivatives.ClosureDerivatives
+    basis: Array,
+    chosen: Indices,
+    solved: Solved,
+    rows: derivatives.ClosureDerivatives,
+    idle: tuple[Array, Array | float],
 ) -> tuple[Array, Array, Array]:
     """Return V_y, A_y and A_y': how the whole mechanism follows independent coordinates.
 
@@ -209,6 +226,8 @@ def following(
         Right-hand sides b (nc, k) to some solutions x (nv, k) of J x = b.
     rows
         Derivatives of the closures' rows.
+    idle
+        Parts of V_y and A_y in idle freedoms.
     """
 
     def held(right: Array) -> Array:
@@ -216,9 +235,9 @@ def following(
         x = solved(right)
         return np.asarray(x - basis @ x[chosen])
 
-    velocity_y = held(-rows.rate_q @ basis)
+    velocity_y = held(-rows.rate_q @ basis) + idle[0]
     acceleration_y = held(-rows.acceleration_q @ basis - rows.acceleration_v @ velocity_y)
-    return velocity_y, acceleration_y, held(-rows.acceleration_v @ basis)
+    return velocity_y, acceleration_y + idle[1], held(-rows.acceleration_v @ basis)
 
 
 def linearisation(derivatives: ForwardDynamicsDerivatives) -> Linearisation:

@@ -144,7 +144,7 @@ class CudaMechanism:
     ) -> DeviceForces:
         """Return the forces of motions; see `ClosedLoopModel.inverse_dynamics`."""
         kept: list[Any] = [None] * 5 if out is None else list(out)
-        lacks = self.code.partition.independent.size > len(self.mechanism.actuated_indices)
+        lacks = self.code.partition.actuated_rank < self.code.partition.independent.size
         kept[3:4] = [kept[3], None] if lacks else []
         tau, multipliers, residual, *rest, status = self._run(
             "inverse_dynamics", (q, v, a), kept, **options

@@ -55,7 +55,9 @@ def differences(proof: Proof, function: DeviceFunction, to_host: Callable[[Any],
             continue
         expected = _expected(proof, name, sample)
         least = _least(proof, function, sample, expected)
-        most = accepted(dtype, sample.condition)
+        most = proof.limit(name, sample)
+        if dtype == "float32":
+            most = accepted(dtype, sample.condition)
         for (output, _), result, wanted in zip(function.outputs, results, expected, strict=False):
             if wanted is not None:
                 relative = _difference(f"{name}: {output}", result[i], wanted, least, most)

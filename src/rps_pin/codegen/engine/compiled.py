@@ -83,10 +83,9 @@ class CompiledMechanism:
         self._lock, self._local = threading.Lock(), threading.local()
         self._plain = not (code.parameters or code.wrench_frames)
         self._calls, self._single = _Calls(code), _Single(code)
-        actuated = code.mechanism.system.actuated.size
         self._is_actuated = code.partition.is_actuated
         self._chosen: dict[tuple[str, ...], bool] = {}  # whether these are the independent joints
-        self._underactuated = actuated < code.partition.independent.size
+        self._underactuated = code.partition.actuated_rank < code.partition.independent.size
 
     def __repr__(self) -> str:
         return in_one_line(type(self).__name__, self.name, self.mechanism.system)
@@ -230,8 +229,14 @@ class CompiledMechanism:
         return LoopErrors(*self._by_samples(answer, given, shapes, **options))
 
     def condition(self, q: ArrayLike, **options: Any) -> Any:
-        """Return condition numbers of J_p, float or (...); see `ClosedLoopModel.condition`."""
-        return each(condition_number, self.passive_jacobian(q, **options), float)
+        """Return condition numbers of J_p, float or (...); see `ClosedLoopModel.condition`.
+
+        By the Pinocchio engine where the actuated joints leave motions open, or are more.
+        """
+        if self._is_actuated:
+            return each(condition_number, self.passive_jacobian(q, **options), float)
+        found = self._by_samples(lambda m, q: (m.condition(q),), (q,), [()], **options)[0]
+        return found if np.ndim(found) else float(found)
 
     def jacobian(self, q: ArrayLike, **options: Any) -> Array:
         """Return J, shape (..., nc, nv); see `ClosedLoopModel.jacobian`."""

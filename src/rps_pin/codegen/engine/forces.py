@@ -11,11 +11,13 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.inverse_dynamics import orientation
 from rps_pin.errors import InputError
-from rps_pin.numerics.linear_algebra import condition_number
 
 
 class HasPassiveJacobian(Protocol):
     """A `CompiledMechanism`."""
+
+    def condition(self, q: ArrayLike, **options: Any) -> Any:
+        """Return the condition number of J_p."""
 
     def passive_jacobian(self, q: ArrayLike, **options: Any) -> Array:
         """Return J_p."""
@@ -67,14 +69,14 @@ class GeneratedForces:
         """Norm of the equations' error on the passive rows, float or (...)."""
         return self._residual[..., 0] if self._residual.ndim > 1 else float(self._residual[0])
 
-    def _passive_jacobian(self) -> Array:
+    def _of_passive_jacobian(self, call: Callable[..., Any]) -> Any:
         mechanism, (q, total), parameters = self._at
         if total is not None and not np.array_equal(_sum(q), total, equal_nan=True):
             raise InputError(
                 "q was changed since inverse_dynamics was called: the condition of a batch is "
                 "computed from it when it is asked for"
             )
-        return mechanism.passive_jacobian(q, parameters=parameters, errors="mask")
+        return call(mechanism, q, parameters=parameters, errors="mask")
 
     @property
     def condition(self) -> Any:
@@ -83,12 +85,13 @@ class GeneratedForces:
         Computed when asked for, for a batch from the array q that was given: `InputError` if that
         was changed since. NaN where q is.
         """
-        return each(condition_number, self._passive_jacobian(), float)
+        return self._of_passive_jacobian(lambda mechanism, q, **o: mechanism.condition(q, **o))
 
     @property
     def orientation(self) -> Any:
         """Sign of det J_p, or 0, int or (...); see `InverseDynamics`. Computed when asked for."""
-        return each(orientation, self._passive_jacobian(), int)
+        jacobian = self._of_passive_jacobian(lambda m, q, **o: m.passive_jacobian(q, **o))
+        return each(orientation, jacobian, int)
 
     def __repr__(self) -> str:
         return (

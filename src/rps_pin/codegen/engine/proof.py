@@ -27,6 +27,10 @@ from rps_pin.numerics.linear_algebra import Decomposition, condition_number, nul
 
 #: Largest difference from the Pinocchio engine, relative to the largest number of a result.
 ACCEPTED = 1e-10
+#: Functions that solve with the reduced mass matrix: at ill-conditioned states more is accepted,
+#: the rounding unit times the condition numbers of that matrix and of J_d, up to a limit.
+_BY_INERTIA = frozenset(("forward_dynamics", "forward_dynamics_derivatives", "step", "steps"))
+_ACCEPTED_AT_MOST = 1e-7
 #: A weight below this is no measure of wrenches, N.
 _WEIGHTLESS = 1e-6
 #: Results that are all below this may be zero: differences are relative to this then. SI units, of
@@ -81,6 +85,8 @@ class Sample(NamedTuple):
     """Of J_d, in one unit."""
     mass: float
     """Largest entry of the tree's mass matrix; 1 if it has no mass."""
+    accepted: float
+    """Largest relative difference of accelerations."""
 
 
 class Proof:
@@ -152,10 +158,18 @@ class Proof:
             tau = m.inverse_dynamics(q, v, a, wrenches=self._acting(wrenches)).tau
         except SingularityError:  # actuators that hardly move one of the motions
             tau = 0.1 * weight * rng.normal(size=m.system.actuated.size)
-        mass = float(np.abs(tree_mass(m.system, q)).max()) or 1.0
-        return Sample(
-            q, v, a, tau, u, w, wrenches, self._parameters, near, self._condition(q), mass
-        )
+        mass, condition = tree_mass(m.system, q), self._condition(q)
+        largest, accepted = float(np.abs(mass).max()) or 1.0, self._accepted(q, mass, condition)
+        parameters = self._parameters
+        return Sample(q, v, a, tau, u, w, wrenches, parameters, near, condition, largest, accepted)
+
+    def _accepted(self, q: Array, mass: Array, condition: float) -> float:
+        """Return the largest relative difference of accelerations, given M and J_d's condition."""
+        motions = self._m.allowed_motions(q)
+        reduced = motions.T @ mass @ motions
+        spread = condition_number(reduced / (np.abs(reduced).max(initial=0.0) or 1.0))
+        rounding = np.finfo(np.float64).eps * condition * spread
+        return float(min(max(ACCEPTED, rounding), _ACCEPTED_AT_MOST))
 
     def _closed(self, q: Array) -> Array:
         """Return q after one of Newton's steps of least norm: closed to rounding error."""
@@ -197,7 +211,7 @@ class Proof:
         Raises
         ------
         CompileError
-            If it is above `ACCEPTED`, or the function flags a state that is regular.
+            If it is above what is accepted, or the function flags a state that is regular.
         """
         worst, compared = 0.0, 0
         given = [self._arguments(function, sample) for sample in self.samples]
@@ -222,17 +236,33 @@ class Proof:
             for k, (one, of_batch, wanted) in enumerate(zip(found, batch, expected, strict=False)):
                 if wanted is not None:
                     for result in (one, of_batch[i]):
-                        relative = self._difference(function, k, result, wanted, least)
+                        limits = least, self.limit(name, sample)
+                        relative = self._difference(function, k, result, wanted, limits)
                         worst = max(worst, relative)
             compared += 1
         if not compared:
             raise CompileError(f"generated code of {name} flags all {len(given)} states", "")
         return worst
 
+    def limit(self, name: str, sample: Sample) -> float:
+        """Return the largest relative difference of a function that is accepted."""
+        if name.endswith("_by_parameters"):
+            return _OF_DIFFERENCES
+        return sample.accepted if name in _BY_INERTIA else ACCEPTED
+
     def _difference(
-        self, function: CompiledFunction, k: int, found: Array, wanted: Any, least: float
+        self,
+        function: CompiledFunction,
+        k: int,
+        found: Array,
+        wanted: Any,
+        limits: tuple[float, float],
     ) -> float:
-        """Return the relative difference of a result; raise if it is above what is accepted."""
+        """Return the relative difference of a result; raise if it is above what is accepted.
+
+        `limits` are the least size that counts, and the largest relative difference.
+        """
+        least, accepted = limits
         wanted = np.asarray(wanted)
         if wanted.shape != found.shape:
             raise CompileError(
@@ -243,7 +273,6 @@ class Proof:
         error = np.abs(found - wanted)
         size = max(float(np.abs(wanted).max(initial=0.0)), least)
         relative = float(error.max(initial=0.0)) / size
-        accepted = _OF_DIFFERENCES if function.name.endswith("_by_parameters") else ACCEPTED
         if not relative <= accepted:
             at = np.unravel_index(int(np.argmax(error)), error.shape)
             raise CompileError(

@@ -223,7 +223,7 @@ def _inverse_dynamics(x: MechanismExpressions) -> Made:
         "multipliers": x.rows.in_package(found.multipliers),
         "residual": found.residual,
     }
-    if x.system.actuated.size < x.independent.size:
+    if x.partition.actuated_rank < x.independent.size:
         results |= {"unproduced": found.unproduced, "missing": found.missing}
     check = ca.vertcat(x.opening, x.growth + found.growth)
     return {"q": x.q, "v": x.v, "a": x.a}, results | {"check": check}

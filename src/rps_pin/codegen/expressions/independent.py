@@ -74,6 +74,8 @@ class Partition:
         Rows of J that depend on others, nc - rank.
     is_actuated : bool
         Whether the independent velocities are the actuated ones.
+    actuated_rank : int
+        How many motions the actuators drive.
     condition : float
         The largest condition number of J_d (all entries in one unit) at the samples; of more than
         100 velocities an estimate by the pivots of QR, which is too small (20 times for a chain of
@@ -86,6 +88,7 @@ class Partition:
     rank: int
     redundant_rows: int
     is_actuated: bool
+    actuated_rank: int
     condition: float
 
     @property
@@ -259,8 +262,9 @@ def choose(system: ConstraintSystem, jacobians: Array, pattern: Bools | None = N
         dependent = np.setdiff1d(np.arange(columns), independent)
         worst = max(_condition(jacobian[:, dependent]) for jacobian in at)
         is_actuated = np.array_equal(independent, system.actuated)
+        redundant, driven = rows - found, _actuated_rank(system, at, found)
         return Partition(
-            independent, dependent, idle, found, rows - found, is_actuated, float(worst)
+            independent, dependent, idle, found, redundant, is_actuated, driven, float(worst)
         )
 
     if system.actuated.size == columns - found:
@@ -312,8 +316,16 @@ def choose_shared(system: ConstraintSystem, jacobians: Array) -> Partition:
     dependent = np.setdiff1d(np.arange(system.model.nv), independent)
     worst = max(_condition(jacobian[:, dependent]) for jacobian in jacobians)
     is_actuated = np.array_equal(independent, system.actuated)
-    redundant = system.equations.size - found
-    return Partition(independent, dependent, idle, found, redundant, is_actuated, float(worst))
+    redundant, driven = system.equations.size - found, _actuated_rank(system, jacobians, found)
+    return Partition(
+        independent, dependent, idle, found, redundant, is_actuated, driven, float(worst)
+    )
+
+
+def _actuated_rank(system: ConstraintSystem, jacobians: Array, found: int) -> int:
+    """Return the largest rank of the actuators' part in the motions, J's rank being known."""
+    motions = (_motions(jacobian, found)[system.actuated] for jacobian in jacobians)
+    return max(rank(singular_values(one)) for one in motions)
 
 
 def _first(shared: Array, least: Array) -> int:

@@ -32,6 +32,7 @@ from rps_pin.codegen.expressions.elimination import LDL, Householder
 from rps_pin.codegen.expressions.independent import Partition
 from rps_pin.codegen.expressions.parameters import Parameters
 from rps_pin.codegen.expressions.tree import Tree
+from rps_pin.errors import MechanismError
 
 #: A CasADi SX expression.
 Expression = Any
@@ -262,12 +263,14 @@ class MechanismExpressions:
         """Return the forces of actuators and closures that carry f, shape (nv,).
 
         As many actuators as motions: the only ones. More: tau of least norm; fewer: least squares,
-        both in one unit.
+        both in one unit; and both where they are not independent.
         """
         actuated, none = self.system.actuated.tolist(), ca.SX(self.tree.model.nv, 1)
         reduced, y = self.reduced(force)
         if self.partition.is_actuated:
             return self._forces(force, reduced, y, none, ca.SX(1, 1), ca.SX(0))
+        if self.partition.actuated_rank < min(len(actuated), self.independent.size):
+            return self._carried_by_dependent(force, reduced)
         of_actuators = self.basis[actuated, :]  # S T, (na, m)
         scale = self.system.column_scale[self.system.actuated]
         if len(actuated) >= self.independent.size:
@@ -288,6 +291,37 @@ class MechanismExpressions:
         rest = force - unproduced
         rest[actuated, 0] -= tau
         return self._forces(force, tau, self.reduced(rest)[1], unproduced, share, growth)
+
+    def _carried_by_dependent(self, force: Expression, reduced: Expression) -> Forces:
+        """Return the forces of actuators that drive fewer motions than they and the motions are.
+
+        Some of them (a) are independent velocities, and all that drive; the others (b) move as
+        those do, B T_a = C. What they lack is f along the other independent velocities (p), which
+        they stand still in: with G = T' D^-2 T and its part G_p,
+
+            r = D^-2 T_p z,   G_p z = T_p' f,   tau_a + C' tau_b = T_a' (f - r),   |D tau| least.
+        """
+        actuated, scale = self.system.actuated.tolist(), self.system.column_scale
+        independent = self.independent.tolist()
+        at = [k for k, index in enumerate(independent) if index in actuated]
+        rest = [k for k in range(len(independent)) if k not in at]
+        if len(at) < self.partition.actuated_rank:
+            raise MechanismError(
+                f"the actuators drive {self.partition.actuated_rank} motions, of which only "
+                f"{len(at)} well enough for generated code"
+            )
+        metric = _rows_times(1 / scale, self.basis)
+        along = LDL(ca.sparsify((metric.T @ metric)[rest, rest])).solve(ca.sparsify(reduced[rest]))
+        unproduced = _rows_times(1 / scale, metric[:, rest] @ along)
+        size = reduced.T @ LDL(ca.sparsify(metric.T @ metric)).solve(ca.sparsify(reduced))
+        share = (reduced[rest].T @ along) / (size + _NOTHING)
+        driven = self.reduced(force - unproduced)[0][at]
+        weights = 1 / scale[self.system.actuated]
+        factors = Householder(_rows_times(weights, self.basis[actuated, at]))
+        tau = _rows_times(weights, factors.transposed(ca.sparsify(driven)))
+        left = force - unproduced
+        left[actuated, 0] -= tau
+        return self._forces(force, tau, self.reduced(left)[1], unproduced, share, ca.SX(0))
 
     def least_force(self, reduced: Expression) -> Expression:
         """Return the least force f (nv,) with a given T' f, D^-2 T (T' D^-2 T)^-1 T' f.
