@@ -22,7 +22,7 @@ APART = {
     "broken XML": "no XML parser reads it",
 }
 
-_DESCRIPTION = re.compile(rb"^(urdf|mjcf):[ \t]*\S", re.MULTILINE)
+_DESCRIPTION = re.compile(rb"^((urdf|mjcf):[ \t]*\S|closed_loop:)", re.MULTILINE)
 _ROOTS = {"mujoco": MJCF, "mujocoinclude": PART, "sdf": "SDF"}
 _XACRO = "{http://www.ros.org/wiki/xacro}", "{http://ros.org/wiki/xacro}"
 

@@ -250,6 +250,17 @@ def test_convert_writes_what_describe_reads(tmp_path: Path) -> None:
     assert one["actuated"] == other["actuated"]
 
 
+def test_convert_replaces_files_only_if_asked(tmp_path: Path) -> None:
+    (tmp_path / "delta.yaml").write_text("mine")
+    run = rps_pin("convert", "delta", "--to", "urdf", folder=tmp_path)
+    assert run.returncode == 1
+    assert "delta.yaml would be replaced; --overwrite does so" in run.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["delta.yaml"]
+    run = rps_pin("convert", "delta", "--to", "urdf", "--overwrite", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "delta.yaml").read_text() != "mine"
+
+
 def test_convert_names_the_link_that_mujoco_does_not_move(tmp_path: Path) -> None:
     run = rps_pin("convert", "rps", "--to", "mjcf", folder=tmp_path)
     assert run.returncode == 1

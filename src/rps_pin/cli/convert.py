@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -13,8 +14,10 @@ from rps_pin.cli.mechanism_options import (
     IgnoreLimitsOption,
     PackagePathOption,
     load_mechanism,
+    print_notes,
     shapes_of,
 )
+from rps_pin.errors import InputError
 
 
 class Format(StrEnum):
@@ -22,6 +25,9 @@ class Format(StrEnum):
 
     URDF = "urdf"
     MJCF = "mjcf"
+
+
+_SUFFIXES = {Format.URDF: (".urdf", ".yaml"), Format.MJCF: (".xml",)}
 
 
 def convert_command(
@@ -47,6 +53,9 @@ def convert_command(
             help="MuJoCo: lower a moment of inertia that exceeds the sum of the other two.",
         ),
     ] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace files that exist.")
+    ] = False,
     package_path: PackagePathOption = None,
     ignore_limits: IgnoreLimitsOption = False,
 ) -> None:
@@ -66,18 +75,23 @@ def convert_command(
     mechanism, found = load_mechanism(file, ignore_limits)
     stem = file.resolve().name if file.is_dir() else found.stem
     output.mkdir(parents=True, exist_ok=True)
-    if to is Format.URDF:
-        shapes, missing = shapes_of(found, mechanism, package_path)
-        target = output / f"{stem}.urdf"
-        description = mechanism.to_urdf(target, shapes=shapes)
-        typer.echo(f"wrote {target} and {description}")
-        for note in missing:
-            typer.echo(f"note: {note}", err=True)
-        return
-    target = mechanism.to_mjcf(
-        output / f"{stem}.xml",
-        least_mass=least_mass,
-        least_inertia=least_inertia,
-        mend_inertia=mend_inertia,
-    )
-    typer.echo(f"wrote {target}")
+    targets = [output / f"{stem}{suffix}" for suffix in _SUFFIXES[to]]
+    there = [str(path) for path in targets if path.exists()]
+    if there and not overwrite:
+        raise InputError(f"{' and '.join(there)} would be replaced; --overwrite does so")
+    notes: list[str] = []
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        if to is Format.URDF:
+            shapes, notes = shapes_of(found, mechanism, package_path)
+            mechanism.to_urdf(targets[0], shapes=shapes, overwrite=True)
+        else:
+            mechanism.to_mjcf(
+                targets[0],
+                least_mass=least_mass,
+                least_inertia=least_inertia,
+                mend_inertia=mend_inertia,
+                overwrite=True,
+            )
+    typer.echo(f"wrote {' and '.join(map(str, targets))}")
+    print_notes([*notes, *(str(one.message) for one in told)])

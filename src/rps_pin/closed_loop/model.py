@@ -44,6 +44,7 @@ from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts, with_effects, without_position_limits
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
 from rps_pin.closed_loop.io.write.files import write_mjcf, write_urdf
+from rps_pin.closed_loop.io.write.mjcf_inertia import Mending
 from rps_pin.closed_loop.io.write.source import Source
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
@@ -1115,7 +1116,11 @@ class ClosedLoopModel:
     # Files ----------------------------------------------------------------------------------------
 
     def to_urdf(
-        self, path: str | os.PathLike[str], *, shapes: pin.GeometryModel | None = None
+        self,
+        path: str | os.PathLike[str],
+        *,
+        shapes: pin.GeometryModel | None = None,
+        overwrite: bool = False,
     ) -> Path:
         """Write the tree as a URDF and, beside it, the description that `load` reads.
 
@@ -1131,6 +1136,8 @@ class ClosedLoopModel:
         shapes
             Shapes for its ``visual`` elements, such as ``rps_pin.closed_loop.visuals.visual_model``
             returns; meshes are named by the paths of their files.
+        overwrite
+            Whether files that exist are replaced.
 
         Returns
         -------
@@ -1140,11 +1147,16 @@ class ClosedLoopModel:
         Raises
         ------
         InputError
-            If the path does not end in ``.urdf``.
+            If the path does not end in ``.urdf``, or a file exists and `overwrite` is false.
         MechanismError
-            If URDF has no such joint (helical, ellipsoid, mimic); names it.
+            If URDF has no such joint (ellipsoid, mimic); names it.
+
+        Warns
+        -----
+        UserWarning
+            If a limit is one that URDF does not have; names the joint.
         """
-        return write_urdf(self._source(), path, shapes)
+        return write_urdf(self._source(), path, shapes, overwrite)
 
     def to_mjcf(
         self,
@@ -1153,6 +1165,7 @@ class ClosedLoopModel:
         least_mass: float = 0.0,
         least_inertia: float = 0.0,
         mend_inertia: bool = False,
+        overwrite: bool = False,
     ) -> Path:
         """Write the mechanism as a MuJoCo file, its loops closed by equalities.
 
@@ -1172,6 +1185,8 @@ class ClosedLoopModel:
         mend_inertia
             Whether a principal moment of inertia that exceeds the sum of the other two, as no
             body's does and MuJoCo refuses, is lowered to it.
+        overwrite
+            Whether a file that exists is replaced.
 
         Returns
         -------
@@ -1181,11 +1196,18 @@ class ClosedLoopModel:
         Raises
         ------
         InputError
-            If the path does not end in ``.xml``, or a least value is negative.
+            If the path does not end in ``.xml``, a least value is negative, or the file exists and
+            `overwrite` is false.
         MechanismError
-            If MuJoCo has no such joint, effect or link; names it.
+            If MuJoCo has no such joint, effect, actuator or link; names it.
+
+        Warns
+        -----
+        UserWarning
+            If a limit is one that MuJoCo does not have; names the joint.
         """
-        return write_mjcf(self._source(), path, least_mass, least_inertia, mend_inertia)
+        mending = Mending(least_mass, least_inertia, mend_inertia)
+        return write_mjcf(self._source(), path, mending, overwrite)
 
     def _source(self) -> Source:
         try:

@@ -18,6 +18,7 @@ from rps_pin import (
     LoopClosure,
     MechanismError,
 )
+from rps_pin.closed_loop.column_names import joint_coordinates
 from tests.closed_loop.io.write.mujoco_agreement import Agreement, agreement
 from tests.closed_loop.random_mechanisms import ALL_KINDS, case, random_placement, random_tree
 from tests.worst import worst
@@ -64,11 +65,18 @@ def lightest(mechanism: ClosedLoopModel) -> ClosedLoopModel:
     return ClosedLoopModel(model, mechanism.closures, mechanism.actuated, home=mechanism.home)
 
 
+def drivable(mechanism: ClosedLoopModel) -> ClosedLoopModel:
+    """Driven but along axes of moving bodies, which MuJoCo's motors on joints do not."""
+    moving = ("planar", "free")
+    return mechanism.with_actuated([n for n in mechanism.actuated if not n.startswith(moving)])
+
+
 @pytest.mark.parametrize("kind", ALL_KINDS)
 def test_every_closure(kind: str, tmp_path: Path) -> None:
     for seed in range(3):
-        mechanism = case(seed, kinds=[kind], joints=JOINTS).mechanism
-        assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
+        mechanism = drivable(case(seed, kinds=[kind], joints=JOINTS).mechanism)
+        path = mechanism.to_mjcf(tmp_path / f"{seed}.xml")
+        assert_agrees(agreement(mechanism, path))
 
 
 @pytest.mark.parametrize("kind", ["spherical", "rigid", "revolute", "planar"])
@@ -125,7 +133,7 @@ def test_damping_springs_and_rotors(seed: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_loops_of_a_plane_with_redundant_rows(seed: int, tmp_path: Path) -> None:
-    mechanism = case(seed, planar=True).mechanism
+    mechanism = drivable(case(seed, planar=True).mechanism)
     assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
 
 
@@ -205,6 +213,84 @@ def body(inertia: pin.Inertia, joint: object = None, **effects: object) -> Close
     return ClosedLoopModel(model, [], ["joint"], effects=given)
 
 
+def test_one_coordinate_of_a_joint_has_one_motor(tmp_path: Path) -> None:
+    """Of a ball, and of joints that MuJoCo has as rows: the force acts on that velocity alone."""
+    model = random_tree(np.random.default_rng(4), ["ball", "universal", "zyx"], planar=False)
+    driven = []
+    for name in list(model.names)[1:]:
+        driven.append(joint_coordinates(model, name)[1])
+    mechanism = ClosedLoopModel(model, [], driven)
+    there = mujoco.MjModel.from_xml_path(str(mechanism.to_mjcf(tmp_path / "m.xml")))
+    assert there.nu == len(driven)
+    data = mujoco.MjData(there)
+    data.ctrl[:] = forces = 1.0 + np.arange(there.nu)
+    mujoco.mj_forward(there, data)
+    expected = np.zeros(model.nv)
+    expected[mechanism.actuated_indices] = forces
+    assert np.abs(data.qfrc_actuator - expected).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("joint", "driven"), [(pin.JointModelPlanar(), "joint.x"), (pin.JointModelFreeFlyer(), "joint")]
+)
+def test_drives_along_axes_of_the_moving_body_are_refused(
+    joint: object, driven: str, tmp_path: Path
+) -> None:
+    mechanism = body(SOLID, joint).with_actuated([driven])
+    with pytest.raises(MechanismError, match="joint 'joint' is driven along axes of the moving"):
+        mechanism.to_mjcf(tmp_path / "m.xml")
+    turning = body(SOLID, joint).with_actuated(["joint.rz"])
+    assert mujoco.MjModel.from_xml_path(str(turning.to_mjcf(tmp_path / "m.xml"))).nu == 1
+
+
+def test_limits_that_are_equal_or_on_one_side_bound_in_mujoco_too(tmp_path: Path) -> None:
+    model = pin.Model(body(SOLID).model)
+    model.lowerPositionLimit[:] = model.upperPositionLimit[:] = 0.5
+    model.lowerEffortLimit[:], model.upperEffortLimit[:] = -3.0, np.inf
+    mechanism = ClosedLoopModel(model, [], ["joint"], home=[0.5])
+    there = mujoco.MjModel.from_xml_path(str(mechanism.to_mjcf(tmp_path / "m.xml")))
+    assert there.jnt_limited.tolist() == [1]
+    assert np.abs(there.jnt_range - 0.5).max() < 1e-15
+    assert there.actuator_forcerange.tolist() == [[-3, 1e10]]
+
+
+def test_what_is_left_out_is_told(tmp_path: Path) -> None:
+    planar = pin.Model(body(SOLID, pin.JointModelPlanar()).model)
+    planar.upperPositionLimit[0] = 2.0
+    with pytest.warns(UserWarning, match="joint 'joint': limits of its position are left out"):
+        ClosedLoopModel(planar, [], []).to_mjcf(tmp_path / "planar.xml")
+    odd = pin.Inertia(2.0, np.zeros(3), np.diag([1.0, 1.0, 2.0 + 1e-10]))
+    with pytest.warns(UserWarning, match="link 'arm': a moment of inertia is 1e-10 kg m"):
+        body(odd).to_mjcf(tmp_path / "odd.xml")
+
+
+def test_names_that_mujoco_keeps_for_itself(tmp_path: Path) -> None:
+    """A link called world, and a joint called as a motor of a ball would be."""
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
+    model.addJoint(1, pin.JointModelRX(), pin.SE3.Random(), "ball_1")
+    for index, name in enumerate(("world", "a/b <c>"), 1):
+        model.appendBodyToJoint(index, SOLID, pin.SE3.Identity())
+        model.addBodyFrame(name, index, pin.SE3.Identity(), 0)
+    mechanism = ClosedLoopModel(model, [], ["ball", "ball_1"])
+    path = mechanism.to_mjcf(tmp_path / "m.xml")
+    assert mujoco.MjModel.from_xml_path(str(path)).nu == 4
+    assert_agrees(agreement(mechanism, path))
+
+
+def test_files_are_replaced_only_if_asked(tmp_path: Path) -> None:
+    mechanism, path = body(SOLID), tmp_path / "m.xml"
+    path.write_text("mine")
+    with pytest.raises(InputError, match=r"m\.xml exists; overwrite=True replaces it"):
+        mechanism.to_mjcf(path)
+    assert path.read_text() == "mine"
+    mechanism.to_mjcf(path, overwrite=True)
+    (tmp_path / "n.yaml").write_text("mine")
+    with pytest.raises(InputError, match=r"n\.yaml exists; overwrite=True replaces it"):
+        mechanism.to_urdf(tmp_path / "n.urdf")
+    assert not (tmp_path / "n.urdf").exists()
+
+
 POINT = pin.Inertia(2.0, np.array([0.1, 0.2, 0.3]), np.zeros((3, 3)))
 #: A moment that no body has.
 ODD = pin.Inertia(2.0, np.zeros(3), np.diag([1.0, 1.0, 2.5]))
@@ -242,7 +328,7 @@ def test_bodies_are_mended_where_asked(tmp_path: Path) -> None:
     there = mujoco.MjModel.from_xml_path(str(path))
     assert there.body("arm").inertia.tolist() == [1e-6] * 3
     assert float(there.body("arm").mass[0]) == 2
-    body(ODD).to_mjcf(path, mend_inertia=True)
+    body(ODD).to_mjcf(path, mend_inertia=True, overwrite=True)
     assert sorted(mujoco.MjModel.from_xml_path(str(path)).body("arm").inertia) == [1, 1, 2]
     with pytest.raises(InputError, match="least_mass"):
         body(POINT).to_mjcf(path, least_mass=-1)

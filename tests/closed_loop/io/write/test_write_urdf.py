@@ -161,6 +161,33 @@ def test_a_row_of_joints_is_written_as_a_row(tmp_path: Path) -> None:
     assert worst(mechanism.generalised_force(q, v, a) - back.generalised_force(q, v, a)) < 1e-12
 
 
+def test_one_coordinate_that_is_driven_comes_back(tmp_path: Path) -> None:
+    """Of a row it is a joint of its own name; of a ball and a universal joint the same name."""
+    composite = pin.JointModelComposite()
+    composite.addJoint(pin.JointModelPX(), pin.SE3.Random())
+    composite.addJoint(pin.JointModelSpherical(), pin.SE3.Random())
+    model = alone(composite)
+    kinds = (
+        pin.JointModelSpherical(),
+        pin.JointModelUniversal(np.eye(3)[0], np.eye(3)[2]),
+        pin.JointModelTranslation(),
+    )
+    for index, kind in enumerate(kinds, 1):
+        model.addJoint(index, kind, pin.SE3.Random(), "buc"[index - 1])
+        model.appendBodyToJoint(index + 1, pin.Inertia.Random(), pin.SE3.Identity())
+    mechanism = ClosedLoopModel(model, [], ["joint.2", "b.z", "u.0", "c.y"])
+    back = ClosedLoopModel.load(mechanism.to_urdf(tmp_path / "m.urdf"))
+    assert back.actuated == ("joint.y", "b.z", "u.0", "c:2")
+    assert np.array_equal(back.actuated_indices, mechanism.actuated_indices)
+
+
+def test_efforts_that_differ_by_sign_are_told(tmp_path: Path) -> None:
+    model = alone(pin.JointModelRX())
+    model.lowerEffortLimit[:], model.upperEffortLimit[:] = -5.0, 7.0
+    with pytest.warns(UserWarning, match="'joint': effort of -5 to 7 is written as 5 either way"):
+        ClosedLoopModel(model, [], ["joint"]).to_urdf(tmp_path / "m.urdf")
+
+
 def test_a_joint_that_urdf_has_not_is_named(tmp_path: Path) -> None:
     mechanism = ClosedLoopModel(alone(pin.JointModelEllipsoid(0.1, 0.2, 0.3)), [], ["joint"])
     with pytest.raises(MechanismError, match=r"'joint' \(Ellipsoid\) cannot be written"):

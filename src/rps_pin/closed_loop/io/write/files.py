@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pinocchio as pin
@@ -18,35 +20,36 @@ from rps_pin.validation import non_negative_number
 
 
 def write_urdf(
-    source: Source, path: str | os.PathLike[str], shapes: pin.GeometryModel | None = None
+    source: Source,
+    path: str | os.PathLike[str],
+    shapes: pin.GeometryModel | None = None,
+    overwrite: bool = False,
 ) -> Path:
     """Write the URDF of a mechanism and, beside it, its description; see `ClosedLoopModel`."""
     target = _target(path, ".urdf")
-    plain = without_rows(source, is_whole)
-    text, merges = urdf_text(plain, shapes)
-    described = description_text(plain, target.name, merges)
-    write_text(target, text)
     description = target.with_suffix(".yaml")
-    write_text(description, described)
+    told: list[str] = []
+    plain = without_rows(source, is_whole)
+    text, merges = urdf_text(plain, shapes, told)
+    described = description_text(plain, target.name, merges)
+    _write({target: text, description: described}, overwrite)
+    _tell(target, told)
     return description
 
 
 def write_mjcf(
-    source: Source,
-    path: str | os.PathLike[str],
-    least_mass: float,
-    least_inertia: float,
-    mend_inertia: bool,
+    source: Source, path: str | os.PathLike[str], mending: Mending, overwrite: bool = False
 ) -> Path:
     """Write a mechanism as a MuJoCo file; see `ClosedLoopModel.to_mjcf`."""
     target = _target(path, ".xml")
-    mending = Mending(
-        non_negative_number(least_mass, "least_mass", "kg"),
-        non_negative_number(least_inertia, "least_inertia", "kg m^2"),
-        mend_inertia,
+    mending = mending._replace(
+        least_mass=non_negative_number(mending.least_mass, "least_mass", "kg"),
+        least_inertia=non_negative_number(mending.least_inertia, "least_inertia", "kg m^2"),
     )
+    told: list[str] = []
     plain = without_rows(source, lambda joint: kind_of(joint) == "ball")
-    write_text(target, mjcf_text(plain, mending))
+    _write({target: mjcf_text(plain, mending, told)}, overwrite)
+    _tell(target, told)
     return target
 
 
@@ -55,3 +58,20 @@ def _target(path: str | os.PathLike[str], suffix: str) -> Path:
     if target.suffix.lower() != suffix:
         raise InputError(f"{target}: the file's name must end in {suffix}")
     return target
+
+
+def _write(texts: Mapping[Path, str], overwrite: bool) -> None:
+    """Write files, or none if one of them exists already and must not be replaced."""
+    there = [str(path) for path in texts if not overwrite and (path.exists() or path.is_symlink())]
+    if there:
+        which = "it" if len(there) == 1 else "them"
+        verb = "exists" if len(there) == 1 else "exist"
+        raise InputError(f"{', '.join(there)} {verb}; overwrite=True replaces {which}")
+    for path, text in texts.items():
+        write_text(path, text)
+
+
+def _tell(target: Path, told: Sequence[str]) -> None:
+    """Warn of what the format does not have."""
+    if told:
+        warnings.warn(f"{target}: {'; '.join(told)}", stacklevel=4)

@@ -13,20 +13,22 @@ import pinocchio as pin
 from lxml import etree
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.column_names import named_velocities
 from rps_pin.closed_loop.io.write.mjcf_bodies import Bodies, Body
 from rps_pin.closed_loop.io.write.mjcf_closures import add_closures, held_joints
 from rps_pin.closed_loop.io.write.mjcf_inertia import Mending, add_inertial
 from rps_pin.closed_loop.io.write.mjcf_joints import MujocoJoint
 from rps_pin.closed_loop.io.write.numbers import number, numbers, quaternion
-from rps_pin.closed_loop.io.write.source import Source
+from rps_pin.closed_loop.io.write.source import FAR, Names, Source, kind_of, unwritten_limits
+from rps_pin.errors import MechanismError
 
-#: A side on which a joint has no limit, where the other has one; MuJoCo's mjMAXVAL.
-_FAR = 1e10
+#: Kinds of MuJoCo's joints with one velocity.
+_ONE = ("hinge", "slide")
 #: Time step, s, and the equalities' time constant: the stiffest that MuJoCo's default allows.
 _STEP = 1e-3
 
 
-def mjcf_text(source: Source, mending: Mending) -> str:
+def mjcf_text(source: Source, mending: Mending, told: list[str]) -> str:
     """Return the MuJoCo file of a mechanism without rows (see `without_rows`).
 
     Parameters
@@ -35,18 +37,22 @@ def mjcf_text(source: Source, mending: Mending) -> str:
         The mechanism.
     mending
         What is done to bodies that MuJoCo does not take.
+    told
+        Takes sentences on what is left out.
 
     Raises
     ------
     MechanismError
         If MuJoCo has no such joint, effect or body; names it.
     """
-    return _Mjcf(source, mending).text()
+    return _Mjcf(source, mending, told).text()
 
 
 class _Mjcf:
-    def __init__(self, source: Source, mending: Mending) -> None:
+    def __init__(self, source: Source, mending: Mending, told: list[str]) -> None:
         self._source, self._model, self._mending = source, source.model, mending
+        self._told = told
+        self._motor_names = Names()
         self._root = etree.Element("mujoco", model=source.name or "mechanism")
         self._home: list[Array] = []
         self._of_velocity: dict[int, MujocoJoint] = {}
@@ -54,6 +60,8 @@ class _Mjcf:
     def text(self) -> str:
         source, root = self._source, self._root
         q = pin.neutral(self._model) if source.home is None else source.home
+        for joint in range(1, self._model.njoints):
+            self._told += unwritten_limits(self._model, joint, effort=False)
         bodies = Bodies(source, held_joints(source), q)
         equalities = add_closures(source, bodies, q)
         etree.SubElement(root, "compiler", angle="radian", autolimits="true")
@@ -77,7 +85,7 @@ class _Mjcf:
         for joint, frame in body.joints:
             self._add_joint(element, joint, frame)
         if body.joints:
-            add_inertial(element, body.name, body.inertia, self._mending)
+            add_inertial(element, body.name, body.inertia, self._mending, self._told)
         for name, placement in body.sites.items():
             etree.SubElement(element, "site", name=name, **_placement(placement))
         for child in body.children:
@@ -103,8 +111,11 @@ class _Mjcf:
         limits = np.array(
             [self._model.lowerPositionLimit[idx_q], self._model.upperPositionLimit[idx_q]]
         )
-        if (np.abs(limits) < _FAR).any():
-            one.set("range", numbers(np.clip(limits, -_FAR, _FAR)))
+        if (np.abs(limits) < FAR).any():
+            low, high = np.clip(limits, -FAR, FAR)
+            if low == high:  # which MuJoCo takes for no limits
+                high = np.nextafter(high, np.inf)
+            one.set("range", numbers([low, high]))
 
     def _add_effects(self, one: Any, idx_v: int) -> None:
         effects = self._source.effects
@@ -123,25 +134,43 @@ class _Mjcf:
         """Return a motor for each coordinate that is driven, in the order of tau."""
         section = etree.Element("actuator")
         for name in self._source.actuated:
-            one = self._model.joints[self._model.getJointId(name)]
-            for idx_v in range(one.idx_v, one.idx_v + one.nv):
-                if idx_v in self._of_velocity:
-                    self._add_motors(section, self._of_velocity[idx_v])
+            velocities = named_velocities(self._model, name) or []
+            for k in velocities:
+                self._add_motor(section, name if len(velocities) == 1 else "", k)
         return section
 
-    def _add_motors(self, section: Any, joint: MujocoJoint) -> None:
-        count = {"ball": 3, "free": 6}.get(joint.kind, 1)
-        for k in range(count):
-            name = joint.name if count == 1 else f"{joint.name}_{k + 1}"
-            motor = etree.SubElement(section, "motor", name=name, joint=joint.name)
-            if count > 1:
-                motor.set("gear", numbers(np.eye(6)[k]))
-            assert joint.idx_v is not None
-            idx_v = joint.idx_v + k
-            limits = [self._model.lowerEffortLimit[idx_v], self._model.upperEffortLimit[idx_v]]
-            if limits[0] < limits[1] and np.abs(limits).max() < _FAR:
-                motor.set("ctrlrange", numbers(limits))
-                motor.set("forcerange", numbers(limits))
+    def _add_motor(self, section: Any, name: str, idx_v: int) -> None:
+        """Add the motor of a velocity; `name` is empty if it shares its joint's."""
+        joint, place = self._joint_of(idx_v)
+        wanted = name or (joint.name if joint.kind in _ONE else f"{joint.name}_{place + 1}")
+        motor = etree.SubElement(section, "motor", name=self._motor_names.fresh(wanted))
+        motor.set("joint", joint.name)
+        if joint.kind not in _ONE:
+            motor.set("gear", numbers(np.eye(6)[place]))
+        limits = np.array(
+            [self._model.lowerEffortLimit[idx_v], self._model.upperEffortLimit[idx_v]]
+        )
+        if limits[0] < limits[1] and (np.abs(limits) < FAR).any():
+            motor.set("ctrlrange", numbers(np.clip(limits, -FAR, FAR)))
+            motor.set("forcerange", numbers(np.clip(limits, -FAR, FAR)))
+
+    def _joint_of(self, idx_v: int) -> tuple[MujocoJoint, int]:
+        """Return MuJoCo's joint with a velocity, and the velocity's place in it."""
+        start = max(k for k in self._of_velocity if k <= idx_v)
+        joint, place = self._of_velocity[start], idx_v - start
+        own = next(
+            i
+            for i, one in enumerate(self._model.joints)
+            if i and one.idx_v <= idx_v < one.idx_v + one.nv
+        )
+        slides = {"planar": 2, "free": 3}.get(kind_of(self._model.joints[own]), 0)
+        if idx_v - self._model.joints[own].idx_v < slides:
+            raise MechanismError(
+                f"joint {self._model.names[own]!r} is driven along axes of the moving body; "
+                "MuJoCo's motors on joints act along fixed axes. Choose other actuated joints, "
+                "by with_actuated()"
+            )
+        return joint, place
 
 
 def _placement(placement: pin.SE3) -> dict[str, str]:

@@ -19,6 +19,8 @@ from rps_pin.closed_loop.io.write.source import Names, Source
 
 #: Masses (kg) and moments of inertia (kg m^2) count as none below this, MuJoCo's mjMINVAL.
 NONE = 1e-15
+#: MuJoCo's name of the world's body, which no other can have.
+_WORLD = "world"
 
 
 @dataclass
@@ -51,13 +53,14 @@ class Bodies:
     def __init__(self, source: Source, held: Collection[int], q: Array) -> None:
         self._source, self._model, self._held, self._q = source, source.model, held, q
         self.joint_names = Names(source.model.names)
-        self._links = Links(source.model).moved
-        self.names = Names(self._links)
+        links = Links(source.model).moved
+        self.names = Names([_WORLD, *links])
+        self._links = [self.names.fresh(name) if name == _WORLD else name for name in links]
         self.screws: list[Screw] = []
         self._children: dict[int, list[int]] = {i: [] for i in range(source.model.njoints)}
         for joint in range(1, source.model.njoints):
             self._children[source.model.parents[joint]].append(joint)
-        self.world = Body("world", pin.SE3.Identity(), pin.Inertia.Zero())
+        self.world = Body(_WORLD, pin.SE3.Identity(), pin.Inertia.Zero())
         self.of_joint = {0: self.world}
         for joint in self._children[0]:
             self._add(joint, self.world, [], pin.SE3.Identity())

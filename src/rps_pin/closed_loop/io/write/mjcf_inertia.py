@@ -16,6 +16,8 @@ from rps_pin.errors import MechanismError
 #: By how much the largest moment of inertia may exceed the sum of the others, relative to it, and
 #: be called rounding.
 _ROUNDING = 1e-9
+#: Above this part of it, that is told.
+_TOLD = 1e-14
 
 
 class Mending(NamedTuple):
@@ -34,7 +36,9 @@ class Mending(NamedTuple):
     lower: bool = False
 
 
-def add_inertial(element: Any, name: str, body: pin.Inertia, mending: Mending) -> None:
+def add_inertial(
+    element: Any, name: str, body: pin.Inertia, mending: Mending, told: list[str]
+) -> None:
     """Add the ``inertial`` of a moving body.
 
     Parameters
@@ -47,6 +51,8 @@ def add_inertial(element: Any, name: str, body: pin.Inertia, mending: Mending) -
         In its frame.
     mending
         What is done to it if MuJoCo does not take it.
+    told
+        Takes a sentence on a moment that is lowered by more than rounding.
 
     Raises
     ------
@@ -65,7 +71,10 @@ def add_inertial(element: Any, name: str, body: pin.Inertia, mending: Mending) -
             f"{moments.min():.6g} kg m^2; MuJoCo moves nothing with less than {NONE:g}: give a "
             "least mass and inertia (least_mass, least_inertia; --least-mass, --least-inertia)"
         )
-    moments = _possible(moments, name, mending.lower)
+    given, moments = moments, _possible(moments, name, mending.lower)
+    excess = float(np.max(given - moments))
+    if excess > _TOLD * moments.max() and not mending.lower:
+        told.append(f"link {name!r}: a moment of inertia is {excess:.3g} kg m^2 less, for MuJoCo")
     attributes = {"pos": numbers(body.lever), "mass": number(mass)}
     attributes["diaginertia"] = numbers(moments)
     if not np.array_equal(axes, np.eye(3)):

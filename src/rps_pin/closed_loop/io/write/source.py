@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.column_names import joint_coordinates, named_velocities
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.editing.rebuild import JointRow, NewJoint, rebuilt
@@ -21,6 +22,8 @@ from rps_pin.errors import MechanismError
 
 #: Axes count as perpendicular below this cosine.
 PERPENDICULAR = 1e-9
+#: Limits from here on bound nothing; MuJoCo's mjMAXVAL.
+FAR = 1e10
 
 
 class Source(NamedTuple):
@@ -72,7 +75,6 @@ def without_rows(source: Source, whole: Callable[[Any], bool]) -> Source:
     model = source.model
     taken = Names([*model.names, *(frame.name for frame in model.frames)])
     rows: dict[int, JointRow] = {}
-    names: dict[str, list[str]] = {}
     for index in range(1, model.njoints):
         name, joint = model.names[index], model.joints[index]
         parts = list(_parts(joint, name, whole))
@@ -81,11 +83,27 @@ def without_rows(source: Source, whole: Callable[[Any], bool]) -> Source:
         labels = [taken.fresh(f"{name}:{k}") for k in range(1, len(parts))] + [name]
         new = [NewJoint(label, kind, at) for label, (at, kind) in zip(labels, parts, strict=True)]
         new[0] = new[0]._replace(placement=model.jointPlacements[index] * new[0].placement)
-        rows[index], names[name] = JointRow(new, [index]), labels
+        rows[index] = JointRow(new, [index])
     if not rows:
         return source
-    actuated = [part for name in source.actuated for part in names.get(name, [name])]
-    return source._replace(model=rebuilt(model, rows), actuated=tuple(actuated))
+    split = rebuilt(model, rows)
+    driven = [named_velocities(model, name) or [] for name in source.actuated]
+    actuated = tuple(name for own in driven for name in _driven(split, own))
+    return source._replace(model=split, actuated=actuated)
+
+
+def _driven(model: pin.Model, velocities: Sequence[int]) -> list[str]:
+    """Return the names of joints, or of their coordinates, that have some velocities."""
+    found = []
+    for index in range(1, model.njoints):
+        name, joint = model.names[index], model.joints[index]
+        own = [k for k in velocities if joint.idx_v <= k < joint.idx_v + joint.nv]
+        if own and len(own) < joint.nv:
+            coordinates = joint_coordinates(model, name)
+            found += [coordinates[k - joint.idx_v] for k in own]
+        elif own:
+            found.append(name)
+    return found
 
 
 def _parts(joint: Any, name: str, whole: Callable[[Any], bool]) -> Iterator[tuple[pin.SE3, Any]]:
@@ -196,6 +214,23 @@ def is_cardan(joint: Any) -> bool:
     first, second = axes_of(joint)
     lengths = np.abs([first @ first - 1, second @ second - 1, first @ second])
     return bool(lengths.max() < PERPENDICULAR)
+
+
+def unwritten_limits(model: pin.Model, joint: int, *, effort: bool) -> list[str]:
+    """Return what is told of a planar or free joint's limits, which the formats do not have."""
+    one, name = model.joints[joint], model.names[joint]
+    slides = {"planar": 2, "free": 3}.get(kind_of(one), 0)
+    at = slice(one.idx_q, one.idx_q + slides)
+    found = []
+    if slides and (_bounds(model.lowerPositionLimit[at]) or _bounds(model.upperPositionLimit[at])):
+        found.append(f"joint {name!r}: limits of its position are left out")
+    if slides and effort and _bounds(velocities(model, joint, model.upperEffortLimit)):
+        found.append(f"joint {name!r}: limits of its effort are left out")
+    return found
+
+
+def _bounds(limits: Array) -> bool:
+    return bool((np.abs(limits) < FAR).any())
 
 
 def coordinates(model: pin.Model, joint: int, q: Array) -> Array:

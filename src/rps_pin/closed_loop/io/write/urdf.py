@@ -32,6 +32,7 @@ from rps_pin.closed_loop.io.write.source import (
     is_cardan,
     kind_of,
     pitch_of,
+    unwritten_limits,
 )
 from rps_pin.errors import MechanismError
 
@@ -56,7 +57,7 @@ def is_whole(joint: Any) -> bool:
 
 
 def urdf_text(
-    source: Source, shapes: pin.GeometryModel | None = None
+    source: Source, shapes: pin.GeometryModel | None, told: list[str]
 ) -> tuple[str, list[dict[str, Any]]]:
     """Return the URDF of a tree without rows (see `without_rows`), and the merges it needs.
 
@@ -65,19 +66,22 @@ def urdf_text(
     source
         The mechanism.
     shapes
-        Shapes of its links, by the joints that move them; none if left out.
+        Shapes of its links, by the joints that move them; or None.
+    told
+        Takes sentences on what is left out.
 
     Raises
     ------
     MechanismError
         If URDF has no such joint; names it.
     """
-    return _Urdf(source, shapes).text()
+    return _Urdf(source, shapes, told).text()
 
 
 class _Urdf:
-    def __init__(self, source: Source, shapes: pin.GeometryModel | None) -> None:
+    def __init__(self, source: Source, shapes: pin.GeometryModel | None, told: list[str]) -> None:
         self._source, self._model, self._shapes = source, source.model, shapes
+        self._told = told
         self._links = Links(source.model)
         self._names = Names(
             [*source.model.names, *(f.name for f in source.model.frames), *self._links.moved]
@@ -121,6 +125,7 @@ class _Urdf:
     def _add_joint(self, joint: int) -> None:
         name, one = self._model.names[joint], self._model.joints[joint]
         kind, below, link = kind_of(one), self._links.hung[joint], self._links.moved[joint]
+        self._told += unwritten_limits(self._model, joint, effort=True)
         if kind in _MERGED:
             self._add_row(name, kind, one, below, link)
         elif kind in _TYPES:
@@ -168,7 +173,13 @@ class _Urdf:
     def _add_limit(self, element: Any, idx_q: int, idx_v: int, *, bounded: bool) -> None:
         """Add a joint's limits; a missing one is the largest number there is."""
         model = self._model
-        effort = min(model.upperEffortLimit[idx_v], -model.lowerEffortLimit[idx_v])
+        forces = model.upperEffortLimit[idx_v], -model.lowerEffortLimit[idx_v]
+        effort = min(forces)
+        if forces[0] != forces[1]:
+            self._told.append(
+                f"joint {element.get('name')!r}: effort of {-forces[1]:g} to {forces[0]:g} is "
+                f"written as {effort:g} either way"
+            )
         speed = model.upperVelocityLimit[idx_v]  # Pinocchio's reader has no sign for the lower one
         limits = {"effort": effort or _LEAST, "velocity": speed or _LEAST}
         if bounded:
