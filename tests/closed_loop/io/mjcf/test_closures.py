@@ -235,9 +235,19 @@ def test_closures_given_come_after_the_files() -> None:
     assert parts.closures[0].frame_a == "pin:1"
 
 
-SPATIAL = (
-    """<tendon><spatial name="rope"><site site="tip"/><site site="knee"/></spatial></tendon>"""
-)
+ROPE = """<tendon><spatial name="rope">{}</spatial></tendon>"""
+ROD = ROPE.format('<site site="tip"/><site site="knee"/>')
+SPATIAL = ROPE.format('<site site="tip"/><site site="knee"/><site site="tip"/>')
+
+
+def test_a_tendon_straight_between_two_sites_is_a_rod() -> None:
+    """Held at its length in qpos0 and 0.05 m more."""
+    text = fourbar(ROD, equalities('\n<tendon name="rod" tendon1="rope" polycoef="0.05 0 0 0 0"/>'))
+    (closure,) = parts_from_mjcf(text).closures
+    there = mujoco.MjModel.from_xml_string(text)
+    assert closure == LoopClosure(
+        "tip", "knee", "distance", "rod", distance=float(there.tendon_length0[0]) + 0.05
+    )
 
 
 @each(

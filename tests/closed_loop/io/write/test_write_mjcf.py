@@ -137,25 +137,6 @@ def test_loops_of_a_plane_with_redundant_rows(seed: int, tmp_path: Path) -> None
     assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
 
 
-UNREAD = ("rps", "delta", "differential", "gripper")
-
-
-@pytest.mark.parametrize("name", [name for name in PACKAGE if name not in UNREAD])
-def test_read_back_by_the_package(name: str, tmp_path: Path) -> None:
-    mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
-    back = ClosedLoopModel.from_mjcf(mechanism.to_mjcf(tmp_path / "m.xml"))
-    assert back.actuated == mechanism.actuated
-    mobility = mechanism.describe().mobility
-    assert back.describe().mobility == mobility
-    driven = list(mechanism.actuated)
-    if len(driven) != mobility:
-        return
-    for what in ("mass_matrix", "gravity_forces"):
-        one = getattr(mechanism, what)(mechanism.home, driven)
-        other = getattr(back, what)(back.home, driven)
-        assert np.abs(one - other).max() < 1e-9 * np.abs(one).max()
-
-
 def test_the_home_is_a_key_frame_and_closed(tmp_path: Path) -> None:
     mechanism = case(3, kinds=["planar", "universal", "point_on_plane"]).mechanism
     model = mujoco.MjModel.from_xml_path(str(mechanism.to_mjcf(tmp_path / "m.xml")))

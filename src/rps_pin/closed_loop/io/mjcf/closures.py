@@ -9,7 +9,8 @@ element        becomes
 ``joint``      a `JointCoupling` q1 - ref1 = c0 + c1 (q2 - ref2) + ... + c4 (q2 - ref2)^4; without
                joint2, joint1 is held at ref1 + c0
 ``tendon``     a `JointCoupling` of all joints of the one or two fixed tendons, whose lengths take
-               the places of q1 and q2; if it is not linear, of two joints that stand for them
+               the places of q1 and q2; if it is not linear, of two joints that stand for them;
+               of one spatial tendon straight between two sites, a ``distance`` closure
 =============  =================================================================================
 
 All are exact: MuJoCo's softness of constraints (solref, solimp, torquescale) is not used. The
@@ -75,6 +76,13 @@ def _closure(tree: MjcfTree, tendons: Tendons, number: int) -> Closure:
         if one == two:
             source.refuse("equalities", number, "couples a joint to itself")
         return _coupling(tree.joints[one], tree.joints[two], curve, start, name)
+    rod = tendons.rod(one)
+    if rod and two < 0:
+        sites = [tree.sites[site] for site in rod]
+        length = float(m.tendon_length0[one] + curve.coef[0])
+        if length <= 0:
+            source.refuse("equalities", number, f"holds a rod at a length of {length:g}")
+        return LoopClosure(sites[0], sites[1], "distance", name, distance=length)
     for tendon in (one, two):
         if tendon >= 0 and not source.is_fixed(tendon):
             source.refuse("equalities", number, "is of a spatial tendon, which is not read")

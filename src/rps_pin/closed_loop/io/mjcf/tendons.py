@@ -5,8 +5,8 @@ without mass whose coordinate is the tendon's length (m, or rad where it is a su
 the tendon's name, tied to the joints by a `JointCoupling`. Its stiffness, damping, dry friction,
 armature and limits are the tendon's, and its force is the tendon's force.
 
-A spatial tendon has a length that is not a sum of coordinates: one with forces, or in an equality,
-is refused; another is not read.
+A spatial tendon has a length that is not a sum of coordinates: one with forces is refused, and one
+in an equality that is not straight between two sites; another is not read.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import JointCoupling
 from rps_pin.closed_loop.io.mjcf.tree import MjcfTree
 
+#: MuJoCo's mjWRAP_SITE.
+_SITE = 3
 #: Arrays of MuJoCo's model with what makes a force, by the attributes that give them.
 FORCES = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "frictionloss", "armature")
 
@@ -50,6 +52,16 @@ class Tendons:
                 self._source.refuse("tendons", number, f"has {forces[0]}, which is not read")
             elif m.tendon_limited[number] and limited:
                 self._source.tell("tendons", number, "a range of a spatial tendon is not read")
+
+    def rod(self, number: int) -> list[int] | None:
+        """Return the two sites between which a spatial tendon is straight, or None."""
+        m, first = self._source.model, int(self._source.model.tendon_adr[number])
+        if self._source.is_fixed(number) or int(m.tendon_num[number]) != 2:
+            return None
+        ends = range(first, first + 2)
+        if any(m.wrap_type[end] != _SITE for end in ends):
+            return None
+        return [int(m.wrap_objid[end]) for end in ends]
 
     def coefficients(self, number: int) -> Array:
         """Return the coefficients of a fixed tendon's length by qpos, shape (nq,)."""

@@ -14,16 +14,18 @@ from lxml import etree
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.column_names import named_velocities
+from rps_pin.closed_loop.constraints.closures import JointCoupling
 from rps_pin.closed_loop.io.write.mjcf_bodies import Bodies, Body
 from rps_pin.closed_loop.io.write.mjcf_closures import add_closures, held_joints
 from rps_pin.closed_loop.io.write.mjcf_inertia import Mending, add_inertial
 from rps_pin.closed_loop.io.write.mjcf_joints import MujocoJoint
+from rps_pin.closed_loop.io.write.mjcf_tendons import tendons_of
 from rps_pin.closed_loop.io.write.numbers import number, numbers, quaternion
 from rps_pin.closed_loop.io.write.source import FAR, Names, Source, kind_of, unwritten_limits
 from rps_pin.errors import MechanismError
 
-#: Kinds of MuJoCo's joints with one velocity.
-_ONE = ("hinge", "slide")
+#: Kinds of MuJoCo's joints with one velocity, and tendons.
+_ONE = ("hinge", "slide", "tendon")
 #: Time step, s, and the equalities' time constant: the stiffest that MuJoCo's default allows.
 _STEP = 1e-3
 
@@ -62,8 +64,13 @@ class _Mjcf:
         q = pin.neutral(self._model) if source.home is None else source.home
         for joint in range(1, self._model.njoints):
             self._told += unwritten_limits(self._model, joint, effort=False)
-        bodies = Bodies(source, held_joints(source), q)
-        equalities = add_closures(source, bodies, q)
+        held = held_joints(source)
+        tendons = tendons_of(source, held)
+        bodies = Bodies(source, held, tendons, q)
+        tied = tuple(one for one in source.closures if one not in tendons.values())
+        equalities = add_closures(source._replace(closures=tied), bodies, q)
+        for joint, coupling in tendons.items():
+            self._add_tendon(equalities.tendon, joint, coupling)
         etree.SubElement(root, "compiler", angle="radian", autolimits="true")
         etree.SubElement(
             root, "option", gravity=numbers(self._model.gravity.linear), timestep=number(_STEP)
@@ -107,10 +114,26 @@ class _Mjcf:
             self._add_effects(one, joint.idx_v)
             self._of_velocity[joint.idx_v] = joint
 
-    def _add_range(self, one: Any, idx_q: int) -> None:
-        limits = np.array(
-            [self._model.lowerPositionLimit[idx_q], self._model.upperPositionLimit[idx_q]]
-        )
+    def _add_tendon(self, section: Any, joint: int, coupling: JointCoupling) -> None:
+        """Add a fixed tendon for a slide that stands for one; its length is 0 at coordinates 0."""
+        place, name = self._model.joints[joint], self._model.names[joint]
+        tendon = etree.SubElement(section, "fixed", name=name)
+        self._add_range(tendon, place.idx_q, coupling.constant)
+        self._add_effects(tendon, place.idx_v)
+        if "stiffness" in tendon.attrib:
+            tendon.attrib.pop("springref", None)
+            rest = self._source.effects.rest[place.idx_v] - coupling.constant
+            tendon.set("springlength", number(np.nextafter(-1, 0) if rest == -1 else rest))
+        for other, (ratio, *_) in zip(coupling.others, coupling.terms, strict=True):
+            etree.SubElement(tendon, "joint", joint=other, coef=number(ratio))
+        start = np.empty(0)
+        self._of_velocity[place.idx_v] = MujocoJoint(name, "tendon", None, start)
+
+    def _add_range(self, one: Any, idx_q: int, zero: float = 0.0) -> None:
+        """Add limits of a coordinate that is `zero` where MuJoCo's is 0."""
+        model = self._model
+        limits = np.array([model.lowerPositionLimit[idx_q], model.upperPositionLimit[idx_q]])
+        limits -= zero
         if (np.abs(limits) < FAR).any():
             low, high = np.clip(limits, -FAR, FAR)
             if low == high:  # which MuJoCo takes for no limits
@@ -144,7 +167,7 @@ class _Mjcf:
         joint, place = self._joint_of(idx_v)
         wanted = name or (joint.name if joint.kind in _ONE else f"{joint.name}_{place + 1}")
         motor = etree.SubElement(section, "motor", name=self._motor_names.fresh(wanted))
-        motor.set("joint", joint.name)
+        motor.set("tendon" if joint.kind == "tendon" else "joint", joint.name)
         if joint.kind not in _ONE:
             motor.set("gear", numbers(np.eye(6)[place]))
         limits = np.array(

@@ -50,7 +50,9 @@ class Bodies:
         Couplings of helical joints.
     """
 
-    def __init__(self, source: Source, held: Collection[int], q: Array) -> None:
+    def __init__(
+        self, source: Source, held: Collection[int], tendons: Collection[int], q: Array
+    ) -> None:
         self._source, self._model, self._held, self._q = source, source.model, held, q
         self.joint_names = Names(source.model.names)
         links = Links(source.model).moved
@@ -63,6 +65,8 @@ class Bodies:
         self.world = Body(_WORLD, pin.SE3.Identity(), pin.Inertia.Zero())
         self.of_joint = {0: self.world}
         for joint in self._children[0]:
+            if joint in tendons:
+                continue
             self._add(joint, self.world, [], pin.SE3.Identity())
         for index in range(1, source.model.nframes):
             frame = source.model.frames[index]

@@ -95,7 +95,7 @@ class _Writer:
         self._found = Equalities()
         self._names = Names()
         self._site_names = Names([frame.name for frame in source.model.frames])
-        self._tendon_names = Names()
+        self._tendon_names = Names(source.model.names)
 
     def written(self) -> Equalities:
         self._cut_bodies()
