@@ -1,9 +1,12 @@
-"""A leg and a biped on a floating base, driven by cranks and rods: nv = 31 and 56.
+"""A leg, a biped and a humanoid on a floating base, driven by cranks and rods: nv 31, 56 and 62.
 
 Each leg has seven joints: hip yaw, roll, pitch, knee, ankle pitch, roll, and toe. The hip yaw is
 driven directly, the other six by cranks: two for hip roll and pitch, one for the knee, two for the
 ankle, one for the toe. A rod stands on a universal joint at its crank's tip and has a ball at the
 link that it moves: three closure rows. All links have mass. The zero configuration is closed.
+
+The humanoid's rods have balls at both ends, as Digit's, and spin idly; its toes are passive, and
+each arm has one joint.
 """
 
 from __future__ import annotations
@@ -86,7 +89,14 @@ def biped() -> ClosedLoopModel:
     return _mechanism("biped", {"left": 1.0, "right": -1.0}, 12.0)
 
 
-def _mechanism(name: str, sides: dict[str, float], mass: float) -> ClosedLoopModel:
+def humanoid() -> ClosedLoopModel:
+    """Return two legs and two arms: nv = 62, 30 rows, 14 actuators, mobility 32, 10 of it idle."""
+    return _mechanism("humanoid", {"left": 1.0, "right": -1.0}, 15.0, humanoid=True)
+
+
+def _mechanism(
+    name: str, sides: dict[str, float], mass: float, *, humanoid: bool = False
+) -> ClosedLoopModel:
     model = pin.Model()
     model.name = name
     rng = np.random.default_rng(5)
@@ -94,8 +104,14 @@ def _mechanism(name: str, sides: dict[str, float], mass: float) -> ClosedLoopMod
     _add_link(model, base, mass, (0.0, 0.0, 0.15), rng)
     closures, actuated = [], []
     for side, sign in sides.items():
-        closures += _add_leg(model, side, sign, rng)
-        actuated += [f"{side}_hip_yaw", *(f"{side}_{drive}_crank" for drive in DRIVES)]
+        drives = {name: d for name, d in DRIVES.items() if not (humanoid and name == "toe")}
+        closures += _add_leg(model, side, sign, rng, drives, balls=humanoid)
+        actuated += [f"{side}_hip_yaw", *(f"{side}_{drive}_crank" for drive in drives)]
+    for side, sign in sides.items() if humanoid else ():
+        shoulder = pin.SE3(np.eye(3), np.array([0.0, sign * 0.2, 0.4]))
+        arm = model.addJoint(base, pin.JointModelRY(), shoulder, f"{side}_arm")
+        _add_link(model, arm, 2.0, (0.0, 0.0, -0.25), rng)
+        actuated.append(f"{side}_arm")
     armature = np.zeros(model.nv)
     for joint in actuated:
         armature[model.joints[model.getJointId(joint)].idx_v] = ROTOR
@@ -106,7 +122,13 @@ def _mechanism(name: str, sides: dict[str, float], mass: float) -> ClosedLoopMod
 
 
 def _add_leg(
-    model: pin.Model, side: str, sign: float, rng: np.random.Generator
+    model: pin.Model,
+    side: str,
+    sign: float,
+    rng: np.random.Generator,
+    drives: dict[str, Drive],
+    *,
+    balls: bool,
 ) -> list[LoopClosure]:
     """Add a leg, mirrored in y where sign is -1, and return the closures of its rods."""
 
@@ -122,23 +144,32 @@ def _add_leg(
         place = pin.SE3(pin.rpy.rpyToMatrix(sign * tilt[0], tilt[1], tilt[2]), at(joint.place))
         here[name] = turn(here[joint.parent], joint.axis, place, name)
         _add_link(model, here[name], joint.mass, joint.middle, rng)
-        for drive_name, drive in DRIVES.items():  # branch by branch, as Pinocchio demands
+        for drive_name, drive in drives.items():  # branch by branch, as Pinocchio demands
             if drive.on == name:
                 place = pin.SE3(np.eye(3), at(drive.place))
                 crank = turn(here[name], "y", place, f"{drive_name}_crank")
                 _add_link(model, crank, 0.2, at(drive.arm) / 2, rng)
-                tip = pin.SE3(np.eye(3), at(drive.arm))
+                tip, rod_name = pin.SE3(np.eye(3), at(drive.arm)), f"{drive_name}_rod"
+                if balls:
+                    ball = pin.JointModelSpherical()
+                    here[f"{drive_name} rod"] = model.addJoint(
+                        crank, ball, tip, f"{side}_{rod_name}"
+                    )
+                    continue
                 cross = turn(crank, "y", tip, f"{drive_name}_cross")
                 _add_link(model, cross, 0.02, (0.0, 0.0, 0.01), rng)
-                rod = turn(cross, drive.second, pin.SE3.Identity(), f"{drive_name}_rod")
+                rod = turn(cross, drive.second, pin.SE3.Identity(), rod_name)
                 here[f"{drive_name} rod"] = rod
     data = model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))
     closures = []
-    for name, drive in DRIVES.items():
+    for name, drive in drives.items():
         rod, moved = here[f"{name} rod"], here[drive.moves]
         ball = data.oMi[rod].actInv(data.oMi[moved].act(at(drive.ball)))
-        _add_link(model, rod, 0.1, ball / 2, rng)
+        if balls:
+            _add_rod(model, rod, 0.1, ball)
+        else:
+            _add_link(model, rod, 0.1, ball / 2, rng)
         ends = {
             f"{side}_{name}_rod_tip": (rod, ball),
             f"{side}_{name}_ball": (moved, at(drive.ball)),
@@ -160,3 +191,11 @@ def _add_link(
     second = np.outer(half, half) / 3 + cloud @ cloud.T
     inertia = mass * (np.trace(second) * np.eye(3) - second)
     model.appendBodyToJoint(joint, pin.Inertia(mass, centre, inertia), pin.SE3.Identity())
+
+
+def _add_rod(model: pin.Model, joint: int, mass: float, end: Array) -> None:
+    """Add a round rod of 1 cm from a joint to a point."""
+    length = float(np.linalg.norm(end))
+    along = pin.Inertia.FromCylinder(mass, 0.005, length)  # along z, about its middle
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end).matrix()
+    model.appendBodyToJoint(joint, along, pin.SE3(turn, end / 2))

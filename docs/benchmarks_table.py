@@ -27,13 +27,14 @@ Times = dict[str, dict[str, float]]
 
 
 def main() -> None:
-    """Run the benchmarks and write both tables."""
+    """Run the benchmarks and write the tables."""
     times = measured()
     text = PAGE.read_text("utf-8")
     chains = {group: roles for group, roles in times.items() if "four-bars" in group}
     others = {group: roles for group, roles in times.items() if group not in chains}
     text = replaced(text, "operations", operations_table(others))
     text = replaced(text, "chains", chains_table(chains))
+    text = replaced(text, "underdriven", underdriven_table())
     PAGE.write_text(text, "utf-8")
 
 
@@ -51,6 +52,16 @@ def measured() -> Times:
                 role = bench["extra_info"]["role"]
                 found[bench["group"]][role] = 1e6 * bench["stats"]["min"]
     return found
+
+
+def underdriven_table() -> str:
+    """Return the table that benchmarks/underdriven.py prints."""
+    command = [sys.executable, "-m", "benchmarks.underdriven"]
+    single = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        command, cwd=ROOT, check=True, env=single, capture_output=True, text=True, encoding="utf-8"
+    )
+    return done.stdout.strip()
 
 
 def operations_table(times: Times) -> str:

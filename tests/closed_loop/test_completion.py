@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, JointCoupling, SingularityError
+from rps_pin.closed_loop.constraints.least_squares import PassiveLeastSquares
 from rps_pin.closed_loop.dynamics.inverse_dynamics import InverseDynamics, null_space_solution
 from rps_pin.numerics.linear_algebra import Decomposition
 from tests.closed_loop import mechanisms
@@ -75,6 +76,33 @@ def test_any_actuators_get_the_forces_of_the_null_space(planar: bool) -> None:
             by_factors += completion.forces(m.jacobian(c.q), force) is not None
     assert worst(errors) < 1e-9
     assert by_factors > 25
+
+
+def test_least_squares_and_factors_give_the_same_forces() -> None:
+    """Passive velocities that meet all rows; units differ where joints slide."""
+    errors, scaled = [], 0
+    for seed in range(120):
+        c = case(seed, effects=seed % 2 == 0)
+        m = with_actuators(c, some_actuators(c, seed)[:2])
+        m.inverse_dynamics(c.q, c.v, c.a)  # which chooses velocities
+        completion = m.system.completion
+        if completion is None or completion._squares is None:
+            continue
+        scaled += completion._squares._scaling is not None
+        force, jacobian = force_of_bodies(c, c.v, c.a), m.jacobian(c.q)
+        found = completion._by_least_squares(completion._squares, jacobian, force)
+        wanted = completion._by_factors(jacobian, force)
+        assert found is not None and wanted is not None
+        assert found[3] is not None and wanted[3] is not None
+        size = np.linalg.norm(force)
+        errors += [worst(*(one - other for one, other in zip(found, wanted, strict=True))) / size]
+    assert len(errors) > 15 and scaled > 5
+    assert worst(errors) < 1e-10
+
+
+def test_least_squares_want_full_row_rank() -> None:
+    squares = PassiveLeastSquares(np.arange(3), np.ones(2), np.ones(4), 1e8)
+    assert squares.multipliers(np.array([[1.0, 2, 3, 4], [2, 4, 6, 8]]), np.ones(4)) is None
 
 
 def test_two_actuators_on_one_freedom_share_its_force() -> None:

@@ -23,6 +23,8 @@ from rps_pin.closed_loop.freedoms import Freedom, freedoms, left_open, open_moti
 from rps_pin.closed_loop.regular import actuated_rank, regular_near
 from rps_pin.numerics.linear_algebra import Decomposition, rank, singular_values
 
+#: A line names so many joints or links of one freedom.
+_NAMED = 6
 _JOINT_KINDS = {
     "JointModelR": "revolute",
     "JointModelP": "prismatic",
@@ -305,9 +307,14 @@ def _driven(joint: JointDescription) -> str:
 
 
 def _in_words(freedom: Freedom) -> str:
-    """Return what moves in a freedom."""
-    links = ", ".join(freedom.links)
-    return f"{counted(freedom.size, 'motion')} of {links} (joints: {', '.join(freedom.joints)})"
+    """Return what moves in a freedom; not all of many."""
+    links, joints = _some(freedom.links), _some(freedom.joints)
+    return f"{counted(freedom.size, 'motion')} of {links} (joints: {joints})"
+
+
+def _some(names: tuple[str, ...]) -> str:
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return ", ".join(names[:_NAMED]) + more
 
 
 def _limits(joint: JointDescription) -> str:

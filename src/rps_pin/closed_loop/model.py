@@ -74,7 +74,8 @@ class ClosedLoopModel:
     closures
         Its loop closures: `LoopClosure` and `JointCoupling` objects.
     actuated
-        Names of the actuated joints; `tau` comes in this order. ``[]``: nothing is driven.
+        Names of the actuated joints, or of one coordinate (``ball.x``); `tau` comes in this order.
+        ``[]``: nothing is driven.
     home
         Configuration to start from, shape (nq,); its loops are closed here (see `close`) if they
         are open. Left out: Pinocchio's neutral one, whose loops are closed when `home` is first

@@ -14,7 +14,8 @@ What is left, f - r, they produce: with further actuators (b) that move as those
 
     tau_a + C' tau_b = T_a' (f - r),   |D tau| least,   J_d' lambda = (f - r - S' tau)_d.
 
-These are the forces of `least_effort`, whichever velocities are chosen.
+These are the forces of `least_effort`, whichever velocities are chosen. Where the passive
+velocities meet all rows of J, `least_squares` gives the same with less work.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from scipy.linalg.lapack import dposv
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.factorisation import HUGE, Factors, PassiveFactorisation
+from rps_pin.closed_loop.constraints.least_squares import PassiveLeastSquares
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, Decomposition, rank, singular_values
 
 #: Part of the force that the actuators may leave, relative to it, before there is a residual force.
@@ -116,6 +118,7 @@ class CompletedFactorisation:
         self._factorisation, self.passive = dependent, passive
         self._dependent = d = dependent.passive
         self._order = np.concatenate([passive.indices, actuated])
+        self._actuated = actuated
         self._passive_size = passive.indices.size
         # Motions of p that move no closure are unit vectors: r has f's own entries there.
         self._alone = np.intersect1d(chosen.passive, unmoving)
@@ -128,6 +131,10 @@ class CompletedFactorisation:
         #: The weight of all dependent velocities, if they have one.
         self._weight = float(weights[d[0]]) if d.size and np.ptp(weights[d]) == 0 else None
         self._scale = columns
+        self._squares: PassiveLeastSquares | None = None
+        if self._open.size and dependent.meets_all_rows and not np.isin(d, actuated).any():
+            moving = np.setdiff1d(passive.indices, self._alone)
+            self._squares = dependent.least_squares(moving, columns)
         #: Part of f above which r counts, whatever their directions.
         self._enough = RESIDUAL * float(columns.max() / columns.min())
 
@@ -136,6 +143,13 @@ class CompletedFactorisation:
 
         That is one of J_d, of the actuators or of the closures.
         """
+        if self._squares is not None:
+            found = self._by_least_squares(self._squares, jacobian, force)
+            if found is not None:
+                return found
+        return self._by_factors(jacobian, force)
+
+    def _by_factors(self, jacobian: Array, force: Array) -> CompletedForces | None:
         factors, lacking, rest = None, None, force
         if not self._simple:
             factors = self._factorisation.factors(jacobian)
@@ -161,6 +175,23 @@ class CompletedFactorisation:
                 return None
             lacking = lacking if counts else None
         return tau, multipliers, residual, lacking
+
+    def _by_least_squares(
+        self, squares: PassiveLeastSquares, jacobian: Array, force: Array
+    ) -> CompletedForces | None:
+        multipliers = squares.multipliers(jacobian, force)
+        if multipliers is None:
+            return None
+        lacking = dgemv(-1.0, jacobian.T, multipliers, 1.0, force)
+        tau = lacking.take(self._actuated)
+        lacking[self._actuated] = 0.0
+        size, whole = dnrm2(lacking), dnrm2(force)
+        if not (size < math.inf and dnrm2(multipliers) <= HUGE * whole):
+            return None
+        counts = size > self._enough * whole or self._counts(jacobian, force, tau, lacking)
+        if counts is None:
+            return None
+        return (tau, multipliers, 0.0, lacking) if counts else (tau, multipliers, size, None)
 
     def _multipliers(self, factors: Factors | None, jacobian: Array, rest: Array) -> Array | None:
         """Return lambda, shape (nc,), of f - r."""

@@ -22,6 +22,7 @@ from scipy.linalg.blas import dasum, dtrsm
 from scipy.linalg.lapack import dgecon, dgeqp3, dgetrf, dgetrs, dormqr
 
 from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.constraints.least_squares import PassiveLeastSquares
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, condition_number, rank
 
 #: Size of a solution, relative to the right side, that no well conditioned J_p gives in one unit.
@@ -64,6 +65,15 @@ class PassiveFactorisation:
         if rows.size == passive.size > 0:
             spread = math.exp(sum(float(np.ptp(np.log(scale))) for scale in self.scales))
             self._harmless_rcond = min(100 * passive.size * spread / max_condition, 1.0)
+
+    @property
+    def meets_all_rows(self) -> bool:
+        """Whether J_p has as many columns as rows, and so full row rank where it is regular."""
+        return self._rows.size == self.passive.size
+
+    def least_squares(self, passive: Indices, columns: Array) -> PassiveLeastSquares:
+        """Return the solver for other passive velocities, columns (nv,) scaled to one unit."""
+        return PassiveLeastSquares(passive, self._rows[:, 0], columns, self._max_condition)
 
     def factors(self, jacobian: Array) -> Factors | None:
         """Return factors of J_p for any number of solutions, or None near a singularity."""
