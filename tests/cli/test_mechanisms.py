@@ -261,6 +261,34 @@ def test_convert_replaces_files_only_if_asked(tmp_path: Path) -> None:
     assert (tmp_path / "delta.yaml").read_text() != "mine"
 
 
+def test_convert_keeps_meshes_and_tells_what_is_lost(tmp_path: Path) -> None:
+    """Meshes by whole paths, so that they are found from the new folder; others are told."""
+    source = tmp_path / "source"
+    source.mkdir()
+    shapes = "".join(
+        f'<visual><geometry><mesh filename="{name}.stl"/></geometry></visual>'
+        for name in ("mesh", "gone")
+    )
+    inertial = (
+        '<inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    )
+    (source / "arm.urdf").write_text(
+        f'<robot name="arm"><link name="base"/><link name="arm">{inertial}{shapes}</link>'
+        '<joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint></robot>'
+    )
+    corners = ("0 0 0", "1 0 0", "0 1 0")
+    facet = "".join(f"vertex {corner}\n" for corner in corners)
+    (source / "mesh.stl").write_text(
+        f"solid a\nfacet normal 0 0 1\nouter loop\n{facet}endloop\nendfacet\nendsolid a\n"
+    )
+    run = rps_pin("convert", "source/arm.urdf", "--to", "urdf", "-o", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert f'filename="{source / "mesh.stl"}"' in (tmp_path / "out" / "arm.urdf").read_text()
+    assert "gone.stl" in run.stderr
+    assert "a URDF names no actuated joints" in run.stderr
+
+
 def test_convert_names_the_link_that_mujoco_does_not_move(tmp_path: Path) -> None:
     run = rps_pin("convert", "rps", "--to", "mjcf", folder=tmp_path)
     assert run.returncode == 1

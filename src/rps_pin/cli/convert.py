@@ -94,4 +94,4 @@ def convert_command(
                 overwrite=True,
             )
     typer.echo(f"wrote {' and '.join(map(str, targets))}")
-    print_notes([*notes, *(str(one.message) for one in told)])
+    print_notes([*mechanism.notes, *notes, *(str(one.message) for one in told)])

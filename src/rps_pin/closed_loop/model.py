@@ -1150,7 +1150,7 @@ class ClosedLoopModel:
         InputError
             If the path does not end in ``.urdf``, or a file exists and `overwrite` is false.
         MechanismError
-            If URDF has no such joint (ellipsoid, mimic); names it.
+            If URDF has no such joint (ellipsoid, mimic), or a file cannot hold a name; names it.
 
         Warns
         -----
@@ -1200,7 +1200,7 @@ class ClosedLoopModel:
             If the path does not end in ``.xml``, a least value is negative, or the file exists and
             `overwrite` is false.
         MechanismError
-            If MuJoCo has no such joint, effect, actuator or link; names it.
+            If MuJoCo has no such joint, effect, actuator or link; or a file cannot hold a name.
 
         Warns
         -----

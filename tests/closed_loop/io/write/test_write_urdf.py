@@ -264,6 +264,23 @@ def test_names_that_yaml_or_xml_could_misread_come_back(tmp_path: Path) -> None:
     assert back.name == "no"
 
 
+@pytest.mark.parametrize("name", ["a\x01b", "", "a" * 2000])
+@pytest.mark.parametrize("write", ["to_urdf", "to_mjcf"])
+def test_names_that_no_file_can_hold_are_refused(name: str, write: str, tmp_path: Path) -> None:
+    mechanism = ClosedLoopModel(alone(pin.JointModelRX(), name), [], [])
+    with pytest.raises(MechanismError, match="cannot be written: a name in a file has 1 to 1000"):
+        getattr(mechanism, write)(tmp_path / ("m.urdf" if write == "to_urdf" else "m.xml"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_neutral_home_outside_the_limits_comes_back(tmp_path: Path) -> None:
+    model = alone(pin.JointModelRX())
+    model.lowerPositionLimit[:], model.upperPositionLimit[:] = 0.5, 1.0
+    mechanism = ClosedLoopModel(model, [], ["joint"])
+    back = ClosedLoopModel.load(mechanism.to_urdf(tmp_path / "m.urdf"))
+    assert mechanism.home.tolist() == back.home.tolist() == [0]
+
+
 def test_frames_keep_their_places_and_the_links_they_hang_on(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     model = random_tree(rng, ["revolute", "prismatic"], planar=False)

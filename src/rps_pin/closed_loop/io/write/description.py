@@ -43,7 +43,8 @@ def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, An
     lines += _list("closures", frames)
     lines += _list("couplings", couplings)
     lines.append(f"actuated: {_value(source.actuated)}")
-    if source.home is not None:
+    neutral = source.home is not None and np.array_equal(source.home, pin.neutral(model))
+    if source.home is not None and not neutral:  # the neutral one is taken where none is given
         home = {name: _coordinates(model, i, source.home) for i, name in _joints(model)}
         lines += _mapping("home", home)
     lines += _mapping("damping", _by_joint(model, effects.damping))

@@ -7,6 +7,7 @@ that row, with massless links between: q and v keep their entries.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -18,12 +19,14 @@ from rps_pin.closed_loop.column_names import joint_coordinates, named_velocities
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.editing.rebuild import JointRow, NewJoint, rebuilt
-from rps_pin.errors import MechanismError
+from rps_pin.errors import MechanismError, shown
 
 #: Axes count as perpendicular below this cosine.
 PERPENDICULAR = 1e-9
 #: Limits from here on bound nothing; MuJoCo's mjMAXVAL.
 FAR = 1e10
+#: YAML's longest key.
+_LONGEST = 1000
 
 
 class Source(NamedTuple):
@@ -51,6 +54,8 @@ class Source(NamedTuple):
     max_condition: float
 
 
+_IN_XML = re.compile("[\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")
+
 #: Joints in a row: the placement of each in the one before, and a Pinocchio joint model.
 Parts = list[tuple[pin.SE3, Any]]
 
@@ -73,6 +78,7 @@ def without_rows(source: Source, whole: Callable[[Any], bool]) -> Source:
         If a joint is of a kind that no format has (ellipsoid, mimic); names it.
     """
     model = source.model
+    _check_names(source)
     taken = Names([*model.names, *(frame.name for frame in model.frames)])
     rows: dict[int, JointRow] = {}
     for index in range(1, model.njoints):
@@ -90,6 +96,19 @@ def without_rows(source: Source, whole: Callable[[Any], bool]) -> Source:
     driven = [named_velocities(model, name) or [] for name in source.actuated]
     actuated = tuple(name for own in driven for name in _driven(split, own))
     return source._replace(model=split, actuated=actuated)
+
+
+def _check_names(source: Source) -> None:
+    """Refuse names that no XML or YAML file can hold."""
+    model = source.model
+    names = [*list(model.names)[1:], *(frame.name for frame in list(model.frames)[1:])]
+    names += [closure.name for closure in source.closures]
+    for name in [*names, source.name or "mechanism"]:
+        if not name or len(name) > _LONGEST or not _IN_XML.fullmatch(name):
+            raise MechanismError(
+                f"the name {shown(name)} cannot be written: a name in a file has 1 to {_LONGEST} "
+                "characters, and no control characters"
+            )
 
 
 def _driven(model: pin.Model, velocities: Sequence[int]) -> list[str]:
