@@ -43,7 +43,6 @@ def complete(
     start = _closed_start(system, guess, within_limits)
     if start is not guess:
         target = with_values(system, start, named)
-    found = Path(system, given, start, target).follow()
     if np.abs(pin.difference(system.model, start, target)).max(initial=0.0) <= _SAME:
         return target
     found = Path(system, given, start, target).follow()
