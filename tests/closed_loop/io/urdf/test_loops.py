@@ -206,6 +206,11 @@ def test_the_axis_of_a_loop_is_in_the_frame_of_its_end() -> None:
         (CUTS["Isaac Sim"].replace('<axis xyz="0 1 0"/>', ""), "loop_joint 'l' has no <axis>"),
         ("<drake:ball_constraint/>", "has no <drake:ball_constraint_body_A>"),
         (CUTS["Drake"].replace("0.4 0 0", "0.4 0"), "value = '0.4 0' must be 3 finite numbers"),
+        (CUTS["Drake"].replace("coupler", "rocker"), "'ball_1' joins link 'rocker' to itself"),
+        (
+            CUTS["Drake"].replace("coupler", "rocker").replace("0.4", "0").replace("0.2", "0"),
+            "'ball_1' joins link 'rocker' to itself",
+        ),
         ("<gazebo><joint name='j'/></gazebo>", "a <joint> of SDFormat in <gazebo> is not read"),
     ],
 )

@@ -75,18 +75,8 @@ def closures_of(file: UrdfFile) -> list[Closure]:
     for element in file.robot.iterchildren("*"):
         read = readers.get(tag_of(element))
         if read is not None:
-            closure = read(file, element, len(found) + 1)
-            _refuse_one_link(file, element, closure)
-            found.append(closure)
+            found.append(read(file, element, len(found) + 1))
     return found
-
-
-def _refuse_one_link(file: UrdfFile, element: Any, closure: Closure) -> None:
-    if isinstance(closure, LoopClosure):
-        links = {frame.name: frame.link for frame in file.frames}
-        a, b = (links.get(name, name) for name in (closure.frame_a, closure.frame_b))
-        if a == b:
-            file.refuse(element, f"{tag_of(element)} {closure.name!r} joins link {a!r} to itself")
 
 
 def _loop(file: UrdfFile, element: Any, _: int) -> Closure:
@@ -130,7 +120,7 @@ def _ball(file: UrdfFile, element: Any, number: int) -> Closure:
         placement = pin.SE3(np.eye(3), np.array(file.numbers(at, "value", 3)))
         frames.append(_frame(file, f"ball_{number}", link, placement, body[-1]))
     name = get(element, "name") or f"ball_{number}"
-    return LoopClosure(frames[0], frames[1], "spherical", name)
+    return _joined(file, element, frames, "spherical", name)
 
 
 def _closure(
@@ -142,8 +132,17 @@ def _closure(
         options["axis"] = axes[0].tolist()
         if kind in _WITH_TWO_AXES:
             options["axis_b"] = axes[1].tolist()
-    if frames[0] == frames[1]:  # which no LoopClosure can have
-        file.refuse(element, f"{tag_of(element)} {name!r} joins link {frames[0]!r} to itself")
+    return _joined(file, element, frames, kind, name, **options)
+
+
+def _joined(
+    file: UrdfFile, element: Any, frames: Sequence[str], kind: str, name: str, **options: Any
+) -> LoopClosure:
+    """Return a closure of two frames, which must be on two links."""
+    links = {frame.name: frame.link for frame in file.frames}
+    a, b = (links.get(frame, frame) for frame in frames)
+    if a == b:
+        file.refuse(element, f"{tag_of(element)} {name!r} joins link {a!r} to itself")
     return LoopClosure(frames[0], frames[1], kind, name, **options)  # type: ignore[arg-type]
 
 
