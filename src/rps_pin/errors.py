@@ -24,6 +24,12 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
+def few(names: Sequence[str], most: int = 12) -> str:
+    """Return names with commas, the first ones of many and how many more there are."""
+    listed = ", ".join(names[:most])
+    return listed if len(names) <= most else f"{listed} and {len(names) - most} more"
+
+
 def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return ``" (did you mean x?)"`` for a misspelt name, or nothing."""
     near = get_close_matches(name, list(names), n=1)

@@ -16,15 +16,13 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop import kinematics
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
-from rps_pin.closed_loop.freedoms import Freedom, freedoms, left_open, open_motions
+from rps_pin.closed_loop.freedoms import NAMED, Freedom, freedoms, of_actuators
 from rps_pin.closed_loop.regular import actuated_rank, regular_near
+from rps_pin.errors import few
 from rps_pin.numerics.linear_algebra import Decomposition, rank, singular_values
 
-#: A line names so many joints or links of one freedom.
-_NAMED = 6
 _JOINT_KINDS = {
     "JointModelR": "revolute",
     "JointModelP": "prismatic",
@@ -221,7 +219,7 @@ def describe(
     jacobian = equations.jacobian(at).copy()
     scaled = system.scaled(jacobian)
     factors = Decomposition(scaled)
-    motions = open_motions(system, at, left_open(system, jacobian, actuated))
+    motions = of_actuators(system, at, jacobian)
     return MechanismDescription(
         name=name,
         joints=tuple(_joint(system, i) for i in range(1, model.njoints)),
@@ -235,7 +233,9 @@ def describe(
         actuated=system.actuated_names,
         actuated_velocities=actuated.size,
         actuated_rank=actuated_rank(system, factors),
-        condition=kinematics.condition(system, at, jacobian),
+        condition=system.factorisation.condition(
+            jacobian[:, system.passive], motions.idle.shape[1]
+        ),
         idle=freedoms(system, at, motions.idle),
         lacking=freedoms(system, at, motions.lacking),
         notes=notes,
@@ -308,13 +308,8 @@ def _driven(joint: JointDescription) -> str:
 
 def _in_words(freedom: Freedom) -> str:
     """Return what moves in a freedom; not all of many."""
-    links, joints = _some(freedom.links), _some(freedom.joints)
+    links, joints = few(freedom.links, NAMED), few(freedom.joints, NAMED)
     return f"{counted(freedom.size, 'motion')} of {links} (joints: {joints})"
-
-
-def _some(names: tuple[str, ...]) -> str:
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    return ", ".join(names[:_NAMED]) + more
 
 
 def _limits(joint: JointDescription) -> str:

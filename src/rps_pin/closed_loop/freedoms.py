@@ -27,14 +27,15 @@ from scipy.sparse.csgraph import connected_components
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.errors import few
 from rps_pin.numerics.linear_algebra import Decomposition
 
 #: Speed of a point of a link that turns on the spot, over that of its tip.
 ON_THE_SPOT = 0.05
 #: What moves less than this, in the unit of the motions, stands.
 _STANDS = 1e-6
-#: A message names so many joints.
-_NAMED = 6
+#: A message names so many joints, or links.
+NAMED = 6
 
 
 class Freedom(NamedTuple):
@@ -76,13 +77,33 @@ def open_motions(system: ConstraintSystem, q: Array, motions: Array) -> OpenMoti
     return OpenMotions(*(np.concatenate(parts, axis=1) for parts in zip(*found, strict=True)))
 
 
-def left_open(system: ConstraintSystem, jacobian: Array, given: Indices) -> Array:
-    """Return the motions with J n = 0 that leave given velocities zero, (nv, k), as `motions`."""
-    rest = np.setdiff1d(np.arange(system.model.nv), given)
-    motions = Decomposition(system.scaled(jacobian)[:, rest]).null_space()
-    whole = np.zeros((system.model.nv, motions.shape[1]))
-    whole[rest] = motions
-    return whole
+class Rest(NamedTuple):
+    """The velocities that are not given, and their columns of J."""
+
+    size: int
+    """How many velocities there are, nv."""
+    indices: Indices
+    """Those that are not given, in rising order."""
+    factors: Decomposition
+    """Of their columns J_r, all entries in one unit."""
+
+    def left_open(self) -> Array:
+        """Return the motions with J n = 0 that leave the given velocities zero, (nv, k)."""
+        motions = self.factors.null_space()
+        whole = np.zeros((self.size, motions.shape[1]))
+        whole[self.indices] = motions
+        return whole
+
+
+def rest_of(system: ConstraintSystem, jacobian: Array, given: Indices) -> Rest:
+    """Return the velocities that are not given, and the factors of their columns of J."""
+    indices = np.setdiff1d(np.arange(system.model.nv), given)
+    return Rest(system.model.nv, indices, Decomposition(system.scaled(jacobian)[:, indices]))
+
+
+def of_actuators(system: ConstraintSystem, q: Array, jacobian: Array) -> OpenMotions:
+    """Return the motions that the actuated joints leave open."""
+    return open_motions(system, q, rest_of(system, jacobian, system.actuated).left_open())
 
 
 def freedoms(system: ConstraintSystem, q: Array, motions: Array) -> tuple[Freedom, ...]:
@@ -99,8 +120,7 @@ def in_words(system: ConstraintSystem, motions: Array) -> str:
     names, joints = list(system.model.names)[1:], list(system.model.joints)[1:]
     most = [float(size[j.idx_v : j.idx_v + j.nv].max(initial=0.0)) for j in joints]
     moving = [i for i in np.argsort(-np.array(most), kind="stable") if most[i] > _STANDS]
-    more = f" and {len(moving) - _NAMED} more" if len(moving) > _NAMED else ""
-    quoted = ", ".join(repr(names[i]) for i in moving[:_NAMED]) + more
+    quoted = few([repr(names[i]) for i in moving], NAMED)
     return f"joint {quoted}" if len(moving) == 1 else f"joints {quoted}"
 
 
@@ -147,16 +167,18 @@ def _link(system: ConstraintSystem, index: int, carried: list[Array]) -> _Link:
 
 def _separate(system: ConstraintSystem, motions: Array) -> Iterator[Array]:
     """Return bases of the parts of a space of motions that move different joints, (nv, k) each."""
-    joints = [slice(j.idx_v, j.idx_v + j.nv) for j in list(system.model.joints)[1:]]
-    together = motions @ motions.T
-    linked = [[np.abs(together[a, b]).max(initial=0.0) > _STANDS for b in joints] for a in joints]
-    _, labels = connected_components(np.array(linked), directed=False)
+    joints = [joint for joint in list(system.model.joints)[1:] if joint.nv]
+    first, sizes = [joint.idx_v for joint in joints], [joint.nv for joint in joints]
+    together = np.abs(motions @ motions.T)
+    largest = np.maximum.reduceat(np.maximum.reduceat(together, first, axis=0), first, axis=1)
+    _, labels = connected_components(largest > _STANDS, directed=False)
+    of_velocity = np.repeat(labels, sizes)
     for label in dict.fromkeys(labels.tolist()):
-        rows = np.zeros(system.model.nv, dtype=bool)
-        for joint, of_joint in zip(joints, labels, strict=True):
-            rows[joint] |= of_joint == label
-        left, values, _ = np.linalg.svd(np.where(rows[:, None], motions, 0.0), full_matrices=False)
-        if (part := left[:, values > 0.5]).shape[1]:  # each value is 0 or 1
+        rows = of_velocity == label
+        left, values, _ = np.linalg.svd(motions[rows], full_matrices=False)
+        if count := int((values > 0.5).sum()):  # each value is 0 or 1
+            part = np.zeros((system.model.nv, count))
+            part[rows] = left[:, :count]
             yield part
 
 

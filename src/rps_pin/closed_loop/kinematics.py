@@ -11,7 +11,7 @@ import numpy as np
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
-from rps_pin.closed_loop.freedoms import in_words, left_open, open_motions
+from rps_pin.closed_loop.freedoms import Rest, in_words, of_actuators, open_motions, rest_of
 from rps_pin.errors import ClosureError, SingularityError
 from rps_pin.numerics import linear_algebra
 
@@ -34,7 +34,7 @@ def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
     motions = allowed_motions(system, jacobian)
     of_chosen = motions[chosen]
     if of_chosen.shape[0] < of_chosen.shape[1]:
-        return _basis_without_idle(system, q, jacobian, chosen)
+        return _basis_without_idle(system, q, jacobian, chosen, _named(*of_chosen.shape))
     if of_chosen.shape[0] != of_chosen.shape[1]:
         reason = _named(*of_chosen.shape)
         raise SingularityError(reason, np.inf, system.max_condition)
@@ -47,11 +47,10 @@ def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
 
 
 def _basis_without_idle(
-    system: ConstraintSystem, q: Array, jacobian: Array, chosen: Indices
+    system: ConstraintSystem, q: Array, jacobian: Array, chosen: Indices, named: str
 ) -> Array:
     """Return T where only idle freedoms are left open, of least norm: J_r T_r = -J_c."""
-    named = _named(chosen.size, allowed_motions(system, jacobian).shape[1])
-    factors, rest = _factors_of_rest(system, q, jacobian, chosen, named)
+    _, rest, factors = _determined(system, q, jacobian, chosen, named)
     right = -system.row_scale[:, None] * jacobian[:, chosen]
     scaled = factors.least_norm(right)
     opening = np.abs(system.scaled(jacobian)[:, rest] @ scaled - right).max(initial=0.0)
@@ -69,8 +68,7 @@ def _basis_without_idle(
 
 def condition(system: ConstraintSystem, q: Array, jacobian: Array) -> float:
     """Return the condition number of J_p, idle freedoms left out; see `ClosedLoopModel`."""
-    motions = left_open(system, jacobian, system.actuated)
-    idle = open_motions(system, q, motions).idle.shape[1]
+    idle = of_actuators(system, q, jacobian).idle.shape[1]
     return system.factorisation.condition(jacobian[:, system.passive], idle)
 
 
@@ -78,26 +76,24 @@ def _named(count: int, mobility: int) -> str:
     return f"{count} independent velocities are named, for a mobility of {mobility} here"
 
 
-def _factors_of_rest(
+def _determined(
     system: ConstraintSystem,
     q: Array,
     jacobian: Array,
     given: Indices,
     reason: str = "the actuated joints do not determine the motion here",
-) -> tuple[linear_algebra.Decomposition, Indices]:
-    """Return the factors of J_r in one unit, and r: all velocities but the given ones.
+) -> Rest:
+    """Return the velocities that are not given, which those that are determine.
 
     Raises
     ------
     SingularityError
-        If they leave motions open that are not idle, or nearly so.
+        If motions are left open that are not idle, or nearly so.
     """
-    rest = np.setdiff1d(np.arange(system.model.nv), given)
-    factors = linear_algebra.Decomposition(system.scaled(jacobian)[:, rest])
-    if factors.rank < rest.size:
-        left_open = np.zeros((system.model.nv, rest.size - factors.rank))
-        left_open[rest] = factors.null_space()
-        lacking = open_motions(system, q, left_open).lacking
+    rest = rest_of(system, jacobian, given)
+    factors = rest.factors
+    if factors.rank < rest.indices.size:
+        lacking = open_motions(system, q, rest.left_open()).lacking
         if lacking.size:
             raise SingularityError(
                 f"{reason}: {in_words(system, lacking)} can move while these stand still",
@@ -107,7 +103,7 @@ def _factors_of_rest(
     if factors.rank:
         condition = float(factors.values[0] / factors.values[factors.rank - 1])
         system.refuse_singular(condition)
-    return factors, rest
+    return rest
 
 
 def actuated_basis(system: ConstraintSystem, solved: Array) -> Array:
@@ -153,7 +149,7 @@ def _completed(
         if solved is not None:
             full[system.passive] = -solved[:, 0]
             return full
-    factors, rest = _factors_of_rest(system, q, jacobian, given)
+    _, rest, factors = _determined(system, q, jacobian, given)
     right = -system.row_scale * right
     scaled = factors.least_norm(right)
     opening = float(np.abs(system.scaled(jacobian)[:, rest] @ scaled - right).max(initial=0.0))

@@ -14,13 +14,12 @@ from pinocchio import coal
 from rps_pin.closed_loop.constraints.closures import LoopClosure
 from rps_pin.closed_loop.io.gepetto import gepetto_urdf, is_gepetto
 from rps_pin.closed_loop.io.mechanism_schema import Description
-from rps_pin.closed_loop.io.urdf.elements import few
 from rps_pin.closed_loop.io.urdf.normal_form import Shapes, normal_form
 from rps_pin.closed_loop.io.urdf.packages import file_of
 from rps_pin.closed_loop.io.urdf.tree import urdf_file
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.config import read_yaml
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, few
 
 PackagePath = Sequence[str | os.PathLike[str]]
 

@@ -17,8 +17,7 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.derivatives import FrameMotions, closure_derivatives
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
-from rps_pin.closed_loop.freedoms import left_open
-from rps_pin.numerics.linear_algebra import Decomposition
+from rps_pin.closed_loop.freedoms import rest_of
 
 
 class IdleSlopes:
@@ -46,12 +45,12 @@ class IdleSlopes:
     ) -> None:
         nv = system.model.nv
         jacobian = system.equations.jacobian(q).copy()
-        scaled = left_open(system, jacobian, chosen)
+        rest = rest_of(system, jacobian, chosen)
+        scaled = rest.left_open()
         self.motions = system.column_scale[:, None] * scaled
         if not scaled.size:
             return
-        self._rest = np.setdiff1d(np.arange(nv), chosen)
-        self._factors = Decomposition(system.scaled(jacobian)[:, self._rest])
+        self._rest, self._factors = rest.indices, rest.factors
         self._rows, self._columns = system.row_scale, system.column_scale[self._rest]
         states = [(q, motion, np.zeros(nv)) for motion in self.motions.T]
         #: dJ E by each direction, (k, nc, nv).

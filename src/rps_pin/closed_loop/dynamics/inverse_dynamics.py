@@ -30,7 +30,7 @@ from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.dynamics.generalised_forces import required_force, resisting_force
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
-from rps_pin.closed_loop.freedoms import left_open, open_motions
+from rps_pin.closed_loop.freedoms import of_actuators
 from rps_pin.closed_loop.regular import actuated_rank, refuse_irregular
 from rps_pin.errors import InputError
 from rps_pin.numerics import linear_algebra
@@ -215,7 +215,7 @@ def _of_any_actuators(
     ranks, mobility = (factors.rank, actuated_rank(system, factors)), system.model.nv - factors.rank
     refuse_irregular(system, q, ranks)
     scales = system.factorisation.scales
-    idle = open_motions(system, q, left_open(system, jacobian, system.actuated)).idle.shape[1]
+    idle = of_actuators(system, q, jacobian).idle.shape[1]
     passive = PassiveVelocities(system.passive, idle)
     if mobility == system.actuated.size == ranks[1]:
         system.refuse_singular(system.condition(jacobian))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from rps_pin.closed_loop.io.urdf.elements import VELOCITIES, UrdfFile, UrdfJoint, few
+from rps_pin.closed_loop.io.urdf.elements import VELOCITIES, UrdfFile, UrdfJoint
+from rps_pin.errors import few
 
 #: Pinocchio's parser calls itself once a link, and its scratch memory grows as the cube of the
 #: velocities (300 take 1.8 GB).

@@ -17,6 +17,7 @@ from lxml import etree
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.io.urdf import vocabulary
 from rps_pin.closed_loop.io.urdf.vocabulary import child, children, get, tag_of
+from rps_pin.errors import few
 
 #: Joint types by the element that may have them.
 JOINT_TYPES = {
@@ -439,9 +440,3 @@ def unknown(owner: str, what: str, given: object, known: Sequence[str]) -> str:
     near = get_close_matches(str(given), known, n=1)
     meant = f"did you mean {near[0]!r}?" if near else f"there are: {few(known)}"
     return f"{owner}: no {what} {given!r}; {meant}"
-
-
-def few(names: Sequence[str]) -> str:
-    """Return names, the first twelve of many."""
-    shown = ", ".join(map(str, names[:12]))
-    return shown if len(names) <= 12 else f"{shown} and {len(names) - 12} more"
