@@ -367,6 +367,22 @@ def test_old_remains_of_others_go(fake: FakeCompiler) -> None:
     assert (old.exists(), new.exists(), fake.compiled) == (False, True, 1)
 
 
+def test_what_others_remove_meanwhile_is_no_error(
+    fake: FakeCompiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between the list of a folder and the look at what is in it, another process may remove it."""
+    build(sine(1.0), Proof(1.0))
+    ghost = cache_folder() / "of-another.part-1"
+    listed = Path.glob
+
+    def glob(self: Path, pattern: str) -> list[Path]:
+        return [*listed(self, pattern), ghost if "part" in pattern else self / "ghost"]
+
+    monkeypatch.setattr(Path, "glob", glob)
+    np.testing.assert_array_equal(called(build(sine(3.0), Proof(3.0)), X), 3.0 * np.sin(X))
+    assert cache.usage()[0] == 2
+
+
 def test_clearing(fake: FakeCompiler) -> None:
     library = build(sine(), Proof(), "gcc")
     build(sine(), Proof(), "tcc")

@@ -225,20 +225,28 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def _used(entry: Path) -> float:
-    try:
-        return (entry / _RECORD).stat().st_mtime
-    except OSError:
-        return 0.0
+    found = _status(entry / _RECORD)
+    return 0.0 if found is None else found.st_mtime
 
 
 def _size(entry: Path) -> int:
-    return sum(file.stat().st_size for file in entry.glob("*"))
+    found = (_status(file) for file in entry.glob("*"))
+    return sum(one.st_size for one in found if one is not None)
+
+
+def _status(file: Path) -> os.stat_result | None:
+    """Return the status of a file or folder; None if another process removed it meanwhile."""
+    try:
+        return file.stat()
+    except OSError:
+        return None
 
 
 def _make_room(newest: Path) -> None:
     """Remove what killed processes left, and what was used the longest time ago if need be."""
     for part in newest.parent.glob(f"*{_PART}*"):
-        if time.time() - part.stat().st_mtime > _DAY:
+        found = _status(part)
+        if found is not None and time.time() - found.st_mtime > _DAY:
             shutil.rmtree(part, ignore_errors=True)
     entries = sorted(_entries(newest.parent), key=_used)
     sizes = [_size(entry) for entry in entries]
