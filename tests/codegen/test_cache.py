@@ -371,7 +371,7 @@ def test_what_others_remove_meanwhile_is_no_error(
     fake: FakeCompiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Between the list of a folder and the look at what is in it, another process may remove it."""
-    build(sine(1.0), Proof(1.0))
+    build(sine(1.0), Proof(1.0), "gcc")
     ghost = cache_folder() / "of-another.part-1"
     listed = Path.glob
 
@@ -379,7 +379,8 @@ def test_what_others_remove_meanwhile_is_no_error(
         return [*listed(self, pattern), ghost if "part" in pattern else self / "ghost"]
 
     monkeypatch.setattr(Path, "glob", glob)
-    np.testing.assert_array_equal(called(build(sine(3.0), Proof(3.0)), X), 3.0 * np.sin(X))
+    library = build(sine(3.0), Proof(3.0), "gcc")
+    np.testing.assert_array_equal(called(library, X), 3.0 * np.sin(X))
     assert cache.usage()[0] == 2
 
 
