@@ -15,20 +15,23 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.assembly.closing import close, closed_gap
 from rps_pin.closed_loop.column_names import named_velocities
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure, frame_id
+from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.editing.merge import (
     JointMerge,
     merged,
     merged_configuration,
     placeholder_notes,
 )
+from rps_pin.closed_loop.editing.present_pose import closure_at
 from rps_pin.closed_loop.editing.replace import replace_joints, replaced_configuration
 from rps_pin.closed_loop.io.gepetto import is_gepetto, parts_from_gepetto
 from rps_pin.closed_loop.io.mechanism_schema import ClosureEntry, CouplingEntry, Description
@@ -86,12 +89,15 @@ def parts_from_yaml(
     for index, name in enumerate(actuated):
         if named_velocities(parts.model, name) is None:
             _check_joint(file, ("actuated", index), name, parts.model)
-    added = _closures(file, description, parts.model)
+    given = _closures(file, description, parts.model)
+    own = [one for one in parts.closures if one not in given]
+    home = _home(file, description, tree, parts, merges)
+    added, home = _standing(file, parts.model, own, given, home)
     return replace(
         parts,
-        closures=(*(one for one in parts.closures if one not in added), *added),
+        closures=(*own, *added),
         actuated=actuated,
-        home=_home(file, description, tree, parts, merges),
+        home=home,
         name=description.name or parts.name or Path(path).stem,
         friction_speed=description.friction_speed,
         characteristic_length=description.characteristic_length,
@@ -271,29 +277,71 @@ def _angle(where: str, name: str, given: Array) -> float:
 # Closures -----------------------------------------------------------------------------------------
 
 
-def _closures(file: YamlFile, description: Description, model: pin.Model) -> list[Closure]:
-    found: list[Closure] = []
+class _AtHome(NamedTuple):
+    """A closure of frames as they stand at home, once this is known."""
+
+    number: int
+    """Index in the file's closures."""
+    fields: dict[str, Any]
+
+
+def _closures(
+    file: YamlFile, description: Description, model: pin.Model
+) -> list[Closure | _AtHome]:
+    found: list[Closure | _AtHome] = []
     for i, entry in enumerate(description.closures):
         for end in ("frame_a", "frame_b"):
             with file.at("closures", i, end):
                 frame_id(model, getattr(entry, end), "closures")
+        fields = _fields(entry)
         with file.at("closures", i):
-            found.append(_closure(entry))
+            found.append(_AtHome(i, fields) if entry.at_home else LoopClosure(**fields))
     for i, coupled in enumerate(description.couplings):
         with file.at("couplings", i):
             found.append(_coupling(coupled, model))
     return found
 
 
-def _closure(entry: ClosureEntry) -> LoopClosure:
-    """Return a closure; R = R_z(yaw) R_y(pitch) R_x(roll) of an offset."""
-    given = entry.model_dump()
+def _fields(entry: ClosureEntry) -> dict[str, Any]:
+    """Return the fields of a closure; R = R_z(yaw) R_y(pitch) R_x(roll) of an offset."""
+    fields = entry.model_dump(exclude={"at_home"})
     for end in ("placement_a", "placement_b"):
         offset = getattr(entry, end)
         if offset is not None:
             turn = pin.rpy.rpyToMatrix(*offset.rpy)
-            given[end] = pin.SE3(turn, np.array(offset.xyz)).homogeneous
-    return LoopClosure(**given)
+            fields[end] = pin.SE3(turn, np.array(offset.xyz)).homogeneous
+    return fields
+
+
+def _standing(
+    file: YamlFile,
+    model: pin.Model,
+    own: Sequence[Closure],
+    given: Sequence[Closure | _AtHome],
+    home: Array | None,
+) -> tuple[list[Closure], Array | None]:
+    """Return the closures given, and the home, at which all others are closed if some stand there.
+
+    Parameters
+    ----------
+    own
+        The closures of the tree's file.
+    """
+    fixed = [one for one in given if not isinstance(one, _AtHome)]
+    if len(fixed) == len(given):
+        return fixed, home
+    system = ConstraintSystem(model, [*own, *fixed], ())
+    q = system.normalised(pin.neutral(model) if home is None else home, "home")
+    if system.equations.largest_gap(system.equations.gaps(q)) > closed_gap(system):
+        q = close(system, q)
+    closures: list[Closure] = []
+    for one in given:
+        if isinstance(one, _AtHome):
+            with file.at("closures", one.number):
+                closures.append(closure_at(model, q, **one.fields))
+        else:
+            closures.append(one)
+    return closures, q
 
 
 def _coupling(entry: CouplingEntry, model: pin.Model) -> JointCoupling:

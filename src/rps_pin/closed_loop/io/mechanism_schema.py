@@ -18,7 +18,7 @@ class PlacementEntry(Entry):
 
 
 class ClosureEntry(Entry):
-    """The fields of a `LoopClosure`."""
+    """The fields of a `LoopClosure`; `at_home` is one of the frames as they stand at home."""
 
     frame_a: Text
     frame_b: Text
@@ -29,6 +29,7 @@ class ClosureEntry(Entry):
     distance: Finite | None = None
     placement_a: PlacementEntry | None = None
     placement_b: PlacementEntry | None = None
+    at_home: bool = False
 
 
 class CouplingEntry(Entry):
