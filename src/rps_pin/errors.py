@@ -156,6 +156,10 @@ class SingularityError(RPSPinError, ArithmeticError):
         super().__init__(message)
 
 
+class AccuracyWarning(UserWarning):
+    """The numbers of a mechanism's file are rounded: nearly redundant rows count as redundant."""
+
+
 class LimitExcess(NamedTuple):
     """A force beyond its limit."""
 

@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rps_pin.closed_loop.assembly.closing import close_gaps
+from rps_pin.closed_loop.constraints.rank_rule import EXACT
 
 Array = NDArray[np.float64]
 
@@ -25,6 +26,7 @@ def toy(gaps, jacobian, size: int, limits: Square | None = None) -> SimpleNamesp
         row_scale=1.0,
         column_scale=1.0,
         scaled=lambda matrix: matrix,
+        rule=EXACT,
     )
 
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated
+import warnings
+from collections.abc import Callable
+from functools import partial
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -13,7 +16,7 @@ from rich.markup import escape
 from rps_pin import __version__
 from rps_pin.cli.doctor import doctor
 from rps_pin.cli.lazy_group import SETTINGS, LazyGroup
-from rps_pin.errors import RPSPinError
+from rps_pin.errors import AccuracyWarning, RPSPinError
 
 app = typer.Typer(name="rps-pin", cls=LazyGroup, no_args_is_help=True, **SETTINGS)
 
@@ -77,8 +80,17 @@ def rps_pin(
     """
 
 
+def _show_warning(others: Callable[..., None], warning: object, kind: object, *rest: Any) -> None:
+    """Show a warning about a file's numbers as a note, others as they are."""
+    if isinstance(warning, AccuracyWarning):
+        typer.echo(f"note: {warning}", err=True)
+    else:
+        others(warning, kind, *rest)
+
+
 def run() -> None:
     """Run the command line."""
+    warnings.showwarning = partial(_show_warning, warnings.showwarning)
     try:
         app(prog_name="rps-pin")
         return

@@ -17,11 +17,12 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling
+from rps_pin.closed_loop.constraints.rank_rule import Rounding
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.freedoms import NAMED, Freedom, freedoms, of_actuators
 from rps_pin.closed_loop.regular import actuated_rank, regular_near
 from rps_pin.errors import few
-from rps_pin.numerics.linear_algebra import Decomposition, rank, singular_values
+from rps_pin.numerics.linear_algebra import rank, singular_values
 
 _JOINT_KINDS = {
     "JointModelR": "revolute",
@@ -116,6 +117,12 @@ class MechanismDescription:
         (Compares equal to ``"lacking"``, its former name, too.)
     condition : float
         Condition number of the passive joints' Jacobian there, idle freedoms left out.
+    gap : float
+        Largest gap of a closure there, m.
+    tolerance : float
+        Singular values up to this, over the largest (or 1 if that is less), count as zero.
+    rounding : Rounding or None
+        What the file's rounded numbers do to the closures; None if they are exact.
     notes : tuple of str
         What the reader of its file has decided.
     """
@@ -133,6 +140,9 @@ class MechanismDescription:
     actuated_velocities: int
     actuated_rank: int
     condition: float
+    gap: float
+    tolerance: float
+    rounding: Rounding | None = None
     notes: tuple[str, ...] = ()
     idle: tuple[Freedom, ...] = ()
     lacking: tuple[Freedom, ...] = ()
@@ -188,6 +198,11 @@ class MechanismDescription:
         lines += [f"without actuator: {_in_words(freedom)}" for freedom in self.lacking]
         if self.home_is_singular:
             lines.append("the home configuration is singular: all this holds next to it")
+        if self.rounding is not None:
+            lines.append(
+                f"the file's numbers are rounded: {self.rounding}; singular values up to "
+                f"{self.tolerance:.2g} count as zero"
+            )
         lines += [f"note: {note}" for note in self.notes]
         return "\n".join(lines)
 
@@ -217,8 +232,7 @@ def describe(
     at, singular = (q, False) if q is not None else regular_near(system, home())
     model, equations, actuated = system.model, system.equations, system.actuated
     jacobian = equations.jacobian(at).copy()
-    scaled = system.scaled(jacobian)
-    factors = Decomposition(scaled)
+    scaled, factors = system.scaled(jacobian), system.decomposed(jacobian)
     motions = of_actuators(system, at, jacobian)
     return MechanismDescription(
         name=name,
@@ -236,6 +250,9 @@ def describe(
         condition=system.factorisation.condition(
             jacobian[:, system.passive], motions.idle.shape[1]
         ),
+        gap=equations.largest_gap(equations.gaps(at)),
+        tolerance=system.rule.tolerance,
+        rounding=system.rule.rounding,
         idle=freedoms(system, at, motions.idle),
         lacking=freedoms(system, at, motions.lacking),
         notes=notes,
@@ -261,7 +278,7 @@ def _closure(
     system: ConstraintSystem, closure: Closure, scaled: Array, found: int
 ) -> ClosureDescription:
     others = np.delete(scaled, system.equations.rows(closure.name), axis=0)
-    needed = found - rank(singular_values(others))
+    needed = found - rank(singular_values(others), system.rule.tolerance)
     if isinstance(closure, JointCoupling):
         between = (closure.joint, *closure.others)
         return ClosureDescription(closure.name, "coupling", between, closure.size, needed)
@@ -285,9 +302,13 @@ def _offset(offset: tuple[float, ...] | None) -> str:
 def _plain(value: Any) -> Any:
     """Return a value of a description as plain data; infinities and NaN as None."""
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, (JointDescription, ClosureDescription, Freedom)):
-        return {name: _plain(part) for name, part in value._asdict().items()}
+        value = value.tolist()
+    elif isinstance(value, (JointDescription, ClosureDescription, Freedom)):
+        value = value._asdict()
+    elif isinstance(value, Rounding):
+        value = vars(value)
+    if isinstance(value, dict):
+        return {name: _plain(part) for name, part in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(part) for part in value]
     if isinstance(value, float):

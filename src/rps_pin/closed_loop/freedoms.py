@@ -98,7 +98,9 @@ class Rest(NamedTuple):
 def rest_of(system: ConstraintSystem, jacobian: Array, given: Indices) -> Rest:
     """Return the velocities that are not given, and the factors of their columns of J."""
     indices = np.setdiff1d(np.arange(system.model.nv), given)
-    return Rest(system.model.nv, indices, Decomposition(system.scaled(jacobian)[:, indices]))
+    columns = system.scaled(jacobian)[:, indices]
+    factors = Decomposition(columns, system.rule.tolerance)
+    return Rest(system.model.nv, indices, factors)
 
 
 def of_actuators(system: ConstraintSystem, q: Array, jacobian: Array) -> OpenMotions:

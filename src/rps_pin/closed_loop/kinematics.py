@@ -15,13 +15,11 @@ from rps_pin.closed_loop.freedoms import Rest, in_words, of_actuators, open_moti
 from rps_pin.errors import ClosureError, SingularityError
 from rps_pin.numerics import linear_algebra
 
-#: Opening rate that `velocity` and `acceleration` accept, relative to the rates given.
-_CONSISTENT = 1e-8
-
 
 def allowed_motions(system: ConstraintSystem, jacobian: Array) -> Array:
     """Return N, shape (nv, m), a basis of the null space of J, orthonormal in one unit."""
-    return system.column_scale[:, None] * linear_algebra.null_space(system.scaled(jacobian))
+    motions = linear_algebra.null_space(system.scaled(jacobian), system.rule.tolerance)
+    return system.column_scale[:, None] * motions
 
 
 def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
@@ -54,7 +52,7 @@ def _basis_without_idle(
     right = -system.row_scale[:, None] * jacobian[:, chosen]
     scaled = factors.least_norm(right)
     opening = np.abs(system.scaled(jacobian)[:, rest] @ scaled - right).max(initial=0.0)
-    if opening > _CONSISTENT * np.abs(right).max(initial=0.0):
+    if opening > system.rule.consistent * np.abs(right).max(initial=0.0):
         raise SingularityError(
             "these joints do not move independently here: the loops would open",
             np.inf,
@@ -127,7 +125,7 @@ def acceleration(
     jacobian = system.equations.jacobian(q)
     opening = float(np.abs(system.row_scale * (jacobian @ v)).max(initial=0.0))
     speed = float(np.abs(v / system.column_scale).max(initial=0.0))
-    if opening > _CONSISTENT * max(speed, 1.0):
+    if opening > system.rule.consistent * max(speed, 1.0):
         raise ClosureError(
             f"v opens the loops at {opening:.3g} m/s; complete it with velocity() first", opening
         )
@@ -154,7 +152,7 @@ def _completed(
     scaled = factors.least_norm(right)
     opening = float(np.abs(system.scaled(jacobian)[:, rest] @ scaled - right).max(initial=0.0))
     size = float(np.abs(right).max(initial=0.0))
-    if opening > _CONSISTENT * max(size, 1e-3):
+    if opening > system.rule.consistent * max(size, 1e-3):
         raise ClosureError(
             f"no motion of the mechanism has these {given.size} actuated values: "
             f"the loops would open at a rate of {opening:.3g} (asked for: {size:.3g})",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
@@ -19,8 +20,10 @@ from rps_pin.closed_loop import kinematics
 from rps_pin.closed_loop.assembly.closing import close, closed_gap
 from rps_pin.closed_loop.assembly.completion import complete
 from rps_pin.closed_loop.assembly.projection import project
+from rps_pin.closed_loop.assembly.rounding import find_rule
 from rps_pin.closed_loop.constraints.closures import Closure, Kind, LoopClosure
 from rps_pin.closed_loop.constraints.equations import LoopErrors
+from rps_pin.closed_loop.constraints.rank_rule import RankRule
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION, ConstraintSystem
 from rps_pin.closed_loop.describe import MechanismDescription, describe
 from rps_pin.closed_loop.dynamics import derivatives, generalised_forces
@@ -50,7 +53,7 @@ from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.closed_loop.summary import in_lines, in_one_line
 from rps_pin.errors import ClosureError, CompileError, MechanismError
-from rps_pin.validation import choice, real_vector
+from rps_pin.validation import choice, non_negative_number, real_vector
 
 _REFERENCES = {
     "world": pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
@@ -90,12 +93,18 @@ class ClosedLoopModel:
         distance of a closed frame from the joint that carries it (1 m if all are zero).
     max_condition
         `SingularityError` is raised where the condition number exceeds this.
+    accuracy
+        Largest error of the file's numbers, in characteristic lengths and rad: rows of the closures
+        that are redundant but for such errors count as redundant, and loops may stay open by as
+        much where no motion closes them (see `rank_rule`). 0: the numbers are exact. Left out: 1e-3
+        (5e-3 where the rows, if they counted, would leave fewer motions than there are actuators).
+        A mechanism in whose closures no such error is found is exact in any case.
     notes
         Sentences that `describe` prints: what the reader of a file has decided.
 
     Attributes
     ----------
-    model, closures, actuated, effects, name, max_condition, notes
+    model, closures, actuated, effects, name, max_condition, accuracy, notes
         As given; `closures` and `actuated` as tuples.
     system : ConstraintSystem
         The tree with its closure equations and their factorisation, for the algorithms.
@@ -121,6 +130,7 @@ class ClosedLoopModel:
         name: str = "",
         characteristic_length: float | None = None,
         max_condition: float = MAX_CONDITION,
+        accuracy: float | None = None,
         notes: Sequence[str] = (),
     ) -> None:
         self.system = system = ConstraintSystem(
@@ -130,7 +140,11 @@ class ClosedLoopModel:
             effects=effects,
             characteristic_length=characteristic_length,
             max_condition=max_condition,
+            rule=None,
         )
+        if accuracy is not None:
+            non_negative_number(accuracy, "accuracy", "")
+        self.accuracy = accuracy
         self.model: pin.Model = model
         self.closures = system.equations.closures
         self.actuated = system.actuated_names
@@ -141,8 +155,10 @@ class ClosedLoopModel:
         self._home: Array | None = None
         self._start: Array = pin.neutral(model)
         self._given_length = characteristic_length
+        system.find_rule = self._rank_rule
         if home is not None:
-            self._start = self._home = self._closed(system.normalised(home, "home"))
+            self._start = system.normalised(home, "home")
+            self._start = self._home = self._closed(self._start)
 
     @classmethod
     def from_urdf(
@@ -261,6 +277,7 @@ class ClosedLoopModel:
         closures: Sequence[Closure] = (),
         actuated: Sequence[str] | None = None,
         within_limits: bool = True,
+        accuracy: float | None = None,
     ) -> ClosedLoopModel:
         """Build a mechanism from a MuJoCo file: its path, or its text (which begins with ``<``).
 
@@ -281,6 +298,8 @@ class ClosedLoopModel:
             Names of the actuated joints, instead of the file's.
         within_limits
             Whether the file's position limits count.
+        accuracy
+            As for the class.
 
         Raises
         ------
@@ -292,7 +311,8 @@ class ClosedLoopModel:
             As `load`.
         """
         parts = parts_from_mjcf(path_or_xml, closures=closures, actuated=actuated)
-        return cls._from_parts(parts if within_limits else without_position_limits(parts))
+        parts = parts if within_limits else without_position_limits(parts)
+        return cls._from_parts(replace(parts, accuracy=accuracy))
 
     @classmethod
     def _from_parts(cls, parts: MechanismParts) -> ClosedLoopModel:
@@ -304,11 +324,13 @@ class ClosedLoopModel:
             name=parts.name,
             characteristic_length=parts.characteristic_length,
             max_condition=parts.max_condition or MAX_CONDITION,
+            accuracy=parts.accuracy,
             notes=parts.notes,
         )
         if parts.home is None:
             mechanism._home = mechanism.home  # closed, or not to be built
         else:
+            mechanism._start = mechanism.system.normalised(parts.home, "home")
             mechanism._start = mechanism._home = mechanism.close(parts.home)
         return mechanism
 
@@ -332,6 +354,7 @@ class ClosedLoopModel:
             "name": self.name,
             "characteristic_length": self._given_length,
             "max_condition": self.max_condition,
+            "accuracy": self.accuracy,
             "notes": self.notes,
         }
 
@@ -1224,6 +1247,7 @@ class ClosedLoopModel:
             self.name,
             self.characteristic_length,
             self.max_condition,
+            self.accuracy,
         )
 
     # Other engines --------------------------------------------------------------------------------
@@ -1273,6 +1297,10 @@ class ClosedLoopModel:
     def _closed(self, q: Array) -> Array:
         """Return q if it is closed, or else a closed configuration near it."""
         return q if self.loop_gap(q) <= closed_gap(self.system) else close(self.system, q)
+
+    def _rank_rule(self, system: ConstraintSystem, guesses: Sequence[Array]) -> RankRule | None:
+        """Return the rule of rank, found near home or else near the guesses."""
+        return find_rule(system, [self._start, *guesses], self.accuracy)
 
     @cached_property
     def _derivatives(self) -> derivatives.DynamicsDerivatives:

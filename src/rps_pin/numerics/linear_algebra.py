@@ -8,7 +8,8 @@ anything has entries of the order of 1, a singular value counts if
 s_0 the largest. Where all singular values are far below 1 the whole matrix is rounding error and
 its rank is 0: such are the rows of a closure that keeps a planar mechanism in its plane. A matrix
 of another size (weighted, for example) is compared with `size` instead of 1. Every rank, null
-space and pseudo-inverse in the package is determined by `rank`.
+space and pseudo-inverse in the package is determined by `rank`. The tolerance is that of rounding
+errors, or of the file where a mechanism's numbers are rounded (see `RankRule`).
 """
 
 from __future__ import annotations
@@ -65,6 +66,13 @@ def full_svd(matrix: Array) -> tuple[Array, Array, Array]:
 class Decomposition:
     """Singular values of a matrix A of finite entries, its rank, and solutions of least norm.
 
+    Parameters
+    ----------
+    matrix
+        A.
+    tolerance
+        As for `rank`.
+
     Attributes
     ----------
     left, values, right : arrays
@@ -72,9 +80,9 @@ class Decomposition:
     rank : int
     """
 
-    def __init__(self, matrix: Array) -> None:
+    def __init__(self, matrix: Array, tolerance: float = RANK_TOLERANCE) -> None:
         self.left, self.values, self.right = full_svd(matrix)
-        self.rank = rank(self.values)
+        self.rank = rank(self.values, tolerance)
 
     def null_space(self) -> Array:
         """Return an orthonormal basis N of all x with A x = 0, shape (n, n - rank)."""
@@ -101,17 +109,18 @@ def solve_transposed(matrix: Array, right: Array, limit: float, reason: str) -> 
     return np.asarray(np.linalg.solve(matrix.T, right), np.float64)
 
 
-def null_space(matrix: Array) -> Array:
+def null_space(matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
     """Return an orthonormal basis N of all x with A x = 0, shape (n, n - rank)."""
     _, values, right = np.linalg.svd(matrix)
-    return right[rank(values) :].T
+    return right[rank(values, tolerance) :].T
 
 
-def condition_number(matrix: Array, lost: int = 0) -> float:
+def condition_number(matrix: Array, lost: int = 0, tolerance: float = RANK_TOLERANCE) -> float:
     """Return the largest singular value over the smallest of a matrix that must not lose a column.
 
     ``inf`` where A x = 0 for some x other than 0: fewer rows than columns, a singular value of
-    zero, or nothing but rounding error. 1 without columns.
+    zero, or nothing but rounding error. With a tolerance above that of rounding errors also where
+    the rank is lower. 1 without columns.
 
     Parameters
     ----------
@@ -119,6 +128,8 @@ def condition_number(matrix: Array, lost: int = 0) -> float:
         A.
     lost
         So many independent x with A x = 0 are left out.
+    tolerance
+        As for `rank`.
     """
     rows, columns = matrix.shape
     needed = columns - lost
@@ -127,7 +138,8 @@ def condition_number(matrix: Array, lost: int = 0) -> float:
     if rows < needed:
         return math.inf
     values = singular_values(matrix)
-    if rank(values) == 0 or not values[needed - 1] > 0:
+    found = rank(values, tolerance)
+    if found == 0 or not values[needed - 1] > 0 or (tolerance > RANK_TOLERANCE and found < needed):
         return math.inf
     return float(values[0] / values[needed - 1])
 

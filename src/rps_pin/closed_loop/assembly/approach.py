@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array, Indices
-from rps_pin.closed_loop.assembly.closing import close_gaps, closed_gap
+from rps_pin.closed_loop.assembly.closing import close_gaps, is_closed
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.numerics.linear_algebra import Decomposition, null_space
 
@@ -56,7 +56,7 @@ def approached(
         return np.asarray((pin.difference(model, q, wanted) / scale)[given])
 
     def motions(q: Array) -> Array:
-        return null_space(system.scaled(system.equations.jacobian(q)))
+        return null_space(system.scaled(system.equations.jacobian(q)), system.rule.tolerance)
 
     q, share = start, 1.0
     allowed, way = motions(q), left(q)
@@ -72,7 +72,7 @@ def approached(
         corrected = pin.difference(model, predicted, moved) / scale
         after, way_after = motions(moved), left(moved)
         nearer = (
-            system.equations.largest_gap(system.equations.gaps(moved)) <= closed_gap(system)
+            is_closed(system, moved)
             and float(np.linalg.norm(corrected)) <= _CORRECTION * share * np.linalg.norm(step)
             and after.shape == allowed.shape
             and np.linalg.svd(allowed.T @ after, compute_uv=False).min(initial=1.0) >= _SAME

@@ -7,6 +7,9 @@ The gaps e(q) are brought to zero by the Levenberg-Marquardt method on the confi
 in coordinates scaled to one unit. mu falls to zero as the loops close: the last steps are Newton's,
 of least norm, and the result is closed to rounding. Joints that a step would drive through a limit
 are held there, and the step is computed again without them.
+
+In a rounded file (see `RankRule`) that is done with U_1' e and U_1' J, and what remains of the
+gaps outside U_1 is accepted up to the file's accuracy.
 """
 
 from __future__ import annotations
@@ -48,12 +51,13 @@ def close(
         phrases = ", ".join(outside[name] for name in fixed if name in outside)
         raise ClosureError(f"fixed joints are outside their limits: {phrases}", np.inf)
     start = limits.clip(guess) if within_limits else guess
+    system.settle_rule(start)
     best, best_gap, rng = start, np.inf, np.random.default_rng(0)
     for attempt in range(1 + restarts):
         q = close_gaps(system, start, held, within_limits)
-        gap = equations.largest_gap(equations.gaps(q))
-        if gap <= closed_gap(system):
+        if is_closed(system, q):
             return q
+        gap = equations.largest_gap(equations.gaps(q))
         if gap < best_gap:
             best, best_gap = q, gap
         spread = np.pi * (attempt + 1) / max(restarts, 1)
@@ -73,6 +77,23 @@ def close(
 def closed_gap(system: ConstraintSystem) -> float:
     """Return the gap below which a configuration counts as closed, m."""
     return CLOSED * max(system.equations.length, 1.0)
+
+
+def is_closed(system: ConstraintSystem, q: Array) -> bool:
+    """Return whether the loops are closed at q, as far as the file's accuracy lets them."""
+    equations, rule = system.equations, system.rule
+    gaps = equations.gaps(q)
+    largest = equations.largest_gap(gaps)
+    if rule.rank is None or largest <= closed_gap(system):
+        return largest <= closed_gap(system)
+    return largest <= rule.gap and independent_gap(system, q, gaps) <= closed_gap(system)
+
+
+def independent_gap(system: ConstraintSystem, q: Array, gaps: Array) -> float:
+    """Return the largest gap of a closure along the independent rows of a rounded file, m."""
+    rows = system.rule.independent(system.scaled(system.equations.jacobian(q)))
+    along = rows @ (rows.T @ (system.row_scale * gaps)) / system.row_scale
+    return system.equations.largest_gap(along)
 
 
 def close_gaps(
@@ -102,12 +123,15 @@ def close_gaps(
     array
         The best configuration met, shape (nq,), whether its loops are closed or not.
     """
-    equations, limits = system.equations, system.limits
-    tolerance = CLOSED * equations.length
+    equations, limits, rule = system.equations, system.limits, system.rule
+    tolerance, rows = CLOSED * equations.length, None
     q, error, damping = guess, system.row_scale * equations.gaps(guess), _FIRST_DAMPING
     for _ in range(iterations):
-        size = float(np.linalg.norm(error))
         jacobian, still = system.scaled(equations.jacobian(q)), held.copy()
+        if rule.rank is not None:
+            rows = rule.independent(jacobian).T
+            jacobian, error = rows @ jacobian, rows @ (system.row_scale * equations.current_gaps(q))
+        size = float(np.linalg.norm(error))
         factors = _factors(jacobian, still)
         while True:
             step = _damped_step(factors, error, damping * size)
@@ -119,6 +143,8 @@ def close_gaps(
             candidate = pin.integrate(system.model, q, system.column_scale * step)
             candidate = limits.clip(candidate) if within_limits else candidate
             candidate_error = system.row_scale * equations.gaps(candidate)
+            if rows is not None:
+                candidate_error = rows @ candidate_error
             if np.linalg.norm(candidate_error) < size:
                 break
             if size <= tolerance or np.linalg.norm(step) < _SMALLEST_STEP:

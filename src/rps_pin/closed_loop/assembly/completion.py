@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.assembly.approach import approached
-from rps_pin.closed_loop.assembly.closing import close, closed_gap
+from rps_pin.closed_loop.assembly.closing import close, is_closed
 from rps_pin.closed_loop.assembly.continuation import Followed, Path, coordinates_of
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError, InputError, SingularityError
@@ -51,7 +51,7 @@ def complete(
         q = _overdetermined(system, named, given, start, target)
     elif found.share < 1:
         _refuse(system, named, target, found, within_limits, start is guess)
-    if system.equations.largest_gap(system.equations.gaps(q)) > closed_gap(system):
+    if not is_closed(system, q):
         q = close(system, q, fixed=list(named), within_limits=False, restarts=0)
     return _within_limits(system, q, named) if within_limits else q
 
@@ -83,8 +83,7 @@ def with_values(system: ConstraintSystem, q: Array, values: Mapping[str, ArrayLi
 
 
 def _closed_start(system: ConstraintSystem, guess: Array, within_limits: bool) -> Array:
-    equations = system.equations
-    if equations.largest_gap(equations.gaps(guess)) <= closed_gap(system):
+    if is_closed(system, guess):
         return guess
     return close(system, guess, within_limits=within_limits)
 
@@ -116,10 +115,10 @@ def _within_limits(system: ConstraintSystem, q: Array, given: Mapping[str, Array
         sprung = system.effects is not None and system.effects.stiffness[limits.v[i]] > 0
         if angular and not sprung and limits.lower[i] <= nearer <= limits.upper[i]:
             turned[limits.q[i]] = nearer
-    equations, outside = system.equations, limits.outside(turned)
+    outside = limits.outside(turned)
     beyond = [phrase for name, phrase in outside.items() if name not in given]
     still = [name for i, name in enumerate(limits.names) if out[i] and name in outside]
-    if still or equations.largest_gap(equations.gaps(turned)) > closed_gap(system):
+    if still or not is_closed(system, turned):
         raise ClosureError(
             "the configuration with these values in the assembly mode of the guess is outside "
             f"joint limits: {', '.join(beyond or list(limits.outside(q).values()))}; "

@@ -29,6 +29,7 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.assembly.closing import closed_gap
+from rps_pin.closed_loop.constraints.rank_rule import largest
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.numerics.linear_algebra import rank
 
@@ -73,7 +74,7 @@ class _Point:
         self.q, self.others, self.given = q, jacobian[:, path.others], jacobian[:, path.given]
         self.gaps = system.row_scale * system.equations.current_gaps(q)
         left, values, right = np.linalg.svd(self.others, full_matrices=False)
-        self.rank = rank(values)
+        self.rank = rank(values, system.rule.tolerance)
         size = self.rank if size is None else size
         self.condition = 1.0 if size == 0 else np.inf
         if size and values[size - 1] > 0:
@@ -81,8 +82,11 @@ class _Point:
         with np.errstate(divide="ignore"):
             self._inverse = left[:, :size] / values[:size]  # U / S
         self._right = right[:size].T
-        #: The largest singular value that does not count.
-        self.beyond = float(values[size]) if values.size > size else 0.0
+        #: The largest singular value that does not count, as `rank` sees it.
+        self.beyond = float(values[size]) / largest(values) if values.size > size else 0.0
+        #: The largest gap of rows that count.
+        gaps = self.gaps if system.rule.rank is None else left[:, :size].T @ self.gaps
+        self.open = float(np.abs(gaps).max(initial=0.0))
 
     def solve(self, right: Array) -> Array:
         """Return A+ b."""
@@ -121,7 +125,10 @@ class Path:
         self._start, self._target = start, target
         self._rate = pin.difference(system.model, start, target)[given]
         self._scale, self._length = system.column_scale, system.equations.length
-        self._closed_gap = 10 * closed_gap(system)
+        rule = system.rule
+        self._closed_gap = 10 * closed_gap(system) + rule.gap
+        self._no_rank = max(_NO_RANK, rule.tolerance)
+        self._inconsistent = max(_INCONSISTENT, rule.consistent)
         self._of_given = coordinates_of(system.model, given)
 
     def follow(self) -> Followed:
@@ -160,7 +167,7 @@ class Path:
         velocity[self.given] = self._rate
         velocity[self.others] = self._scale[self.others] * along
         size = float(np.linalg.norm(self._rate / self._scale[self.given]))
-        tolerance = max(_INCONSISTENT, self._of_gaps(point))
+        tolerance = max(self._inconsistent, self._of_gaps(point))
         return velocity, rest <= tolerance * size
 
     def _step(
@@ -188,13 +195,13 @@ class Path:
             return None, max(change, rejected) if np.isfinite(change) else rejected
         if not self._closed(end, last):
             return None, rejected
-        if end.beyond > self._of_gaps(end) and _Point(self, end.q, size).beyond > _NO_RANK:
+        if end.beyond > self._of_gaps(end) and _Point(self, end.q, size).beyond > self._no_rank:
             raise _SingularStart
         return end, change
 
     def _of_gaps(self, point: _Point) -> float:
         """Return the largest singular value that open loops give to rows that are redundant."""
-        return max(_NO_RANK, _OF_GAPS * float(np.abs(point.gaps).max(initial=0.0)) / self._length)
+        return max(self._no_rank, _OF_GAPS * point.open / self._length)
 
     def _closed(self, point: _Point, last: bool) -> bool:
         """Close the loops at a point by Newton's steps; to rounding error if it is the last."""

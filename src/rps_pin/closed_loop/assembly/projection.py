@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.assembly.closing import close, close_gaps, closed_gap
+from rps_pin.closed_loop.assembly.closing import close, close_gaps, is_closed
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError
 from rps_pin.numerics.linear_algebra import null_space
@@ -44,8 +44,7 @@ def project(system: ConstraintSystem, given: Array, *, within_limits: bool = Tru
         moved = limits.clip(moved) if within_limits else moved
         moved = close_gaps(system, moved, none, within_limits)
         nearer, moved_towards = _distance(system, moved, given)
-        gap = equations.largest_gap(equations.gaps(moved))
-        if nearer < distance and gap <= closed_gap(system):
+        if nearer < distance and is_closed(system, moved):
             q, distance, towards, length = moved, nearer, moved_towards, min(1.0, 2 * length)
         elif length < 1e-6:
             return q  # nearer by no more than rounding
@@ -68,7 +67,8 @@ def _distance(system: ConstraintSystem, q: Array, given: Array) -> tuple[float, 
 
 def _step(system: ConstraintSystem, q: Array, towards: Array, within_limits: bool) -> Array:
     """Return the allowed motion nearest to `towards` that stays within the limits, (nv,)."""
-    motions, limits = null_space(system.scaled(system.equations.jacobian(q))), system.limits
+    scaled, limits = system.scaled(system.equations.jacobian(q)), system.limits
+    motions = null_space(scaled, system.rule.tolerance)
     y = motions.T @ towards
     if within_limits:
         limited = (motions * system.column_scale[:, None])[limits.v]

@@ -56,7 +56,7 @@ class PassiveVelocities(NamedTuple):
     """How many motions of them are idle."""
 
 
-def choose(factors: Decomposition, actuated: Indices) -> Chosen:
+def choose(factors: Decomposition, actuated: Indices, tolerance: float) -> Chosen:
     """Return velocities that determine the motion well at one configuration.
 
     By QR with column pivoting of the allowed motions; actuated ones before passive ones.
@@ -67,11 +67,13 @@ def choose(factors: Decomposition, actuated: Indices) -> Chosen:
         Of J, all entries in one unit.
     actuated
         Indices of the actuated velocities.
+    tolerance
+        Of ranks.
     """
     motions = factors.null_space()
     of_actuators = motions[actuated]
     passive = np.setdiff1d(np.arange(motions.shape[0]), actuated)
-    count = rank(singular_values(of_actuators))
+    count = rank(singular_values(of_actuators), tolerance)
     driven = actuated[_independent_rows(of_actuators, count)]
     left_open = motions @ np.linalg.svd(of_actuators)[2][count:].T
     chosen = _independent_rows(left_open[passive], motions.shape[1] - count)

@@ -171,7 +171,8 @@ class ClosureEquations:
         self.curved = [coupling for coupling in self.couplings if not coupling.is_linear]
         self.row_scale = np.where(self.angular_rows, self.length, 1.0)
         self._groups = self._row_groups()
-        self._open_limit = OPEN * self.length
+        #: Gap beyond which a configuration counts as open, m.
+        self.open_limit = OPEN * self.length
         self._open_points, self._open_frames = self._open_tests()
         self._only_spherical = len(self._open_points) == len(self.closures)
 
@@ -259,7 +260,7 @@ class ClosureEquations:
 
     def is_open(self, q: Array) -> bool:
         """Return whether a gap exceeds `OPEN`, after `jacobian` at q: fast, for control loops."""
-        reach = self._open_limit
+        reach = self.open_limit
         for point in self._open_points:
             if not _distance(point(), _ORIGIN) <= reach:
                 return True
@@ -274,6 +275,10 @@ class ClosureEquations:
             if not gap * gap <= limit:
                 return True
         return False
+
+    def accept(self, gap: float) -> None:
+        """Count configurations with this gap (m) as closed: a rounded file leaves it."""
+        self.open_limit = max(self.open_limit, gap)
 
     def open_closure(self, gaps: Array) -> str:
         """Return the closure of the largest gap, and the gap, in words."""

@@ -9,12 +9,16 @@ J_p = Q R. Then
   rest of Q' b vanishes.
 
 Near a singularity, and with more or fewer actuators than mobility, there is no such solution.
+
+In a rounded file nearly redundant rows count as redundant (see `RankRule`): x_p = R^-1 Q' b meets
+all rows in the least-squares sense. That is the motion of the truncated singular value
+decomposition but for the square of what is left out.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import eigenpy
 import numpy as np
@@ -23,10 +27,21 @@ from scipy.linalg.lapack import dgecon, dgeqp3, dgetrf, dgetrs, dormqr
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.least_squares import PassiveLeastSquares
-from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, condition_number, rank
+from rps_pin.closed_loop.constraints.rank_rule import EXACT, RankRule
+from rps_pin.numerics.linear_algebra import condition_number, rank
 
 #: Size of a solution, relative to the right side, that no well conditioned J_p gives in one unit.
 HUGE = 1e12
+
+
+class Scales(NamedTuple):
+    """Scaling of J_p to one unit, and the tolerance of its rank."""
+
+    rows: Array
+    """Shape (nc, 1)."""
+    columns: Array
+    """Shape (np,)."""
+    tolerance: float
 
 
 class PassiveFactorisation:
@@ -40,6 +55,8 @@ class PassiveFactorisation:
         Scaling of J to one unit, shapes (nc,) and (nv,).
     max_condition
         Of `ClosedLoopModel`.
+    rule
+        By which the rank of J is decided.
     """
 
     def __init__(
@@ -49,27 +66,32 @@ class PassiveFactorisation:
         rows: Array,
         columns: Array,
         max_condition: float,
+        rule: RankRule = EXACT,
     ) -> None:
         self.passive, self._actuated, self._max_condition = passive, actuated, max_condition
-        #: Scaling of J_p to one unit, shapes (nc, 1) and (np,).
-        self.scales = rows[:, None], columns[passive]
+        #: Scaling of J_p to one unit, shapes (nc, 1) and (np,), and tolerance of its rank.
+        self.scales = Scales(rows[:, None], columns[passive], rule.tolerance)
         self._rows = rows[:, None]
         # eigenpy takes a vector of one number for a matrix: one row is not counted as square.
-        self._square = rows.size == passive.size > 1
+        self._rounded = rule.rank is not None
+        self._tall = self._rounded or rows.size != passive.size
+        self._square = not self._tall and passive.size > 1
+        #: Whether J_p may have full rank, in a rounded file.
+        self._determined = rule.rank is None or rule.rank == passive.size
         self._lu = eigenpy.PartialPivLU(passive.size)
         # Above this estimate of the reciprocal condition no closer look is needed. The estimate is
         # in the 1-norm, without scaling, and rarely off by more than a factor of 3 (Higham). The
         # norms differ by at most a factor of the size, the scaling by at most the ratios of its
         # factors; one of 100 is for the estimate.
         self._harmless_rcond, self._norm = 0.0, 0.0
-        if rows.size == passive.size > 0:
-            spread = math.exp(sum(float(np.ptp(np.log(scale))) for scale in self.scales))
+        if not self._tall and passive.size:
+            spread = math.exp(sum(float(np.ptp(np.log(scale))) for scale in self.scales[:2]))
             self._harmless_rcond = min(100 * passive.size * spread / max_condition, 1.0)
 
     @property
     def meets_all_rows(self) -> bool:
         """Whether J_p has as many columns as rows, and so full row rank where it is regular."""
-        return self._rows.size == self.passive.size
+        return not self._rounded and self._rows.size == self.passive.size
 
     def least_squares(self, passive: Indices, columns: Array) -> PassiveLeastSquares:
         """Return the solver for other passive velocities, columns (nv,) scaled to one unit."""
@@ -80,7 +102,7 @@ class PassiveFactorisation:
         passive_jacobian = jacobian.take(self.passive, axis=1)
         if not self.passive.size:
             return _NoFactors(jacobian.shape[0])
-        if self._rows.size != self.passive.size:
+        if self._tall:
             return self._tall_factors(jacobian, passive_jacobian)
         found = _SquareFactors(passive_jacobian)
         if not self._norm:  # that of J_p at any configuration is of this size
@@ -92,8 +114,8 @@ class PassiveFactorisation:
 
         ``idle`` is how many these are.
         """
-        rows, columns = self.scales
-        return condition_number(rows * passive_jacobian * columns, idle)
+        rows, columns, tolerance = self.scales
+        return condition_number(rows * passive_jacobian * columns, idle, tolerance)
 
     def multipliers(self, jacobian: Array, passive_jacobian: Array, force: Array) -> Array | None:
         """Return lambda (nc,), of least norm in one unit, with J_p' lambda = f_p.
@@ -140,16 +162,16 @@ class PassiveFactorisation:
 
     def _tall_factors(self, jacobian: Array, passive_jacobian: Array) -> _TallFactors | None:
         """Return the factors of J_p where they determine the motion well."""
-        rows, columns = self.scales
-        if not rows.size >= columns.size > 0:
+        rows, columns, tolerance = self.scales
+        if not (rows.size >= columns.size > 0 and self._determined):
             return None
-        factors = _TallFactors(passive_jacobian, rows, columns)
+        factors = _TallFactors(passive_jacobian, rows, columns, tolerance)
         well = factors.condition < np.inf and (
             100 * factors.condition <= self._max_condition
             or self.condition(passive_jacobian) <= self._max_condition
         )
         # The actuators move independently if J_a lies in the range of J_p.
-        if not well or factors.passive_motion(jacobian[:, self._actuated])[1] > RANK_TOLERANCE:
+        if not well or factors.passive_motion(jacobian[:, self._actuated])[1] > tolerance:
             return None
         return factors
 
@@ -203,7 +225,7 @@ class _NoFactors:
 class _TallFactors:
     """Q, R and the permutation of a J_p, shape (nc, np), nc >= np > 0; scaled to one unit."""
 
-    def __init__(self, jacobian: Array, rows: Array, columns: Array) -> None:
+    def __init__(self, jacobian: Array, rows: Array, columns: Array, tolerance: float) -> None:
         self._rows, self._columns = rows[:, 0], columns
         self._size = columns.size
         packed, order, reflectors, _, _ = dgeqp3(rows * jacobian * columns)
@@ -214,7 +236,8 @@ class _TallFactors:
         self._largest, smallest = float(pivots.max()), float(pivots.min())
         #: Estimate of the condition number by the pivots; the true one is rarely 10 times larger.
         self.condition = np.inf
-        if rank(np.array([self._largest, smallest])) == 2:  # pivots stand for singular values
+        # Pivots stand for singular values.
+        if rank(np.array([self._largest, smallest]), tolerance) == 2:
             self.condition = self._largest / smallest
 
     def multipliers(self, force: Array) -> Array:

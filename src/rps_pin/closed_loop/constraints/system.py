@@ -7,7 +7,8 @@ passive joint forces. `ClosedLoopModel` is the public face of one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -23,8 +24,9 @@ from rps_pin.closed_loop.constraints.completion import (
     PassiveVelocities,
     choose,
 )
-from rps_pin.closed_loop.constraints.equations import OPEN, ClosureEquations, refuse_twice
+from rps_pin.closed_loop.constraints.equations import ClosureEquations, refuse_twice
 from rps_pin.closed_loop.constraints.factorisation import PassiveFactorisation
+from rps_pin.closed_loop.constraints.rank_rule import EXACT, RankRule
 from rps_pin.closed_loop.dynamics import passive_joint_forces
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.errors import ClosureError, InputError, MechanismError
@@ -34,6 +36,9 @@ from rps_pin.validation import real_vector
 #: Beyond this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
 #: machine is built well enough to know its forces.
 MAX_CONDITION = 1e8
+
+#: How often the rule of rank is looked for in vain, before the file counts as exact.
+_ATTEMPTS = 5
 
 
 class ConstraintSystem:
@@ -52,6 +57,8 @@ class ConstraintSystem:
         ``row_scale[:, None] * J * column_scale`` has entries of one unit.
     factorisation : PassiveFactorisation
         Of J_p.
+    rule : RankRule
+        By which the rank of the closures' Jacobian is decided; found out when first asked for.
     effects : JointEffects or None
         Passive joint forces; `coordinates` are the indices in q that their springs act on.
     limits : JointLimits
@@ -67,6 +74,7 @@ class ConstraintSystem:
         effects: passive_joint_forces.JointEffects | None = None,
         characteristic_length: float | None = None,
         max_condition: float = MAX_CONDITION,
+        rule: RankRule | None = EXACT,
     ) -> None:
         self.model = model
         self.actuated_names = (actuated,) if isinstance(actuated, str) else tuple(actuated)
@@ -89,7 +97,9 @@ class ConstraintSystem:
         self.row_scale, self.column_scale = equations.row_scale, equations.column_scale
         self._scale = self.row_scale[:, None] * self.column_scale
         self.max_condition = max_condition
-        self.factorisation = self.factorisation_of(self.passive, self.actuated)
+        self._rule, self._attempts = rule, 0
+        #: Finds out the rule, from a system and configurations to start from; None if it cannot.
+        self.find_rule: Callable[[ConstraintSystem, Sequence[Array]], RankRule | None] | None = None
         #: Of J and of the actuators at regular configurations, once they were asked for.
         self.ranks: tuple[int, int] | None = None
         #: For actuators that are more or fewer than the motions, or not independent, once needed.
@@ -97,6 +107,54 @@ class ConstraintSystem:
         self.effects, self.coordinates = effects, passive_joint_forces.coordinate_indices(model)
         self.limits = JointLimits(model)
         self._frame_ids: dict[str, int] = {}
+
+    # Rule of rank ---------------------------------------------------------------------------------
+
+    @property
+    def rule(self) -> RankRule:
+        """Rule by which the rank of the closures' Jacobian is decided."""
+        return self._rule or self.settle_rule()
+
+    def settle_rule(self, *guesses: Array) -> RankRule:
+        """Find out the rule if it is not known, if need be from guesses of a configuration (nq,).
+
+        If the loops do not close from there, those of exact files hold until they do.
+        """
+        if self._rule is not None:
+            return self._rule
+        if self._attempts and not guesses:
+            return EXACT
+        self._attempts += 1
+        found = EXACT if self.find_rule is None else self.find_rule(self, guesses)
+        if found is None and self._attempts < _ATTEMPTS:
+            return EXACT
+        found = found or EXACT
+        self._rule = found
+        if found.rank is not None:
+            self.equations.accept(found.gap)
+            self.__dict__.pop("factorisation", None)
+            self.ranks = self.completion = None
+        return found
+
+    def trial(self, rule: RankRule) -> ConstraintSystem:
+        """Return a system of the same mechanism with another rule, and scratch memory of its own.
+
+        Without joint limits and effects.
+        """
+        equations = self.equations
+        return ConstraintSystem(
+            self.model,
+            equations.closures,
+            self.actuated_names,
+            characteristic_length=equations.length,
+            max_condition=self.max_condition,
+            rule=rule,
+        )
+
+    def rescale(self, row_scale: Array, column_scale: Array) -> None:
+        """Take another scaling of J to one unit."""
+        self.row_scale, self.column_scale = row_scale, column_scale
+        self._scale = row_scale[:, None] * column_scale
 
     # Arguments ------------------------------------------------------------------------------------
 
@@ -160,22 +218,29 @@ class ConstraintSystem:
 
     def refuse_open(self, q: Array) -> None:
         """Raise `ClosureError` if q is open (see `OPEN`); after a Jacobian at q."""
-        if self.equations.is_open(q):
-            gaps = self.equations.gaps(real_vector(q, self.model.nq, "q"))
-            length = self.equations.length
+        equations = self.equations
+        if not equations.is_open(q):
+            return
+        gaps = equations.gaps(real_vector(q, self.model.nq, "q"))
+        self.settle_rule(q)  # a rounded file may leave larger gaps
+        if equations.is_open(q):
             raise ClosureError(
-                f"q is not a closed configuration: {self.equations.open_closure(gaps)}, and at "
-                f"most {OPEN * length:.3g} m is accepted; close it first with close()",
-                self.equations.largest_gap(gaps),
+                f"q is not a closed configuration: {equations.open_closure(gaps)}, and at "
+                f"most {equations.open_limit:.3g} m is accepted; close it first with close()",
+                equations.largest_gap(gaps),
             )
 
     # Factorisations -------------------------------------------------------------------------------
 
+    @cached_property
+    def factorisation(self) -> PassiveFactorisation:
+        """Of J_p."""
+        return self.factorisation_of(self.passive, self.actuated)
+
     def factorisation_of(self, dependent: Indices, independent: Indices) -> PassiveFactorisation:
         """Return the factorisation of J_d for some partition of the velocities."""
-        return PassiveFactorisation(
-            dependent, independent, self.row_scale, self.column_scale, self.max_condition
-        )
+        scales = self.row_scale, self.column_scale
+        return PassiveFactorisation(dependent, independent, *scales, self.max_condition, self.rule)
 
     def completed(self, factors: Decomposition, idle: int) -> CompletedFactorisation:
         """Return one for velocities that are chosen here, and keep it as `completion`.
@@ -187,7 +252,7 @@ class ConstraintSystem:
         idle
             Number of idle freedoms.
         """
-        chosen = choose(factors, self.actuated)
+        chosen = choose(factors, self.actuated, self.rule.tolerance)
         independent = np.concatenate([chosen.driven, chosen.passive])
         dependent = np.setdiff1d(np.arange(self.model.nv), independent)
         self.completion = CompletedFactorisation(
@@ -218,6 +283,10 @@ class ConstraintSystem:
     def scaled(self, jacobian: Array) -> Array:
         """Return J with all entries in one unit."""
         return self._scale * jacobian
+
+    def decomposed(self, jacobian: Array) -> Decomposition:
+        """Return the singular value decomposition of J with all entries in one unit."""
+        return Decomposition(self._scale * jacobian, self.rule.tolerance)
 
     def condition(self, jacobian: Array) -> float:
         """Return the condition number of J_p."""

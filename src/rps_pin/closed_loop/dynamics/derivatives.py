@@ -38,7 +38,6 @@ from rps_pin.closed_loop.dynamics.inverse_dynamics import constraint_forces, inv
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches, closure_wrenches, forces_on_joints
 from rps_pin.closed_loop.editing.split import split
 from rps_pin.closed_loop.kinematics import motion_basis
-from rps_pin.numerics.linear_algebra import Decomposition
 
 Solved = Callable[[Array], Array]
 
@@ -192,7 +191,7 @@ class DynamicsDerivatives:
         jacobian = system.equations.jacobian(q).copy()
         solve = system.factorisation.passive_motion
         if solve(jacobian, np.zeros((system.equations.size, 1))) is None:
-            factors = Decomposition(system.scaled(jacobian))
+            factors = system.decomposed(jacobian)
             rows, columns = system.row_scale[:, None], system.column_scale[:, None]
             idle = IdleSlopes(system, self._equations, q, chosen)
             return lambda right: columns * factors.least_norm(rows * right), idle

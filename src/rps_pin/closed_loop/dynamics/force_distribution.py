@@ -168,7 +168,7 @@ class ForceDistribution:
         aim = np.zeros(self.weights.size)
         if preferred is not None:
             aim = real_vector(preferred, aim.size, "preferred")
-        factors = Decomposition(self.mechanism.system.scaled(jacobian))
+        factors = self.mechanism.system.decomposed(jacobian)
         effort, free = self._unlimited(factors, force, aim)
         names: tuple[str, ...] = ()
         iterations, redundant = 0, None

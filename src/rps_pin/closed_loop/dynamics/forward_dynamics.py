@@ -21,6 +21,7 @@ from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.generalised_forces import resisting_force, tree_mass
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.kinematics import actuated_basis
+from rps_pin.closed_loop.regular import refuse_lost_rows
 from rps_pin.errors import SingularityError
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, Decomposition
 
@@ -49,8 +50,9 @@ def forward_dynamics(
     right[:, :-1], right[:, -1] = jacobian.take(system.actuated, axis=1), bias
     solved = system.factorisation.passive_motion(jacobian, right)
     if solved is None:  # the motion is determined at a singularity of the actuators, too
-        rows = system.row_scale
-        basis, a_0 = basis_and_bias(rows[:, None] * jacobian, rows * bias, system.column_scale)
+        factors = system.decomposed(jacobian)
+        refuse_lost_rows(system, q, factors)
+        basis, a_0 = basis_and_bias(factors, system.row_scale * bias, system.column_scale)
     else:  # T_p = -J_p^-1 J_a
         a_0 = np.zeros(system.model.nv)
         a_0[system.passive] = -solved[:, -1]
@@ -91,19 +93,18 @@ def reduced_acceleration(
     return basis @ solve_reduced(mass, basis.T @ force) + a_0, resisting
 
 
-def basis_and_bias(jacobian: Array, bias: Array, scale: Array) -> tuple[Array, Array]:
+def basis_and_bias(factors: Decomposition, bias: Array, scale: Array) -> tuple[Array, Array]:
     """Return T, shape (nv, m), and a_0, shape (nv,), of a Jacobian of any rank.
 
     Parameters
     ----------
-    jacobian
-        J, shape (nc, nv), its rows in one unit.
+    factors
+        Of J, shape (nc, nv), all entries in one unit.
     bias
-        J' v, shape (nc,), in the same units.
+        J' v, shape (nc,), its rows in that unit.
     scale
         Scaling of the velocities to one unit, shape (nv,).
     """
-    factors = Decomposition(jacobian * scale)
     return scale[:, None] * factors.null_space(), -scale * factors.least_norm(bias)
 
 

@@ -25,13 +25,13 @@ from scipy.linalg.blas import dgemv, dnrm2
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.completion import PassiveVelocities
-from rps_pin.closed_loop.constraints.factorisation import HUGE
+from rps_pin.closed_loop.constraints.factorisation import HUGE, Scales
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.dynamics.generalised_forces import required_force, resisting_force
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.freedoms import of_actuators
-from rps_pin.closed_loop.regular import actuated_rank, refuse_irregular
+from rps_pin.closed_loop.regular import refuse_irregular
 from rps_pin.errors import InputError
 from rps_pin.numerics import linear_algebra
 
@@ -74,7 +74,7 @@ class InverseDynamics:
         tau: Array,
         constraint_forces: Array,
         residual: float,
-        scales: tuple[Array, Array],
+        scales: Scales,
         passive_jacobian: Array,
         unproduced: Array | None = None,
         passive: PassiveVelocities | None = None,
@@ -93,8 +93,8 @@ class InverseDynamics:
 
         Computed when asked for.
         """
-        idle = self._passive.idle if self._passive else 0
-        return linear_algebra.condition_number(self._scaled_jacobian(), idle)
+        idle, tolerance = self._passive.idle if self._passive else 0, self._scales.tolerance
+        return linear_algebra.condition_number(self._scaled_jacobian(), idle, tolerance)
 
     @property
     def orientation(self) -> int:
@@ -106,7 +106,7 @@ class InverseDynamics:
 
     def _scaled_jacobian(self) -> Array:
         """Return J_p with all entries in one unit, shape (nc, np)."""
-        rows, columns = self._scales
+        rows, columns, _ = self._scales
         jacobian = self._passive_jacobian
         return rows * (jacobian[:, self._passive.indices] if self._passive else jacobian) * columns
 
@@ -194,7 +194,7 @@ def constraint_forces(
     """Return lambda (nc,) of a motion under given actuator forces, of least norm."""
     rest = required_force(system, q, v, a, wrenches)
     rest[system.actuated] -= tau
-    factors = linear_algebra.Decomposition(system.scaled(system.equations.jacobian(q)))
+    factors = system.decomposed(system.equations.jacobian(q))
     return system.row_scale * factors.transposed_least_norm(system.column_scale * rest)
 
 
@@ -211,13 +211,12 @@ def _of_any_actuators(
     if not np.isfinite(force).all():
         raise InputError("q, v and a must be finite")
     jacobian = jacobian.reshape(system.equations.size, system.model.nv).copy()
-    factors = linear_algebra.Decomposition(system.scaled(jacobian))
-    ranks, mobility = (factors.rank, actuated_rank(system, factors)), system.model.nv - factors.rank
-    refuse_irregular(system, q, ranks)
+    factors = system.decomposed(jacobian)
+    driven, mobility = refuse_irregular(system, q, factors), system.model.nv - factors.rank
     scales = system.factorisation.scales
     idle = of_actuators(system, q, jacobian).idle.shape[1]
     passive = PassiveVelocities(system.passive, idle)
-    if mobility == system.actuated.size == ranks[1]:
+    if mobility == system.actuated.size == driven:
         system.refuse_singular(system.condition(jacobian))
     else:
         found = system.completed(factors, idle).forces(jacobian, force)

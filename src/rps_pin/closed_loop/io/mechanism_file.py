@@ -102,6 +102,7 @@ def parts_from_yaml(
         friction_speed=description.friction_speed,
         characteristic_length=description.characteristic_length,
         max_condition=description.max_condition,
+        accuracy=description.accuracy,
     )
 
 

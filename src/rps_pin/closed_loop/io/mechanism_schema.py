@@ -82,3 +82,4 @@ class Description(Entry):
     friction_speed: Positive | None = None
     characteristic_length: Positive | None = None
     max_condition: Annotated[float, Field(ge=1, allow_inf_nan=False)] | None = None
+    accuracy: NonNegative | None = None

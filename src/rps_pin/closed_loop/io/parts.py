@@ -45,6 +45,8 @@ class MechanismParts:
         m, or None if the description does not say.
     max_condition
         Or None if the description does not say.
+    accuracy
+        As for `ClosedLoopModel`; None if the description does not say.
     continuous
         Revolute joints that the file calls continuous; a home may give their cosine and sine.
     notes
@@ -63,6 +65,7 @@ class MechanismParts:
     name: str = ""
     characteristic_length: float | None = None
     max_condition: float | None = None
+    accuracy: float | None = None
     continuous: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
 

@@ -3,8 +3,9 @@
 In scaled velocities x (v = S x, all of one unit), A x = 0 keeps the loops closed, A being the rows
 of the closures' Jacobian that are independent of each other *where the loops are closed*. They are
 selected there once: a step in time evaluates the dynamics at slightly open configurations too,
-where redundant rows contradict each other slightly and would lock the mechanism. With the
-velocities partitioned into dependent and independent ones,
+where redundant rows contradict each other slightly and would lock the mechanism. Of a rounded file
+they are U_1' J with the U_1 of the configuration where they are selected (see `rank_rule`). With
+the velocities partitioned into dependent and independent ones,
 
     A_d x_d + A_i x_i = 0,   x = T x_i,   T_d = -A_d^-1 A_i,
 
@@ -24,6 +25,7 @@ from rps_pin.closed_loop.assembly.closing import CLOSED, closed_gap
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.forward_dynamics import reduced_acceleration
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.closed_loop.regular import refuse_lost_rows
 from rps_pin.errors import ClosureError, SingularityError
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, rank, refuse_condition, singular_values
 
@@ -52,7 +54,10 @@ class ClosedManifold:
         self.model: pin.Model = system.model
         self._columns, self._row_scale = system.column_scale, system.row_scale
         self._rank = -1
+        #: U_1', shape (rank, nc), of a rounded file.
+        self._combined: Array | None = None
         self._choose(q)
+        refuse_lost_rows(system, q, self._system.decomposed(self._equations.jacobian(q)))
 
     # Gaps -----------------------------------------------------------------------------------------
 
@@ -69,9 +74,11 @@ class ClosedManifold:
     def _choose(self, q: Array) -> None:
         """Select rows and partition velocities, at a closed configuration, or nearly."""
         jacobian, gaps = self._evaluate(q)
+        rule = self._system.rule
         # Rows that are redundant where the loops are closed differ here by about the gap.
         nearly = _OF_GAPS * self._equations.largest_gap(gaps) / self._equations.length
-        found = rank(singular_values(jacobian), max(RANK_TOLERANCE, nearly))
+        tolerance = max(RANK_TOLERANCE, nearly) if rule.rank is None else rule.tolerance
+        found = rank(singular_values(jacobian), tolerance)
         if self._rank >= 0 and found != self._rank:
             raise SingularityError(
                 f"the closures had {self._rank} independent rows and have {found} here: the motion "
@@ -82,17 +89,33 @@ class ClosedManifold:
         self._rank, nv = found, self.model.nv
         *_, order = qr(jacobian.T, mode="economic", pivoting=True)
         self._rows = np.sort(order[:found]).astype(np.intp)
-        *_, order = qr(jacobian[self._rows], mode="economic", pivoting=True)
+        if rule.rank is not None:
+            self._combined = rule.independent(jacobian)[:, :found].T
+        self._all_rows = found == self._equations.size
+        selected = self._selected(jacobian)
+        *_, order = qr(selected, mode="economic", pivoting=True)
         self._dependent = np.sort(order[:found]).astype(np.intp)
         self._independent = np.setdiff1d(np.arange(nv), self._dependent)
-        self._all_rows = found == self._equations.size
         self._factors = eigenpy.PartialPivLU(max(found, 1))
         self._basis = np.zeros((nv, nv - found))
         self._basis[self._independent] = np.diag(self._columns[self._independent])
         self._rcond = self._chosen_rcond = 1.0
         if found:
-            self._factors.compute(jacobian[np.ix_(self._rows, self._dependent)])
+            self._factors.compute(selected.take(self._dependent, axis=1))
             self._rcond = self._chosen_rcond = self._factors.rcond()
+
+    def _selected(self, rows: Array) -> Array:
+        """Return A of J, or what A takes of another array with the closures' rows."""
+        if self._all_rows:
+            return rows
+        return rows[self._rows] if self._combined is None else self._combined @ rows
+
+    def _open_by(self, gaps: Array) -> float:
+        """Return the largest gap of a closure that the selected rows can close."""
+        if self._combined is None:
+            return self._equations.largest_gap(gaps)
+        along = self._combined.T @ (self._combined @ (self._row_scale * gaps))
+        return self._equations.largest_gap(along / self._row_scale)
 
     def renew(self, q: Array) -> None:
         """Select rows and partition velocities again, if the present choice is ill-conditioned.
@@ -146,8 +169,7 @@ class ClosedManifold:
         a_0 = np.zeros(self.model.nv)
         if self._rank == 0:
             return self._basis, a_0
-        if not self._all_rows:
-            jacobian, bias = jacobian[self._rows], bias[self._rows]
+        jacobian, bias = self._selected(jacobian), self._selected(bias)
         factors, rank, m = self._factors, self._rank, self._independent.size
         factors.compute(jacobian.take(self._dependent, axis=1))
         self._rcond = factors.rcond()
@@ -188,12 +210,12 @@ class ClosedManifold:
         before = np.inf
         for _ in range(_NEWTON_STEPS):
             jacobian, gaps = self._evaluate(q)
-            rows, worst = jacobian[self._rows], self._equations.largest_gap(gaps)
+            rows, worst = self._selected(jacobian), self._open_by(gaps)
             # The gaps are rounding error once they do not shrink any more.
             if worst <= _NEWTON_ENDS / CLOSED * size or (worst <= size and worst >= before / 4):
                 break
             before = worst
-            open_by = (self._row_scale * gaps)[self._rows]
+            open_by = self._selected(self._row_scale * gaps)
             step = self._columns * self._least(rows, open_by)
             q = pin.integrate(self.model, q, -step)
         if not worst <= size:
@@ -203,6 +225,8 @@ class ClosedManifold:
                 worst,
             )
         v = v - self._columns * self._least(rows, rows @ (v / self._columns))
+        if self._combined is not None:
+            worst = self._equations.largest_gap(gaps)
         return q, v, worst
 
     def _least(self, rows: Array, right: Array) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.assembly.closing import independent_gap
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.damped import Damping, stiff_damping
@@ -117,13 +118,17 @@ def closed_start(system: ConstraintSystem, q: ArrayLike, v: ArrayLike | None) ->
     nv, equations = system.model.nv, system.equations
     q_ = real_vector(q, system.model.nq, "q")
     v_ = np.zeros(nv) if v is None else real_vector(v, nv, "v")
-    gap = equations.largest_gap(equations.gaps(q_))
+    gaps = equations.gaps(q_)
+    gap = equations.largest_gap(gaps)
+    if gap <= system.settle_rule(q_).gap:
+        gap = independent_gap(system, q_, gaps)
     if not gap <= OPEN * max(1.0, equations.length):
         raise ClosureError(
             f"the loops are open by {gap:.3g} m at the start; close them with close() first", gap
         )
     opening = float(np.abs(equations.jacobian(q_) @ v_).max(initial=0.0))
-    if opening > _OPENING * max(1.0, float(np.abs(v_).max(initial=0.0))):
+    accepted = max(_OPENING, system.rule.consistent)
+    if opening > accepted * max(1.0, float(np.abs(v_).max(initial=0.0))):
         raise ClosureError(
             f"v opens the loops at {opening:.3g} m/s (or rad/s) at the start; make it with "
             "velocity() first",

@@ -43,6 +43,7 @@ def with_parameters(
         name=mechanism.name,
         characteristic_length=mechanism.characteristic_length,
         max_condition=mechanism.max_condition,
+        accuracy=mechanism.accuracy,
     )
 
 

@@ -498,7 +498,7 @@ class CompiledMechanism:
     def passive_jacobian(self, q: ArrayLike, **options: Any) -> Array:
         """Return J_p, all entries in one unit, shape (..., nc, np)."""
         system = self.mechanism.system
-        rows, columns = system.factorisation.scales
+        rows, columns, _ = system.factorisation.scales
         jacobian = self.jacobian(q, **options)[..., system.passive]
         return np.asarray(rows * jacobian * columns)
 

@@ -58,6 +58,8 @@ def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, An
     lines.append(f"characteristic_length: {number(source.characteristic_length)}")
     if source.max_condition != MAX_CONDITION:
         lines.append(f"max_condition: {number(source.max_condition)}")
+    if source.accuracy is not None:
+        lines.append(f"accuracy: {number(source.accuracy)}")
     return "\n".join(lines) + "\n"
 
 

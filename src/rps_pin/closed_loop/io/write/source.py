@@ -40,7 +40,7 @@ class Source(NamedTuple):
         A closed configuration, shape (nq,), or None if the mechanism has none.
     characteristic_length
         m.
-    max_condition
+    max_condition, accuracy
         Of `ClosedLoopModel`.
     """
 
@@ -52,6 +52,7 @@ class Source(NamedTuple):
     name: str
     characteristic_length: float
     max_condition: float
+    accuracy: float | None = None
 
 
 _IN_XML = re.compile("[\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")
