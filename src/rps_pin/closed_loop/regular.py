@@ -31,10 +31,12 @@ from rps_pin.numerics.linear_algebra import (
 _TRIES, _STEP = 10, 0.15
 
 
-def around(system: ConstraintSystem, q: Array, *, within_limits: bool = True) -> list[Array]:
+def around(
+    system: ConstraintSystem, q: Array, *, within_limits: bool = True, steps: int = _TRIES
+) -> list[Array]:
     """Return a closed configuration and those of a random walk from it; always the same walk."""
     places, rng = [q], np.random.default_rng(0)
-    for _ in range(_TRIES):
+    for _ in range(steps):
         motions = allowed_motions(system, system.equations.jacobian(q))
         step = _STEP * rng.normal(size=motions.shape[1]) * system.equations.length
         moved = pin.integrate(system.model, q, motions @ step)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop.assembly.closing import CLOSED, close, close_gaps, is_closed
 from rps_pin.closed_loop.constraints.rank_rule import EXACT, RankRule, Rounding, largest
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
@@ -51,6 +51,8 @@ _GAP = 30.0
 _MARGIN = 100.0
 #: Columns of J smaller than this are rounding errors, not levers.
 _LEVER = 3e-5
+#: Steps after which a file whose redundant rows are so to rounding error counts as exact.
+_FIRST = 2
 #: Configurations nearer to a singularity than this, compared with the best, do not count.
 _NEAR_SINGULAR = 0.1
 #: Attempts to close the loops from one guess.
@@ -112,12 +114,10 @@ def _rule(
 ) -> RankRule | None:
     """Return the rule that follows from closed configurations about q; None if they do not tell."""
     bound = trial.rule.tolerance
+    closed = CLOSED * max(system.equations.length, 1.0)
     trial.rescale(system.row_scale, system.column_scale)
     _equalise(trial, q)
-    closed = CLOSED * max(system.equations.length, 1.0)
-    values = values_at(trial, q)
-    independent = values.size == system.equations.size and values[-1] > bound * largest(values)
-    if independent and _gap(trial, q) <= closed:
+    if _is_exact(trial, q, closed):
         return EXACT
     places = around(trial, q, within_limits=False)
     judged, places = _spectrum(trial, places, bound)
@@ -157,6 +157,17 @@ def _rule(
     )
     gap = limit * system.equations.length
     return RankRule(max(float(tolerance), RANK_TOLERANCE), judged.rank, gap, rounding)
+
+
+def _is_exact(trial: ConstraintSystem, q: Array, closed: float) -> bool:
+    """Return whether a few configurations show that no row is nearly redundant, and no gap open."""
+    if _gap(trial, q) > closed:
+        return False
+    values = values_at(trial, q)
+    if values.size == trial.equations.size and values[-1] > trial.rule.tolerance * largest(values):
+        return True
+    places = around(trial, q, within_limits=False, steps=_FIRST)
+    return max(_gap(trial, at) for at in places) <= closed and not _nearly(trial, places).any()
 
 
 def _warn(text: str) -> None:
@@ -206,9 +217,13 @@ def _closes_elsewhere(system: ConstraintSystem, trial: ConstraintSystem, q: Arra
     except ClosureError:
         return False
     exact.rescale(trial.row_scale, trial.column_scale)
-    values = values_at(exact, q)
-    values = values / largest(values)
-    return not ((values > _ROUNDING) & (values <= trial.rule.tolerance)).any()
+    return not _nearly(exact, [q], trial.rule.tolerance).any()
+
+
+def _nearly(system: ConstraintSystem, places: list[Array], bound: float | None = None) -> Bools:
+    """Return which singular values are nearly zero: above rounding error, at most a bound."""
+    values = np.array([one / largest(one) for one in (values_at(system, q) for q in places)])
+    return (values > _ROUNDING) & (values <= (bound or system.rule.tolerance))
 
 
 def _kept(system: ConstraintSystem, count: int, q: Array) -> float:
