@@ -99,6 +99,23 @@ def test_a_weld_is_a_rigid_closure(element: str) -> None:
         assert worst(np.linalg.norm(scale * sine) - np.linalg.norm(gap[3:])) < 1e-12
 
 
+@each("sites", [False, True])
+def test_a_weld_that_holds_no_torque_is_a_spherical_closure(sites: bool) -> None:
+    """MuJoCo's rows of the turn are zero with a torquescale of 0."""
+    element = WELDS["sites" if sites else "both"].replace("/>", ' torquescale="0"/>')
+    twin = Twin(with_references(fourbar(equalities(element))))
+    (closure,) = twin.parts.closures
+    assert isinstance(closure, LoopClosure) and closure.kind == "spherical"
+    rng = np.random.default_rng(6)
+    for _ in range(5):
+        twin.random(rng)
+        a, b = frames_of(twin.parts, closure, twin.q)
+        assert worst(a.translation - b.translation - twin.gaps()[:3]) < 1e-12
+        rows = twin.rows()[1]
+        assert worst(point_rows(twin.parts, closure, twin.q) - rows[:3]) < 1e-12
+        assert not rows[3:].any()
+
+
 JOINTS = {
     "plain": '<joint joint1="j1" joint2="j3"/>',
     "line": '<joint joint1="j2" joint2="j3" polycoef="0.3 -1.7 0 0 0"/>',

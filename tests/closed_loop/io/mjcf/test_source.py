@@ -15,6 +15,10 @@ from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from tests.closed_loop.io.mjcf.twin import BODY, fourbar, mujoco_file, read
 from tests.each import each
 
+INCLUDE = '<mujoco>\n<include file="{}.xml"/></mujoco>'
+ATTACH = """<mujoco><asset>
+    <model name="m" file="{}.xml"/></asset><worldbody><attach model="m" prefix="a"/></worldbody>
+    </mujoco>"""
 BAD = 'stiffness="1 2"'
 WHY = "a stiffness that is not linear"
 
@@ -51,6 +55,95 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
     (tmp_path / "binary.xml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match=r"binary\.xml: not a UTF-8 text"):
         parts_from_mjcf(tmp_path / "binary.xml")
+
+
+WIDE = "is in UTF-16 or UTF-32; MuJoCo reads UTF-8 alone"
+
+
+@each("encoding", ["utf-16", "utf-16-le", "utf-32"])
+@each("included", [False, True])
+def test_files_in_other_encodings_are_refused(
+    encoding: str, included: bool, tmp_path: Path
+) -> None:
+    main = written(tmp_path, main='<mujoco><include file="wide.xml"/></mujoco>')
+    wide = tmp_path / "wide.xml"
+    mark = "\ufeff" if encoding.endswith("le") else ""
+    wide.write_bytes((mark + mujoco_file(BODY)).encode(encoding))
+    with pytest.raises(MechanismError, match=rf"wide\.xml {WIDE}"):
+        parts_from_mjcf(main if included else wide)
+
+
+def test_names_that_are_not_utf8_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    text = '<?xml version="1.0" encoding="iso-8859-1"?><!-- \xb5m -->' + mujoco_file(BODY)
+    path.write_text(text, "latin-1")
+    assert parts_from_mjcf(path).model.nv == 1
+    path.write_text(text.replace('"j"', '"j\xe9"'), "latin-1")
+    with pytest.raises(MechanismError, match=r"robot\.xml has names that are not in UTF-8"):
+        parts_from_mjcf(path)
+
+
+ENTITIES = '<!DOCTYPE m [<!ENTITY a0 "aaaaaaaaaa">' + "".join(
+    f'<!ENTITY a{i} "{10 * f"&a{i - 1};"}">' for i in range(1, 12)
+)
+
+
+@each(
+    ("files", "why"),
+    [
+        (
+            {"main": INCLUDE.format("main")},
+            r"main\.xml, line 2: include of .*main\.xml', which lea",
+        ),
+        (
+            {"main": INCLUDE.format("two"), "two": INCLUDE.format("main")},
+            r"two\.xml, line 2: include of .*main\.xml', which leads back to itself",
+        ),
+        ({"main": ATTACH.format("main")}, r"main\.xml, line 2: model of .*main\.xml', which leads"),
+        (
+            {"main": ATTACH.format("two"), "two": ATTACH.format("main")},
+            r"two\.xml, line 2: model of .*main\.xml', which leads back to itself",
+        ),
+        (
+            {"main": INCLUDE.format("two"), "two": ENTITIES + "]>" + mujoco_file(BODY)},
+            r"two\.xml declares a document type, which no MJCF needs: refused",
+        ),
+        (
+            {"main": ENTITIES + "]>" + mujoco_file(BODY)},
+            r"main\.xml declares a document type, which no MJCF needs: refused",
+        ),
+        (
+            {"main": INCLUDE.format("two"), "two": " " * (64 * 2**20 + 1)},
+            r"two\.xml has more than 67108864 bytes",
+        ),
+        (
+            {"main": INCLUDE.format("two"), "two": "<mujoco>\n<worldbody></mujoco>"},
+            r"Include error.*two\.xml: .*line 2",
+        ),
+        ({"main": INCLUDE.format("none")}, r"Error opening file 'none\.xml' .*line 2"),
+        (
+            {"main": INCLUDE.format(f"{'a' * 300}")},
+            r"Error opening file 'a*\.xml' .*line 2",
+        ),
+        (
+            {
+                "main": INCLUDE.format("f1"),
+                **{f"f{i}": INCLUDE.format(f"f{i + 1}") for i in range(1, 110)},
+            },
+            r"f100\.xml, line 2: include of .*, too deep",
+        ),
+    ],
+)
+def test_files_that_are_hostile_or_broken_are_refused(
+    files: dict[str, str], why: str, tmp_path: Path
+) -> None:
+    path = written(tmp_path, **files)
+    with pytest.raises((MechanismError, InputError), match=why):
+        parts_from_mjcf(path)
+
+
+def test_a_document_type_in_a_comment_is_none() -> None:
+    assert parts_from_mjcf(mujoco_file(BODY, "<!-- <!DOCTYPE mujoco> -->")).model.nv == 1
 
 
 def test_text_that_only_mujoco_takes_is_taken() -> None:
@@ -184,6 +277,26 @@ def test_a_setting_is_named_where_it_stands(tmp_path: Path) -> None:
         more='<mujoco>\n\n<option density="3"/></mujoco>',
     )
     with pytest.raises(MechanismError, match=r"more\.xml, line 3: option has density = 3"):
+        parts_from_mjcf(path)
+
+
+@each(
+    ("two", "why"),
+    [
+        (mujoco_file("<body>\n<joint axs='1'/></body>"), "attribute: 'axs' .*{}, line 2"),
+        (mujoco_file("\n\n<body name='x'><joint/></body>"), "moving bodies .* 'x', .*{}, line 3"),
+        (
+            mujoco_file('<body>\n<joint/><geom type="mesh" mesh="q"/></body>'),
+            "mesh 'q' not found in geom .*{}, line 2",
+        ),
+        (mujoco_file(BODY, '<equality>\n<weld body1="c"/></equality>'), "'c'.*{}, line 2"),
+    ],
+)
+def test_mujocos_errors_have_the_line_in_the_included_file(
+    two: str, why: str, tmp_path: Path
+) -> None:
+    path = written(tmp_path, main=INCLUDE.format("parts/two"), parts__two=two)
+    with pytest.raises(MechanismError, match=why.format(r"parts/two\.xml")):
         parts_from_mjcf(path)
 
 

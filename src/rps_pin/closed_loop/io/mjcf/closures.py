@@ -5,7 +5,7 @@ element        becomes
 =============  =================================================================================
 ``connect``    a spherical closure: of the anchors in both bodies, or of two sites
 ``weld``       a rigid closure: of body1 moved by relpose, and body2 moved by the anchor; or of
-               two sites
+               two sites; with a torquescale of 0 a spherical one
 ``joint``      a `JointCoupling` q1 - ref1 = c0 + c1 (q2 - ref2) + ... + c4 (q2 - ref2)^4; without
                joint2, joint1 is held at ref1 + c0
 ``tendon``     a `JointCoupling` of all joints of the one or two fixed tendons, whose lengths take
@@ -34,6 +34,7 @@ from rps_pin.closed_loop.io.mjcf.tree import MjcfTree, pose_of
 _CONNECT, _WELD, _JOINT, _TENDON = range(4)
 _TAGS = ("connect", "weld", "joint", "tendon")
 _SITE = 6
+_TORQUESCALE = 10  # place in the numbers of a weld
 
 
 def read_equalities(tree: MjcfTree, tendons: Tendons) -> list[Closure]:
@@ -67,7 +68,8 @@ def _closure(tree: MjcfTree, tendons: Tendons, number: int) -> Closure:
     name = m.equality(number).name or f"{_TAGS[kind]}_{number + 1}"
     if kind in (_CONNECT, _WELD):
         frames = _frames(tree, number, name, kind)
-        return LoopClosure(*frames, "spherical" if kind == _CONNECT else "rigid", name)
+        turns = kind == _WELD and m.eq_data[number, _TORQUESCALE]
+        return LoopClosure(*frames, "rigid" if turns else "spherical", name)
     one, two = int(m.eq_obj1id[number]), int(m.eq_obj2id[number])
     curve = Polynomial(m.eq_data[number, :5])
     curve = curve.trim() if two >= 0 else Polynomial(curve.coef[:1])

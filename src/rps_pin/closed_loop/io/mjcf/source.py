@@ -1,21 +1,21 @@
-"""An MJCF as MuJoCo compiles it, and the places in its files that messages name.
+"""An MJCF as MuJoCo compiles it.
 
 MuJoCo reads the file: included files, defaults, frames, replicates, attached models, meshes and
 masses are its business. What is read here is its compiled model, in which each kind of element is
-numbered. Lines are MuJoCo's too, but for elements of included files, which have none there: these
-are looked up in the text of the files.
+numbered.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import warnings
-from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
-from lxml import etree
-
+from rps_pin.closed_loop.io.mjcf.appearance import without_appearance
+from rps_pin.closed_loop.io.mjcf.files import MjcfFiles
 from rps_pin.closed_loop.io.xml_file import xml_text
 from rps_pin.errors import MechanismError, RPSPinError
 
@@ -27,24 +27,7 @@ _TAGS: dict[str, tuple[str, ...] | None] = {
     "equalities": None,
     "actuators": None,
 }
-_SECTIONS = {"equalities": "equality", "actuators": "actuator"}
-
-
-class _Place(NamedTuple):
-    """An element of one of the files."""
-
-    file: str
-    line: int
-    xml: Any
-
-
-class _File(NamedTuple):
-    """A file that another one includes or attaches."""
-
-    name: str
-    """As it is written there."""
-    path: str
-    text: str
+_LINE = re.compile(r"\bline (\d+)")
 
 
 class MjcfSource:
@@ -78,18 +61,15 @@ class MjcfSource:
     def __init__(self, path_or_xml: str | os.PathLike[str]) -> None:
         self._text, self.origin = xml_text(path_or_xml, "MJCF")
         self._path = None if self.origin == "the MJCF text" else Path(self.origin)
-        root = _root(self._text)
-        if root is None or root.getroottree().docinfo.doctype:
-            fault = "is not XML" if root is None else "declares a document type: refused"
-            raise MechanismError(f"{self.origin} is not a valid MJCF: it {fault}")
-        if root.tag != "mujoco":
-            raise MechanismError(
-                f"{self.origin} is not a valid MJCF: its root element is <{root.tag}>, not <mujoco>"
-            )
+        self._files = MjcfFiles(self._text, self.origin, self._path)
+        self.name = self._files.name
         self.mujoco = _mujoco()
         self.told: dict[str, list[str]] = {}
         self._spec, self.model = self._compiled()
-        self.name = str(root.get("model", ""))
+        try:
+            self.model.names.decode()
+        except UnicodeDecodeError:
+            raise MechanismError(f"{self.origin} has names that are not in UTF-8") from None
 
     def _compiled(self) -> tuple[Any, Any]:
         """Return MuJoCo's specification and model; its warnings, some in its log, are told."""
@@ -100,17 +80,29 @@ class MjcfSource:
         try:
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                spec = self._parsed()
-                model = spec.compile()
-        except ValueError as error:
-            why = " ".join(str(error).split())
-            raise MechanismError(f"{self.origin} is not a valid MJCF: {why}") from None
+                spec, model = self._compiled_at_all()
         finally:
             mujoco.set_mju_user_warning(before)
         found = [*logged, *(str(one.message) for one in caught)]
         for words in found:
-            self.told[f"MuJoCo warns: {' '.join(words.split())}"] = [self.origin]
+            self.told[f"MuJoCo warns: {_one_line(words)}"] = [self.origin]
         return spec, model
+
+    def _compiled_at_all(self) -> tuple[Any, Any]:
+        """Return MuJoCo's specification and model, without shapes if it is they that fail."""
+        try:
+            spec = self._parsed()
+            try:
+                return spec, spec.compile()
+            except ValueError as error:
+                spec = without_appearance(self._parsed(), self.mujoco)
+                model = spec.compile()
+                without = "textures, sensors, and shapes that give no mass are left out"
+                self.told[f"MuJoCo: {self._reason(error)}: {without}"] = [self.origin]
+                return spec, model
+        except ValueError as error:
+            why = self._reason(error)
+            raise MechanismError(f"{self.origin} is not a valid MJCF: {why}") from None
 
     def _parsed(self) -> Any:
         """Return MuJoCo's specification; it reads files only whose names end in .xml by itself."""
@@ -119,10 +111,36 @@ class MjcfSource:
             return spec.from_file(str(self._path))
         if self._path is None:
             return spec.from_string(self._text)
-        parts = {one.name: one.text.encode() for one in self._parts()}
-        found = spec.from_string(self._text, include=parts)
+        found = spec.from_string(self._text, include=self._files.parts)
         found.modelfiledir = str(self._path.absolute().parent)
         return found
+
+    def _reason(self, error: ValueError) -> str:
+        """Return MuJoCo's reason, with file and line where it names none."""
+        why = _one_line(error)
+        line = _LINE.search(why)
+        if line is None:
+            files = map(self._files.naming, re.findall("'([^']+)'", why))
+            return f"{why} ({place})" if (place := next(filter(None, files), None)) else why
+        if "Include error" in why:
+            return f"{why} ({self._files.broken()})"
+        if line[1] != "0":
+            return why
+        try:
+            self._in_one_text.compile()
+        except ValueError as same:
+            found = _one_line(same)
+            line = _LINE.search(found)
+            place = self._files.at(int(line[1])) if line else None
+            return _LINE.sub(str(place), found) if place else why
+        return why
+
+    @cached_property
+    def _in_one_text(self) -> Any:
+        """The specification of all files in one text, which has lines of included files too."""
+        spec = self.mujoco.MjSpec.from_string(self._files.text)
+        spec.modelfiledir = str(self._files.folder)
+        return spec
 
     def read(self, name: str, number: int) -> Any:
         """Return an entry of an array of the model, or 0 where this MuJoCo has no such array."""
@@ -157,96 +175,25 @@ class MjcfSource:
     def at(self, kind: str, number: int) -> str:
         """Return an element's file, line, tag and name, by its number in MuJoCo's list."""
         elements = list(getattr(self._spec, kind))
-        element = next(one for one in elements if one.id == number)
-        line = _line(element)
-        place = self._place(kind, element, line)
+        order = next(k for k, one in enumerate(elements) if one.id == number)
+        name = elements[order].name
+        try:
+            again = list(getattr(self._in_one_text, kind))[order]
+            place = self._files.at(int(again.info.rpartition("line ")[2] or 0), _TAGS[kind], name)
+        except (ValueError, IndexError):
+            place = None
         if place is None:
-            return f"{self.origin}: {kind} {element.name or number!r}"
-        called = f" {element.name!r}" if element.name else ""
-        return f"{place.file}, line {line or place.line}: {place.xml.tag}{called}"
+            return f"{self.origin}: {kind} {name or number!r}"
+        return f"{place}: {place.xml.tag}" + (f" {name!r}" if name else "")
 
     def setting(self, *tags: str, attribute: str = "") -> str:
         """Return the place of the last element of some tags, of those that have the attribute."""
-        found = [
-            place
-            for place in self._places()
-            if place.xml.tag in tags and (not attribute or attribute in place.xml.attrib)
-        ]
-        if not found:
-            return f"{self.origin}: {tags[0]}"
-        return f"{found[-1].file}, line {found[-1].line}: {found[-1].xml.tag}"
-
-    def _place(self, kind: str, element: Any, line: int) -> _Place | None:
-        """Return the place that is most like that of an element of MuJoCo's list.
-
-        Its name may have been given a prefix or a suffix, where it is attached or replicated; its
-        line is that in the main file, or in an attached one, or none (0) in an included one.
-        """
-        tags, section = _TAGS[kind], _SECTIONS.get(kind)
-        candidates = [
-            place
-            for place in self._places()
-            if (tags is None or place.xml.tag in tags)
-            and (section is None or _parent(place.xml) == section)
-            and ((place.xml.get("name") or "") in element.name)
-            and bool(place.xml.get("name")) == bool(element.name)
-            and "default" not in _ancestors(place.xml)
-        ]
-        if not line:  # unnamed elements of included files: in their order
-            candidates = [place for place in candidates if place.file != self.origin]
-            others = [one for one in getattr(self._spec, kind) if not _line(one) and not one.name]
-            if not element.name and len(others) == len(candidates):
-                return candidates[[one.id for one in others].index(element.id)]
-        return min(
-            candidates,
-            key=lambda place: (-len(place.xml.get("name") or ""), abs(place.line - line)),
-            default=None,
-        )
-
-    def _places(self) -> Iterator[_Place]:
-        """Yield all elements of the file and of those that it includes or attaches."""
-        files = [_File("", self.origin, self._text), *self._parts()]
-        for one in files:
-            root = _root(one.text)
-            for xml in () if root is None else root.iter(etree.Element):
-                yield _Place(one.path, xml.sourceline, xml)
-
-    def _parts(self) -> Iterator[_File]:
-        """Yield the files that the file includes or attaches."""
-        yield from _parts(self._text, [self._path.parent if self._path else Path()])
+        place = self._files.last(tags, attribute)
+        return f"{place}: {place.xml.tag}" if place else f"{self.origin}: {tags[0]}"
 
 
-def _parts(text: str, folders: list[Path]) -> Iterator[_File]:
-    root = _root(text)
-    for xml in () if root is None else root.iter("include", "model"):
-        name = xml.get("file", "")
-        path = next((f / name for f in folders if name and (f / name).is_file()), None)
-        if path is not None:
-            found = path.read_text("utf-8", "replace")
-            yield _File(name, str(path), found)
-            yield from _parts(found, [*folders, path.parent])
-
-
-def _root(text: str) -> Any:
-    """Return the root element of a text, which MuJoCo's parser reads with less rigour."""
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, recover=True, huge_tree=True
-    )
-    return etree.fromstring(text.encode(), parser)
-
-
-def _line(element: Any) -> int:
-    """Return an element's line as MuJoCo has it, 0 if it is in an included file."""
-    return int(element.info.rpartition("line ")[2] or 0)
-
-
-def _parent(xml: Any) -> str:
-    parent = xml.getparent()
-    return "" if parent is None else str(parent.tag)
-
-
-def _ancestors(xml: Any) -> set[str]:
-    return {str(one.tag) for one in xml.iterancestors()}
+def _one_line(words: object) -> str:
+    return " ".join(str(words).split())
 
 
 def _mujoco() -> Any:

@@ -41,7 +41,7 @@ class Tendons:
         self.names: dict[int, str] = {}
         self.couplings: list[JointCoupling] = []
         m = self._source.model
-        limited = not self._source.disabled("limit")
+        limited = not (self._source.disabled("limit") or self._source.disabled("constraint"))
         for number in range(m.ntendon):
             forces = [n for n in FORCES if np.any(self._source.read(f"tendon_{n}", number))]
             if self._source.is_fixed(number):
