@@ -158,3 +158,16 @@ def test_lengths_of_other_kinds_are_refused(kind: str) -> None:
 
 def test_closures_of_arrays_are_hashable_too() -> None:
     assert len({closure("revolute", axis=np.array([0, 0, 2.0])), closure("revolute")}) == 1
+
+
+@pytest.mark.parametrize("bad", [[1, 0, 1j], ["1", "0", "0"], [1, 0], [[1, 0], 0], "z"])
+def test_axes_of_other_than_real_numbers_are_refused(bad: object) -> None:
+    with pytest.raises(MechanismError, match=r"axis = .* must be three numbers"):
+        LoopClosure("knee", "rocker_tip", "revolute", axis=bad)
+
+
+def test_lengths_of_rods_are_real_numbers_of_any_type() -> None:
+    assert LoopClosure("a", "b", "distance", distance=np.int64(2)).distance == 2.0
+    for bad in (True, 2j, "2", np.nan):
+        with pytest.raises(MechanismError, match="it must be a positive length in m"):
+            LoopClosure("a", "b", "distance", distance=bad)

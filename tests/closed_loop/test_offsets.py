@@ -156,6 +156,7 @@ def test_rounded_rotations_are_made_rotations() -> None:
 
 TURNED = np.diag([1.0, 1.0, -1.0, 1.0])
 BAD = [np.eye(3), [1, 2, 3], "here", 2 * np.eye(4), TURNED, np.full((4, 4), np.nan), [[1], [2, 3]]]
+BAD += [np.eye(4) * (1 + 1e-6j), np.eye(4).astype(bool), np.eye(4).astype(str)]
 
 
 @pytest.mark.parametrize("bad", BAD)

@@ -86,6 +86,9 @@ def test_what_follows_from_the_configuration_cannot_be_given() -> None:
         free.closure_at(q, "body_0", placement_b=pin.SE3.Identity())
     with pytest.raises(MechanismError, match="distance follows from q"):
         free.closure_at(q, "body_0", "body_1", "distance", distance=0.3)
+    options = "no option 'foo'; there are: name, axis, axis_b, placement_a$"
+    with pytest.raises(MechanismError, match=f"'body_0' as it stands: {options}"):
+        free.closure_at(q, "body_0", foo=1)
     with pytest.raises(MechanismError, match="no frame 'toe'; there are: universe"):
         free.closure_at(q, "toe")
     with pytest.raises(MechanismError, match="no closure kind 'glue'"):

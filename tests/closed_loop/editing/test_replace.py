@@ -139,6 +139,16 @@ WRONG = {
         "j1": "hinge"
     },
     r"joint 'j1' cannot be replaced by 3: give one of fixed.*or a Pinocchio joint model": {"j1": 3},
+    r"'j1' cannot be replaced by the class JointModelSpherical: give a joint, .*Spherical\(\.": {
+        "j1": pin.JointModelSpherical
+    },
+    "joint 'j1' cannot be replaced by .*or a Pinocchio joint": {"j1": pin.JointModelComposite()},
+    "joint 'j1' cannot be replaced by .* give one of fixed": {
+        "j1": pin.JointModelRX().createData()
+    },
+    "joint 'j1' cannot be replaced by .*give one of fixed, rev": {
+        "j1": pin.JointModelMimic(pin.JointModelRX(), 2.0, 0.0)
+    },
     r"joint 'j3' \(JointModelSpherical\) has no axis .*; say which: revolute_x": {"j3": "revolute"},
     r"joint 'j2' has armature = \[0.5\], which its new type cannot keep": {"j2": "spherical"},
 }

@@ -36,8 +36,10 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pinocchio as pin
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.couplings import JointCoupling
 from rps_pin.errors import MechanismError, shown
+from rps_pin.validation import real
 
 __all__ = [
     "KINDS",
@@ -150,7 +152,7 @@ class LoopClosure:
                 f"closure {self.name!r}: a distance belongs to kind 'distance' only, not to "
                 f"{self.kind!r}"
             )
-        if is_rod and not (isinstance(given, (int, float)) and 0 < given < math.inf):
+        if is_rod and not 0 < real(given) < math.inf:
             raise MechanismError(
                 f"closure {self.name!r}: distance = {given!r}; it must be a positive length in m"
             )
@@ -163,10 +165,7 @@ class LoopClosure:
         given = getattr(self, option)
         if given is None:
             return None
-        try:
-            matrix = np.array(getattr(given, "homogeneous", given), dtype=np.float64)
-        except (TypeError, ValueError):
-            matrix = np.empty(0)
+        matrix = _real_numbers(getattr(given, "homogeneous", given))
         if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
             raise MechanismError(
                 f"closure {self.name!r}: {option} = {shown(given)} must be a pin.SE3 or 4 x 4 "
@@ -198,12 +197,12 @@ class LoopClosure:
                 f"closure {self.name!r}: {option} does not belong to kind {self.kind!r}, only to "
                 f"{', '.join(taken)}"
             )
-        try:
-            x, y, z = (float(part) for part in given)
-        except (TypeError, ValueError):
+        numbers = _real_numbers(given)
+        if numbers.shape != (3,):
             raise MechanismError(
                 f"closure {self.name!r}: {option} = {given!r} must be three numbers"
-            ) from None
+            )
+        x, y, z = numbers.tolist()
         length = math.hypot(x, y, z)
         if not 0 < length < math.inf:
             raise MechanismError(f"closure {self.name!r}: {option} = {given!r} has no direction")
@@ -270,6 +269,15 @@ class LoopClosure:
 
 
 Closure = LoopClosure | JointCoupling
+
+
+def _real_numbers(given: Any) -> Array:
+    """Return a copy as float64; empty if it is ragged, complex, of truth values or of texts."""
+    try:
+        array = np.array(given)
+    except ValueError:
+        return np.empty(0)
+    return array.astype(np.float64) if array.dtype.kind in "iuf" else np.empty(0)
 
 
 def joint_id(model: pin.Model, name: str, asked_by: str) -> int:

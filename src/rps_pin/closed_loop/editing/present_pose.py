@@ -6,7 +6,7 @@ axes; or, if the world carries frame a, at frame b's origin with frame a's axes.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,11 +16,23 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Kind, LoopClosure
 from rps_pin.errors import MechanismError
 
+#: What follows from the configuration, of a rod and of other closures.
+_FOLLOWING = ("distance", "placement_b")
+_OPTIONS = tuple(
+    field.name for field in fields(LoopClosure) if field.name not in ("frame_a", "frame_b", "kind")
+)
+
 
 def closure_at(
     model: pin.Model, q: Array, frame_a: str, frame_b: str, kind: Kind, **options: Any
 ) -> LoopClosure:
     """Return a closure that is closed at q; see `ClosedLoopModel.closure_at`."""
+    unknown = [name for name in options if name not in _OPTIONS]
+    if unknown:
+        raise MechanismError(
+            f"closure of {frame_a!r} as it stands: no option {unknown[0]!r}; there are: "
+            f"{', '.join(name for name in _OPTIONS if name not in _FOLLOWING)}"
+        )
     is_rod = kind == "distance"
     fixed = "distance" if is_rod else "placement_b"
     if options.get(fixed) is not None:

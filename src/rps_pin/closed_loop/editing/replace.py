@@ -191,10 +191,16 @@ def _locked(model: pin.Model, joints: Sequence[int]) -> pin.Model:
 def _joint_model(model: pin.Model, index: int, kind: JointKind) -> Any:
     """Return Pinocchio's joint of a kind in the place of a joint."""
     if not isinstance(kind, str):
-        if not hasattr(kind, "shortname"):
+        if isinstance(kind, type) and kind.__name__.startswith("JointModel"):
             raise MechanismError(
-                f"joint {model.names[index]!r} cannot be replaced by {shown(kind)}: give one of "
-                f"{', '.join(JOINT_KINDS)}, or a Pinocchio joint model"
+                f"joint {model.names[index]!r} cannot be replaced by the class "
+                f"{kind.__name__}: give a joint, {kind.__name__}(...)"
+            )
+        if not _is_joint_model(kind):
+            raise MechanismError(
+                f"joint {model.names[index]!r} cannot be replaced by "
+                f"{' '.join(shown(kind).split())}: give one of {', '.join(JOINT_KINDS)}, or a "
+                "Pinocchio joint model"
             )
         return kind
     if kind in _OF_ONE_AXIS:
@@ -204,6 +210,12 @@ def _joint_model(model: pin.Model, index: int, kind: JointKind) -> Any:
             f"joint {model.names[index]!r} cannot be {kind!r}; there are: {', '.join(JOINT_KINDS)}"
         )
     return _KINDS[kind]
+
+
+def _is_joint_model(kind: Any) -> bool:
+    """Return whether it is a joint of its own: not a mimic, and no composite without parts."""
+    name = type(kind).__name__
+    return name.startswith("JointModel") and name != "JointModelMimic" and kind.nv > 0
 
 
 def _axis(model: pin.Model, index: int, kind: str) -> Array:
