@@ -296,3 +296,23 @@ def test_convert_names_the_link_that_mujoco_does_not_move(tmp_path: Path) -> Non
     mend = ("--least-mass", "1e-9", "--least-inertia", "1e-9", "--mend-inertia")
     run = rps_pin("convert", "rps", "--to", "mjcf", *mend, folder=tmp_path)
     assert run.returncode == 0, run.stderr
+
+
+def test_assembly_modes_are_printed_and_each_can_be_a_home() -> None:
+    run = rps_pin("assembly-modes", "four_bar", "--at", "crank_joint=1.2")
+    assert run.returncode == 0, run.stderr
+    assert "2 found in 128 random starts" in run.stdout
+    run = rps_pin("assembly-modes", "four_bar", "--at", "crank_joint=1.2", "--json")
+    found = json.loads(run.stdout)
+    mechanism = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    assert found["stopped"] == "settled"
+    assert len(found["modes"]) == 2
+    for mode in found["modes"]:
+        assert mode["home"]["crank_joint"] == 1.2
+        assert (
+            mechanism.loop_gap([mode["home"][name] for name in list(mechanism.model.names)[1:]])
+            < 1e-12
+        )
+    run = rps_pin("assembly-modes", "four_bar", "--at", "crank=1.2")
+    assert run.returncode == 1
+    assert "crank_joint" in run.stderr

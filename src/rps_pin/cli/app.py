@@ -32,11 +32,14 @@ for _panel, _name, _line in (
     (_MOTION, "check", "Singularities and limits along a helix."),
     (_MOTION, "control", "A control loop on a simulated robot."),
     (_ANY, "describe", "Joints, closures, rank, mobility, actuation."),
+    (_ANY, "assembly-modes", "Closed configurations with given joint values."),
     (_ANY, "simulate", "Simulation, loops closed at every step."),
     (_ANY, "convert", "URDF with its description, or a MuJoCo file."),
     (_MORE, "reproduce", "The paper's equations, figures and tables."),
 ):
-    app.command(_name, rich_help_panel=_panel, short_help=_line)(LazyGroup.stub(_name))
+    app.command(_name, rich_help_panel=_panel, short_help=_line)(
+        LazyGroup.stub(_name.replace("-", "_"))
+    )
 
 export = typer.Typer(cls=LazyGroup, no_args_is_help=True, **SETTINGS)
 export.command("c", short_help="C99 with header, CMake and a self-test.")(
@@ -74,7 +77,7 @@ def rps_pin(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Closed-loop robots on Pinocchio: the 3-RPS parallel robot, and any other mechanism.
+    """Closed-loop robots on Pinocchio: the 3-RPS, and any other mechanism.
 
     Units are SI: m, rad, s, kg, N. Begin with **rps-pin helix** and **rps-pin view**.
     """

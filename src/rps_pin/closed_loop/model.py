@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from importlib import import_module
@@ -19,6 +19,7 @@ from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop import kinematics
 from rps_pin.closed_loop.assembly.closing import close, closed_gap
 from rps_pin.closed_loop.assembly.completion import complete
+from rps_pin.closed_loop.assembly.modes import FoundModes, assembly_modes
 from rps_pin.closed_loop.assembly.projection import project
 from rps_pin.closed_loop.assembly.rounding import find_rule
 from rps_pin.closed_loop.constraints.closures import Closure, Kind, LoopClosure
@@ -696,6 +697,79 @@ class ClosedLoopModel:
         guess = self.home if q_guess is None else q_guess
         start = self.system.normalised(guess, "q_guess")
         return complete(self.system, values, start, within_limits=within_limits, jump=jump)
+
+    def assembly_modes(
+        self,
+        values: Mapping[str, ArrayLike] | ArrayLike | None = None,
+        q_guess: ArrayLike | None = None,
+        *,
+        frames: Sequence[str] | None = None,
+        seed: int = 0,
+        starts: int = 20_000,
+        seconds: float | None = None,
+        within_limits: bool = True,
+        progress: Callable[[float], None] | None = None,
+    ) -> FoundModes:
+        """Return the closed configurations with given joint values that a search finds.
+
+        The loops are closed from random starts, until new ones are not expected any more; the
+        result says how many starts led to each and how many are expected in all. See `modes` for
+        the method and its rule. That is no proof that there are no others.
+
+        Parameters
+        ----------
+        values
+            By joint name or of the actuated joints, as for `complete`; left out: those of the
+            guess's actuated joints.
+        q_guess
+            Configuration that the starts are drawn about, and the first of them, shape (nq,). Left
+            out: `home`, or the neutral configuration if that cannot be closed.
+        frames
+            Frames by whose places modes are told apart, ``["platform"]``. Left out: all links; so
+            a leg turned by half a turn on its universal joint makes another mode.
+        seed
+            Of the random numbers: the same starts each time.
+        starts, seconds
+            Most random starts, and the longest time, s.
+        within_limits
+            Whether the modes must lie within the joint limits; the starts do then.
+        progress
+            Called with the share that is done; it falls when another mode is found.
+
+        Returns
+        -------
+        FoundModes
+            One configuration of each mode, angles within a turn, nearest to the guess first. Ctrl-C
+            ends the search and keeps what it has found.
+
+        Raises
+        ------
+        InputError, MechanismError
+            If a value has the wrong shape, or a joint is unknown; or if the values leave motions
+            open that are not idle freedoms, which are named.
+        ClosureError
+            If no closed configuration was found; says where it comes nearest.
+        """
+        return assembly_modes(
+            self.system,
+            values,
+            self.search_start(q_guess),
+            frames=frames,
+            seed=seed,
+            starts=starts,
+            seconds=seconds,
+            within_limits=within_limits,
+            progress=progress,
+        )
+
+    def search_start(self, q_guess: ArrayLike | None) -> Array:
+        """Return a guess, checked; or home, or where home was looked for, shape (nq,)."""
+        if q_guess is None:
+            try:
+                q_guess = self.home
+            except ClosureError:
+                q_guess = self._start
+        return self.system.normalised(q_guess, "q_guess")
 
     # Velocity and acceleration --------------------------------------------------------------------
 

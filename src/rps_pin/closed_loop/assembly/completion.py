@@ -17,7 +17,7 @@ from rps_pin.errors import ClosureError, InputError, SingularityError
 from rps_pin.validation import real_vector
 
 #: How far outside a limit rounding error may leave a joint, rad or m.
-_AT_LIMIT = 1e-9
+AT_LIMIT = 1e-9
 #: Values this near to those of the guess are its own, rad or m.
 _SAME = 1e-13
 #: The last correction of an overdetermined configuration, characteristic lengths.
@@ -39,7 +39,7 @@ def complete(
     if jump:
         return close(system, target, fixed=list(named), within_limits=within_limits)
     if within_limits:
-        _refuse_values_outside(system, target, named)
+        refuse_values_outside(system, target, named)
     start = _closed_start(system, guess, within_limits)
     if start is not guess:
         target = with_values(system, start, named)
@@ -88,9 +88,10 @@ def _closed_start(system: ConstraintSystem, guess: Array, within_limits: bool) -
     return close(system, guess, within_limits=within_limits)
 
 
-def _refuse_values_outside(
+def refuse_values_outside(
     system: ConstraintSystem, target: Array, names: Sequence[str] | Mapping[str, ArrayLike]
 ) -> None:
+    """Raise `ClosureError` if a configuration has one of these joints outside its limits."""
     outside = system.limits.outside(target)
     if outside.keys() & set(names):
         phrases = ", ".join(outside[name] for name in names if name in outside)
@@ -101,7 +102,7 @@ def _within_limits(system: ConstraintSystem, q: Array, given: Mapping[str, Array
     """Return the configuration within the joint limits: angles may be turned by whole turns."""
     limits = system.limits
     x = q[limits.q]
-    out = (x < limits.lower - _AT_LIMIT) | (x > limits.upper + _AT_LIMIT)
+    out = (x < limits.lower - AT_LIMIT) | (x > limits.upper + AT_LIMIT)
     out &= np.array([name not in given for name in limits.names], dtype=bool)
     if not out.any():
         return q

@@ -19,6 +19,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.assembly.modes import FoundModes, assembly_modes
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.constraints.equations import LoopErrors
 from rps_pin.closed_loop.dynamics import least_effort
@@ -329,6 +330,25 @@ class CompiledMechanism:
                 "closed", (wanted,), lambda m, q: (*answer(m, q, q), 0.0), within_limits, options
             )
         return self._closed("completed", (guess, wanted), answer, within_limits, options)
+
+    def assembly_modes(
+        self,
+        values: Mapping[str, ArrayLike] | ArrayLike | None = None,
+        q_guess: ArrayLike | None = None,
+        **options: Any,
+    ) -> FoundModes:
+        """Return the closed configurations with given joint values that a search finds.
+
+        As `ClosedLoopModel.assembly_modes`, from the same starts, with gaps and Jacobians by
+        generated code.
+        """
+
+        def equations(q: Array) -> tuple[Array, Array]:
+            return self.gaps(q), self.jacobian(q)
+
+        mechanism = self.reference()
+        guess = mechanism.search_start(q_guess)
+        return assembly_modes(mechanism.system, values, guess, equations=equations, **options)
 
     def _by_one(self, answer: Reference, given: Sequence[ArrayLike], **options: Any) -> Array:
         """Return the Pinocchio engine's configurations, from where it starts."""

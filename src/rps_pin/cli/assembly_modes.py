@@ -1,0 +1,99 @@
+"""``rps-pin assembly-modes``: the closed configurations with given joint values."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+import pinocchio as pin
+import typer
+
+from rps_pin.arrays import Array
+from rps_pin.cli import console as common
+from rps_pin.cli import mechanism_options as options
+from rps_pin.closed_loop.column_names import column_names
+
+#: Modes in the printed table.
+_MOST = 8
+
+
+def assembly_modes_command(
+    file: options.FileArgument,
+    at: Annotated[
+        options.JointValues,
+        options.joint_values(
+            "Value of a joint, rad or m; default: home's values of the actuated joints."
+        ),
+    ] = None,
+    frame: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Tell modes apart by this frame alone; can be given several times.",
+        ),
+    ] = None,
+    starts: Annotated[int, typer.Option(help="Most random starts.")] = 20_000,
+    seconds: Annotated[float, typer.Option(help="Longest time, s.")] = 60.0,
+    seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 0,
+    ignore_limits: options.IgnoreLimitsOption = False,
+    as_json: common.JsonOption = False,
+) -> None:
+    """Search all closed configurations of a mechanism with given joint values.
+
+    The loops are closed from random starts until no further mode is expected. That is no proof that
+    there is none: the output says how many starts led to each mode, and how many modes are expected
+    in all. Ctrl-C ends the search and keeps what it has found.
+
+    Exit status: 0 found; 1 not found (the error says why); 2 wrong usage.
+
+    Examples:
+
+    - `rps-pin assembly-modes four_bar --at crank_joint=1.2`
+
+    - `rps-pin assembly-modes stewart --frame platform --ignore-limits`
+    """
+    mechanism, _ = options.load_mechanism(file, ignore_limits)
+    console = common.text_console(as_json, soft_wrap=True)
+    with common.share_bar(console, "searching") as progress:
+        found = mechanism.assembly_modes(
+            options.by_joint(at, "--at") if at else None,
+            frames=frame,
+            starts=starts,
+            seconds=seconds,
+            seed=seed,
+            progress=progress,
+        )
+    if as_json:
+        counts = found._asdict()
+        modes = [
+            {"home": _by_joint(mechanism.model, q), "hits": int(hits), "condition": _plain(c)}
+            for q, hits, c in zip(found.q, found.hits, found.condition, strict=True)
+        ]
+        told = {name: counts[name] for name in ("starts", "closed", "outside", "stopped")}
+        expected = {"expected": _plain(found.expected)}
+        common.print_json({"mechanism": mechanism.name, "modes": modes} | told | expected)
+        return
+    columns = [f"{k + 1} ({hits})" for k, hits in enumerate(found.hits[:_MOST])]
+    rows = [
+        (name, *(f"{q[i]:.6g}" for q in found.q[:_MOST]))
+        for i, name in enumerate(column_names(mechanism.model)[0])
+    ]
+    rows.append(("condition number", *(f"{c:.3g}" for c in found.condition[:_MOST])))
+    if found.hits.size:
+        console.print(common.table_of(rows, "mode (starts)", *columns))
+    if found.hits.size > _MOST:
+        console.print(f"{found.hits.size - _MOST} more: --json prints all")
+    console.print(str(found))
+
+
+def _plain(number: float) -> float | None:
+    return float(number) if np.isfinite(number) else None
+
+
+def _by_joint(model: pin.Model, q: Array) -> dict[str, Any]:
+    """Return a configuration as a description's ``home`` has it."""
+    home = {}
+    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
+        values = q[joint.idx_q : joint.idx_q + joint.nq].tolist()
+        home[name] = values[0] if len(values) == 1 else values
+    return home

@@ -1,0 +1,255 @@
+"""All assembly modes that a search finds: against closed forms, and a platform that has 40."""
+
+from __future__ import annotations
+
+import itertools
+import time
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+
+from rps_pin import ClosedLoopModel, LoopClosure, RPSRobot
+from rps_pin.errors import ClosureError, InputError
+from tests.proofs.common import loaded
+from tests.worst import worst
+
+Array = NDArray[np.float64]
+BARS = {"ground": 1.0, "crank": 0.5, "coupler": 1.2, "rocker": 0.8}
+
+
+def at(*point: float) -> pin.SE3:
+    return pin.SE3(np.eye(3), np.array([*point, 0.0, 0.0, 0.0])[:3])
+
+
+def chain(model: pin.Model, name: str, *bars: float, x: float = 0.0) -> None:
+    """Bars that turn in the x-y plane, from x on; the frame NAME is at the end."""
+    parent, place = 0, x
+    for k, bar in enumerate(bars):
+        parent = model.addJoint(parent, pin.JointModelRZ(), at(place), f"{name}{k}")
+        model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Identity())
+        place = bar
+    model.addFrame(pin.Frame(name, parent, at(place), pin.FrameType.OP_FRAME))
+
+
+def four_bar() -> ClosedLoopModel:
+    model = pin.Model()
+    chain(model, "a", BARS["crank"], BARS["coupler"])
+    chain(model, "b", BARS["rocker"], x=BARS["ground"])
+    return ClosedLoopModel(model, [LoopClosure("a", "b")], ["a0"])
+
+
+def wrapped(x: Array) -> Array:
+    return (x + np.pi) % (2 * np.pi) - np.pi
+
+
+def circles(a: Array, r: float, b: Array, s: float) -> list[Array]:
+    """Where circles of radii r about a and s about b meet."""
+    d = b - a
+    length = float(np.hypot(*d))
+    x = (r * r - s * s + length * length) / (2 * length)
+    e, height = d / length, np.sqrt(r * r - x * x)
+    return [a + x * e + side * height * np.array([-e[1], e[0]]) for side in (1, -1)]
+
+
+def angle(v: Array) -> float:
+    return float(np.arctan2(v[1], v[0]))
+
+
+def same_sets(found: Array, exact: Array) -> float:
+    """The largest distance between two sets of angles, each in the other."""
+    apart = np.abs(wrapped(found[:, None] - exact)).max(axis=2)
+    return worst(np.concatenate([apart.min(axis=0), apart.min(axis=1)]))
+
+
+def test_four_bar_has_the_two_points_where_circles_meet() -> None:
+    mechanism = four_bar()
+    for crank in (-2.0, 0.3, 1.7, 100.0):
+        found = mechanism.assembly_modes([crank])
+        a = BARS["crank"] * np.array([np.cos(crank), np.sin(crank)])
+        pivot = np.array([BARS["ground"], 0.0])
+        points = circles(a, BARS["coupler"], pivot, BARS["rocker"])
+        exact = [[crank, angle(b - a) - crank, angle(b - pivot)] for b in points]
+        assert found.q.shape == (2, 3)
+        assert same_sets(found.q, np.array(exact)) < 1e-12
+        assert (found.q[:, 0] == crank).all()
+        assert worst(np.abs(found.q[:, 1:])) <= np.pi
+        assert (found.stopped, found.outside) == ("settled", 0)
+        assert found.hits.sum() == found.closed
+
+
+def test_five_bar_has_two_by_the_cranks_and_four_by_the_platform_of_its_links() -> None:
+    model = pin.Model()
+    chain(model, "a", 0.6, 0.9)
+    chain(model, "b", 0.6, 0.9, x=0.5)
+    mechanism = ClosedLoopModel(model, [LoopClosure("a", "b")], ["a0", "b0"])
+    assert len(mechanism.assembly_modes([2.0, 1.0]).q) == 2
+    # With the tip on a given point, each leg has its elbow on one side or the other.
+    point = LoopClosure("a", "universe", placement_b=at(0.3, 0.9), name="tip")
+    tip = mechanism.with_closures([point]).with_actuated([])
+    found = tip.assembly_modes(q_guess=[2.0, -1.0, 1.0, 1.0])
+    exact = []
+    for left, right in itertools.product((0, 1), repeat=2):
+        goal, ends = np.array([0.3, 0.9]), []
+        for base, side in ((np.zeros(2), left), (np.array([0.5, 0.0]), right)):
+            elbow = circles(base, 0.6, goal, 0.9)[side]
+            ends += [angle(elbow - base), angle(goal - elbow) - angle(elbow - base)]
+        exact.append(ends)
+    assert found.q.shape == (4, 4)
+    assert same_sets(found.q, np.array(exact)) < 1e-11
+
+
+def test_rps_has_those_of_its_closed_form() -> None:
+    """By the elimination of `RPSRobot`, which shares nothing with the search."""
+    robot = RPSRobot.from_preset("sokolov")
+    mechanism = loaded("rps")
+    lengths = [0.45, 0.47, 0.46]
+    found = mechanism.assembly_modes(lengths, within_limits=False)
+    exact = robot.assembly_modes(lengths)
+    places = np.array([mechanism.frame_placement(q, "platform")[:3, 3] for q in found.q])
+    apart = np.linalg.norm(places[:, None] - exact.position, axis=2)
+    assert len(found.q) == len(exact.angle) >= 8
+    assert worst(np.concatenate([apart.min(axis=0), apart.min(axis=1)])) < 1e-9
+
+
+# Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures (1998).
+BASE = [
+    (0, 0, 0),
+    (1.107915, 0, 0),
+    (0.549094, 0.756063, 0),
+    (0.735077, -0.223935, 0.525991),
+    (0.514188, -0.526063, -0.368418),
+    (0.590473, 0.094733, -0.205018),
+]
+PLATFORM = [
+    (0, 0, 0),
+    (0.542805, 0, 0),
+    (0.956919, -0.528915, 0),
+    (0.665885, -0.353482, 1.402538),
+    (0.478359, 1.158742, 0.107672),
+    (-0.137087, -0.235121, 0.353913),
+]
+LEGS = [1, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071]
+
+
+def dietmaier() -> ClosedLoopModel:
+    """A free platform whose points have given distances from points of the world."""
+    model = pin.Model()
+    body = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "platform")
+    model.appendBodyToJoint(body, pin.Inertia.Random(), pin.SE3.Identity())
+    model.addFrame(pin.Frame("top", body, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    legs = [
+        LoopClosure(
+            "top",
+            "universe",
+            "distance",
+            f"leg {k}",
+            distance=leg,
+            placement_a=at(*PLATFORM[k]),
+            placement_b=at(*BASE[k]),
+        )
+        for k, leg in enumerate(LEGS)
+    ]
+    return ClosedLoopModel(model, legs, [])
+
+
+def test_the_platform_of_dietmaier_has_forty() -> None:
+    mechanism = dietmaier()
+    begin = time.monotonic()
+    found = mechanism.assembly_modes(seconds=60.0)
+    assert time.monotonic() - begin < 60
+    assert len(found.q) == 40
+    assert found.stopped == "settled"
+    assert 40 < found.expected <= 40.5
+    for q in found.q:  # the legs, by the poses alone
+        turn = pin.Quaternion(*q[[6, 3, 4, 5]]).toRotationMatrix()
+        tops = q[:3] + np.array(PLATFORM) @ turn.T
+        np.testing.assert_allclose(np.linalg.norm(tops - BASE, axis=1), LEGS, rtol=0, atol=1e-12)
+    dots = np.abs(found.q[:, 3:] @ found.q[:, 3:].T)
+    near = np.linalg.norm(found.q[:, None, :3] - found.q[:, :3], axis=2) < 1e-4
+    np.fill_diagonal(near, False)
+    assert not (near & (dots > 1 - 1e-8)).any()  # 40 different ones
+    assert (found.q[:, 6] >= 0).all()
+
+
+# What the search is told, and tells -------------------------------------------------------------
+
+
+def test_idle_freedoms_make_no_further_modes() -> None:
+    """A slider-crank whose rod spins between two balls has two modes; spun rods are the same."""
+    model = pin.Model()
+    crank = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "crank")
+    rod = model.addJoint(crank, pin.JointModelSpherical(), at(0.1), "ball")
+    slide = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
+    thin = pin.Inertia(0.1, np.array([0.15, 0.0, 0.0]), np.diag([1e-6, 1e-3, 1e-3]))
+    for joint in (crank, rod, slide):
+        model.appendBodyToJoint(joint, thin, pin.SE3.Identity())
+    model.addFrame(pin.Frame("tip", rod, at(0.3), pin.FrameType.OP_FRAME))
+    model.addFrame(pin.Frame("pin", slide, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    mechanism = ClosedLoopModel(model, [LoopClosure("tip", "pin")], ["crank"])
+    found = mechanism.assembly_modes([0.7])
+    side, height = 0.1 * np.cos(0.7), 0.1 * np.sin(0.7)
+    reach = np.sqrt(0.3**2 - height**2)
+    np.testing.assert_allclose(np.sort(found.q[:, -1]), [side - reach, side + reach], atol=1e-12)
+
+
+def test_values_that_leave_motions_open_are_refused_by_name() -> None:
+    with pytest.raises(InputError, match=r"leave 1 motion\(s\) open, of joints 'a"):
+        four_bar().assembly_modes({})
+
+
+def test_values_that_no_configuration_has() -> None:
+    model = pin.Model()
+    chain(model, "a", 1.5, 0.8)
+    chain(model, "b", 0.9, x=1.0)
+    mechanism = ClosedLoopModel(model, [LoopClosure("a", "b", name="pin")], ["a0"])
+    gap = 2.5 - 0.8 - 0.9  # crank end to pivot, less coupler and rocker
+    with pytest.raises(ClosureError, match=rf"closure 'pin' stays open by {gap:.3g}") as caught:
+        mechanism.assembly_modes([np.pi])
+    assert caught.value.gap == pytest.approx(gap, rel=1e-6)
+
+
+def test_limits_leave_modes_out_and_say_so() -> None:
+    mechanism = four_bar()
+    both = mechanism.assembly_modes([0.3]).q
+    limited = four_bar()
+    limited.model.lowerPositionLimit[2] = -np.pi
+    limited.model.upperPositionLimit[2] = both[:, 2].mean()
+    limited = ClosedLoopModel(limited.model, limited.closures, ["a0"])
+    found = limited.assembly_modes([0.3])
+    assert len(found.q) + found.outside <= 2
+    np.testing.assert_allclose(found.q, [both[np.argmin(both[:, 2])]], rtol=0, atol=1e-12)
+    assert len(limited.assembly_modes([0.3], within_limits=False).q) == 2
+
+
+def test_the_search_repeats_ends_in_time_and_keeps_what_it_has_on_ctrl_c() -> None:
+    mechanism = dietmaier()
+    first, again = (mechanism.assembly_modes(starts=200, seed=3) for _ in range(2))
+    np.testing.assert_array_equal(first.q, again.q)
+    assert (first.starts, first.stopped) == (200, "starts")
+    assert first.expected > len(first.q) + 0.5
+    assert mechanism.assembly_modes(seconds=1e-9).stopped == "time"
+    shares: list[float] = []
+
+    def stop(share: float) -> None:
+        shares.append(share)
+        if len(shares) == 2:
+            raise KeyboardInterrupt
+
+    found = mechanism.assembly_modes(progress=stop)
+    assert found.stopped == "interrupted"
+    assert len(found.q) > 5
+    assert "interrupted" in str(found)
+    assert 0 < shares[0] < 1
+    for wrong in ({"starts": 0}, {"seed": -1}, {"seconds": -1.0}):
+        with pytest.raises(InputError):
+            mechanism.assembly_modes(**wrong)  # type: ignore[arg-type]
+
+
+def test_generated_code_finds_the_same() -> None:
+    pytest.importorskip("casadi")
+    mechanism = four_bar()
+    one, other = mechanism.assembly_modes([0.4]), mechanism.compile().assembly_modes([0.4])
+    np.testing.assert_allclose(one.q, other.q, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(one.hits, other.hits)
