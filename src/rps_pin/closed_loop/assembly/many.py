@@ -7,8 +7,8 @@ closures' Jacobian by the velocities that are not held, all in one unit,
 
 or the same by J' J, whichever is smaller. c falls by a factor of 4 where a step lessens |e|, and
 grows by it where it does not. The last term of mu stands for the rank: redundant rows do no harm,
-and the loops close to about 1e-10. In a rounded file (see `RankRule`) e and J are U_1' e and U_1' J.
-Joint limits do not count.
+and the loops close to about 1e-10. In a rounded file (see `RankRule`), U_1' e and U_1' J take their
+places. Joint limits do not count.
 """
 
 from __future__ import annotations
