@@ -27,7 +27,11 @@ TEXT = FILE.read_text("utf-8")
             "joint 'coupler_joint': parent: no link 'crnak'; did you mean 'crank'?",
         ),
         ('parent link="crank"', 'parent link="x"', "there are: base, crank, coupler"),
-        ('child link="crank"', 'child name="crank"', "joint 'crank_joint': child: no link None"),
+        (
+            'child link="crank"',
+            'child name="crank"',
+            "<child> has no attribute 'name'; it can have: 'link'",
+        ),
         (
             'type="revolute"',
             'type="hinge"',

@@ -79,6 +79,8 @@ DRAKE = {
 ENDS = ("predecessor", "successor")
 OTHERS = {
     "robot/joint": "independent dont_collapse",
+    "robot/joint/joint_properties": "",
+    "robot/link/inertial/inertia": "iyx izx izy",
     "robot/loop": "name type",
     "robot/loop/axis": "xyz",
     **{f"robot/loop/{end}": "link" for end in ENDS},
@@ -329,6 +331,51 @@ def test_unknown_words_are_told_once_with_line_and_count() -> None:
     told = " ".join(parts_from_urdf(text).notes)
     assert "<gravity_off> in <robot> is not read" in told
     assert "<v:w> in <robot> is not read" in told
+
+
+@each(
+    ("right", "wrong", "why"),
+    [
+        ("damping=", "dampening=", "<dynamics> has no attribute 'dampening'; it can have: 'damp"),
+        ("damping=", "viscous_friction=", "<dynamics> has no attribute 'viscous_friction'; it can"),
+        ("velocity=", "velocty_limit=", "<limit> has no attribute 'velocty_limit'; it can have"),
+        ("lower=", "minimum=", "<limit> has no attribute 'minimum'; it can have: 'lower', 'upper'"),
+        ("multiplier=", "ratio=", "<mimic> has no attribute 'ratio'; it can have: 'joint', 'multi"),
+        ('mass value="2"', 'mass value="2" unit="g"', "<mass> has no attribute 'unit'; it can"),
+        ('iyz="0"', 'iyz="0" Iyy_about="com"', "<inertia> has no attribute 'Iyy_about'; it can"),
+        ("axis xyz", "axis direction", "<axis> has no attribute 'direction'; it can have: 'xyz'"),
+        ('rpy="0 0 0.1"', 'euler="0 0 6"', "<origin> has no attribute 'euler'; it can have: 'xyz'"),
+        ('parent link="a"', 'parent link="a" frame="x"', "<parent> has no attribute 'frame'"),
+        ('child link="a"', 'child link="a" offset="1"', "<child> has no attribute 'offset'"),
+        ('type="revolute" ind', 'type="revolute" axis="1 0 0" ind', "<joint> has no attribute 'ax"),
+        ("<dynamics ", "<armature v='1'/><dynamics ", "<joint> has a <armature>; it can have: <or"),
+        ("<mass ", "<density v='1'/><mass ", "<inertial> has a <density>; it can have: <origin>, "),
+        ('ratio value="-2"', 'ratio value="-2" of="3"', "<ratio> has no attribute 'of'; it can"),
+    ],
+)
+def test_unknown_words_are_refused_where_they_bear_on_the_motion(
+    right: str, wrong: str, why: str
+) -> None:
+    assert right in FULL
+    line = FULL[: FULL.index(right)].count("\n") + 1
+    with pytest.raises(MechanismError, match=rf"line {line}: {re.escape(why)}"):
+        parts_from_urdf(FULL.replace(right, wrong, 1))
+
+
+@each(
+    ("right", "wrong", "told"),
+    [
+        ("<dynamics ", '<dynamics D="1" K="7000" mu_coulomb="0" mu_viscous="16" ', "'K' of <dyn"),
+        ("<dynamics ", '<dynamics spring_stiffness="0" ', "'spring_stiffness' of <dynamics>"),
+        ("<axis ", '<axis rpy="0 0 0" ', "the attribute 'rpy' of <axis> is not read"),
+        ("<limit ", '<limit gear_velocity="1" ', "the attribute 'gear_velocity' of <limit>"),
+        ("<dynamics ", '<joint_properties friction="0"/><dynamics ', "of <joint_properties>"),
+        ("<dynamics ", '<v:w xmlns:v="u"/><dynamics ', "<v:w> in <joint> is not read"),
+        ('<link name="b"/>', '<link name="b"><gravity>0</gravity></link>', "<gravity> in <link>"),
+    ],
+)
+def test_words_of_other_programs_are_told(right: str, wrong: str, told: str) -> None:
+    assert told in " ".join(parts_from_urdf(FULL.replace(right, wrong, 1)).notes)
 
 
 @pytest.mark.parametrize("spring", ["linear_bushing_rpy", "linear_spring_damper"])

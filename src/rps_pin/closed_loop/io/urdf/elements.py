@@ -39,12 +39,8 @@ VELOCITIES = dict.fromkeys(SIMPLE, 1) | {
 INERTIAS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _INFINITE = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
-#: Moments of inertia below this, negative, are rounding, kg m^2; and axes below this, zero.
-_ROUNDING = 1e-12
+#: Axes below this are zero.
 _SHORTEST_AXIS = 1e-8
-#: A tensor that no body has is told from this share of its largest moment on, and one with so
-#: negative a moment is refused. (In one file of nine, of real robots too, a tensor is wrong.)
-_TOLD, _INDEFINITE = 1e-2, 0.5
 #: A quaternion's length may differ from 1 by this.
 _UNIT = 1e-3
 
@@ -57,6 +53,25 @@ class Mimic:
     joint: str
     multiplier: float
     offset: float
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """What a link's ``inertial`` says.
+
+    Attributes
+    ----------
+    origin
+        Its element, or None.
+    mass
+        kg.
+    tensor
+        Numbers of the words `INERTIAS`, kg m^2.
+    """
+
+    origin: Any | None
+    mass: float
+    tensor: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -110,6 +125,8 @@ class UrdfFile:
         Its root element.
     links
         Their elements, by name.
+    inertials
+        Of the links that have one, by name; `inertials` fills it.
     joints
         By name, in the file's order.
     frames
@@ -123,6 +140,7 @@ class UrdfFile:
     origin: str
     robot: Any
     links: dict[str, Any] = field(default_factory=dict)
+    inertials: dict[str, Inertial] = field(default_factory=dict)
     joints: dict[str, UrdfJoint] = field(default_factory=dict)
     frames: list[OffsetFrame] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -233,8 +251,6 @@ def read_elements(robot: Any, origin: str) -> UrdfFile:
     file.notes += vocabulary.check_words(robot, origin)
     for element in children(robot, "link"):
         _add(file, file.links, element, element)
-        for inertial in children(element, "inertial"):
-            _check_inertial(file, inertial)
     tags = [tag_of(element) for element in robot.iterchildren("*")]
     if not file.links:
         file.refuse(robot, "<robot> has no link")
@@ -270,36 +286,6 @@ def _declare_world(file: UrdfFile) -> None:
     if named and "world" not in file.links:
         file.links["world"] = etree.SubElement(file.robot, "link", name="world")
         file.note(named[0], "the link 'world' is not in the file; it is the world, as in Drake")
-
-
-def _check_inertial(file: UrdfFile, inertial: Any) -> None:
-    link = f"link {get(inertial.getparent(), 'name')!r}"
-    file.placement(child(inertial, "origin"))
-    mass, inertia = child(inertial, "mass"), child(inertial, "inertia")
-    if mass is None or get(mass, "value") is None:
-        file.refuse(inertial, f"{link}: its inertial has no mass value")
-    if inertia is None:
-        file.refuse(inertial, f"{link}: its inertial has no inertia")
-    missing = [name for name in INERTIAS if get(inertia, name) is None]
-    if missing:
-        file.refuse(inertia, f"{link}: its inertia has no {', '.join(missing)}")
-    if file.number(mass, "value") < 0:
-        file.refuse(mass, f"{link}: mass = {get(mass, 'value')} kg is negative")
-    xx, xy, xz, yy, yz, zz = (file.number(inertia, name) for name in INERTIAS)
-    for name in ("ixx", "iyy", "izz"):
-        if file.number(inertia, name) < -_ROUNDING:
-            value = get(inertia, name)
-            file.refuse(inertia, f"{link}: {name} = {value} kg m^2 is negative")
-    moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    if moments[0] < -_INDEFINITE * moments[2] - _ROUNDING:
-        listed = ", ".join(f"{moment:.4g}" for moment in moments)
-        file.refuse(
-            inertia,
-            f"{link}: its principal moments of inertia are {listed} kg m^2; none can be negative",
-        )
-    if moments[2] - moments[0] - moments[1] > _TOLD * moments[2] + _ROUNDING:
-        name = str(get(inertial.getparent(), "name"))
-        file.remark(inertia, name, "inertias that no body has, used as they are")
 
 
 def _joint(file: UrdfFile, element: Any) -> UrdfJoint:

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 from lxml import etree
 
-from rps_pin.closed_loop.io.urdf.elements import INERTIAS, UrdfFile, UrdfJoint
+from rps_pin.closed_loop.io.urdf.elements import INERTIAS, Inertial, UrdfFile, UrdfJoint
 from rps_pin.closed_loop.io.urdf.vocabulary import child, children, get, tag_of
 from rps_pin.errors import InputError
 
@@ -57,9 +57,8 @@ def normal_form(file: UrdfFile, shapes: Shapes | None = None) -> str:
             _material(file, material, robot)
     for name, element in file.links.items():
         link = etree.SubElement(robot, "link", name=name)
-        inertial = child(element, "inertial")
-        if inertial is not None:
-            _inertial(file, inertial, etree.SubElement(link, "inertial"))
+        if name in file.inertials:
+            _inertial(file, file.inertials[name], etree.SubElement(link, "inertial"))
         if shapes is not None:
             for visual in children(element, "visual"):
                 _visual(file, visual, link, shapes)
@@ -68,11 +67,11 @@ def normal_form(file: UrdfFile, shapes: Shapes | None = None) -> str:
     return str(etree.tostring(robot, encoding="unicode"))
 
 
-def _inertial(file: UrdfFile, element: Any, inertial: Any) -> None:
-    _origin(file, child(element, "origin"), inertial)
-    for tag, names in (("mass", ("value",)), ("inertia", INERTIAS)):
-        given = child(element, tag)
-        etree.SubElement(inertial, tag, {n: _text(file.number(given, n)) for n in names})
+def _inertial(file: UrdfFile, given: Inertial, inertial: Any) -> None:
+    _origin(file, given.origin, inertial)
+    etree.SubElement(inertial, "mass", value=_text(given.mass))
+    tensor = zip(INERTIAS, given.tensor, strict=True)
+    etree.SubElement(inertial, "inertia", {word: _text(value) for word, value in tensor})
 
 
 def _joint(file: UrdfFile, joint: UrdfJoint, robot: Any) -> None:

@@ -21,6 +21,7 @@ from rps_pin.closed_loop.io.urdf.check import check_tree
 from rps_pin.closed_loop.io.urdf.elements import SIMPLE, UrdfFile, UrdfJoint, read_elements
 from rps_pin.closed_loop.io.urdf.extensions import armature_of, look_into_extensions
 from rps_pin.closed_loop.io.urdf.foreign import refuse_other_formats
+from rps_pin.closed_loop.io.urdf.inertials import read_inertials
 from rps_pin.closed_loop.io.urdf.loops import closures_of
 from rps_pin.closed_loop.io.urdf.mimics import couplings_of
 from rps_pin.closed_loop.io.urdf.normal_form import normal_form
@@ -44,6 +45,7 @@ def urdf_file(path_or_xml: str | os.PathLike[str]) -> UrdfFile:
     text, origin = xml_text(path_or_xml, "URDF")
     refuse_other_formats(text, origin)
     file = read_elements(xml_root(text, origin, "URDF"), origin)
+    read_inertials(file)
     check_tree(file)
     look_into_extensions(file)
     return file

@@ -3,14 +3,16 @@
 `WORDS` lists the elements and attributes of urdfdom's schema (versions 1.0 to 1.2), of Drake's,
 URDF+'s, Isaac Sim's and Bullet's extensions, and of urdfdom's proposal of constraints. A word is
 *read*, or *harmless*: it changes neither kinematics nor dynamics (appearance, contact, sensors,
-control), or *refused* with the reason. A word that is near a listed one is taken for a misspelt one
-and refused; any other is told in a note.
+control), or *told*: another program's, which stands in robots' files and is not read, or *refused*
+with the reason. A word that is near a listed one is taken for a misspelt one and refused. So is any
+other in an element that bears on the motion (all but a robot and a link themselves); elsewhere, or
+with another program's prefix, it is told in a note.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -25,7 +27,7 @@ class Word:
 
     Attributes
     ----------
-    read, harmless
+    read, harmless, told
         Its attributes, by what is done with them.
     once
         Whether its parent has at most one of them.
@@ -37,13 +39,14 @@ class Word:
 
     read: tuple[str, ...] = ()
     harmless: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()
     once: bool = False
     is_open: bool = False
     refused: str = ""
 
 
-def _word(read: str = "", harmless: str = "", once: bool = False) -> Word:
-    return Word(tuple(read.split()), tuple(harmless.split()), once)
+def _word(read: str = "", harmless: str = "", once: bool = False, told: str = "") -> Word:
+    return Word(tuple(read.split()), tuple(harmless.split()), tuple(told.split()), once)
 
 
 _POSE = _word("xyz rpy quat_xyzw", once=True)
@@ -52,25 +55,33 @@ _INERTIAL = {
     "": _word(once=True),
     "/origin": _POSE,
     "/mass": _word("value", once=True),
-    "/inertia": _word("ixx ixy ixz iyy iyz izz", once=True),
+    "/inertia": _word("ixx ixy ixz iyy iyz izz iyx izx izy", once=True),
 }
 _JOINT = {
     "": _word("name type", "independent dont_collapse drake_ignore"),
     "/origin": _POSE,
     "/parent": _word("link", once=True),
     "/child": _word("link", once=True),
-    "/axis": _word("xyz", once=True),
+    "/axis": _word("xyz", once=True, told="rpy"),
     "/limit": _word(
         "lower upper effort velocity",
         "acceleration deceleration jerk drake:acceleration",
         once=True,
+        told="command_effort gear_velocity current",  # ANYmal's
     ),
-    "/dynamics": _word("damping friction", "coulomb_window", once=True),
+    "/dynamics": _word(
+        "damping friction",
+        "coulomb_window",
+        once=True,
+        told="D K mu_coulomb mu_viscous spring_reference spring_stiffness",  # Franka's, Stretch's
+    ),
     "/mimic": _word("joint multiplier offset", once=True),
     "/actuator": _OPEN,
     "/safety_controller": _OPEN,
     "/calibration": _OPEN,
 }
+#: Elements that may have unknown words: others bear on the motion.
+_NOTED = ("robot", "robot/link")
 _FORCE = "is a spring between two links, which is not modelled; remove it, or give it as wrenches"
 
 
@@ -97,6 +108,7 @@ WORDS: dict[str, Word] = {
     "robot/link/collision_checking": _OPEN,
     "robot/link/self_collision_checking": _OPEN,
     **_below("robot/joint", _JOINT),
+    "robot/joint/joint_properties": _word(told="damping friction"),  # of a converter to Collada
     "robot/frame": _word("name link xyz rpy quat_xyzw"),
     "robot/fixed_frame": _word("name"),
     "robot/fixed_frame/parent": _word("link", once=True),
@@ -179,55 +191,87 @@ def refuse(element: Any, origin: str, why: str) -> NoReturn:
 
 
 def check_words(robot: Any, origin: str) -> list[str]:
-    """Refuse misspelt, doubled and impossible words; return a note on each unknown one.
+    """Refuse misspelt, unknown, doubled and impossible words; return a note on each one not read.
 
     Raises
     ------
     MechanismError
         With the line.
     """
-    unknown: Counter[str] = Counter()
+    unread: Counter[str] = Counter()
     lines: dict[str, int] = {}
+    repeated: list[str] = []
 
     def note(words: str, element: Any) -> None:
-        unknown[words] += 1
+        unread[words] += 1
         lines[words] = min(lines.get(words, element.sourceline), element.sourceline)
 
     todo = [(robot, "robot")]
     while todo:
         element, path = todo.pop()
-        word = WORDS[path]
+        tag, word = tag_of(element), WORDS[path]
         if word.refused:
-            refuse(element, origin, f"<{tag_of(element)}> {word.refused}")
+            refuse(element, origin, f"<{tag}> {word.refused}")
         if word.is_open:
             continue
-        tag, attributes = tag_of(element), (*word.read, *word.harmless)
+        attributes = (*word.read, *word.harmless)
         for name in (_plain(name, element) for name in element.attrib):
             if name in attributes:
                 continue
-            if meant := misspelt(name, attributes):
-                why = f"<{tag}> has no attribute {name!r}; did you mean {meant!r}?"
-                refuse(element, origin, why)
+            why = "" if name in word.told else _objection(path, name, attributes, "{!r}")
+            if why:
+                refuse(element, origin, f"<{tag}> has no attribute {name!r}; {why}")
             note(f"the attribute {name!r} of <{tag}>", element)
-        seen: set[str] = set()
+        seen: dict[str, Any] = {}
         for inner in element.iterchildren("*"):
             below, inner_tag = f"{path}/{tag_of(inner)}", tag_of(inner)
             if below not in WORDS:
                 known = [one.rpartition("/")[2] for one in WORDS if one.rpartition("/")[0] == path]
-                if meant := misspelt(inner_tag, known):
-                    why = f"<{tag}> has a <{inner_tag}>; did you mean <{meant}>?"
-                    refuse(inner, origin, why)
+                if why := _objection(path, inner_tag, known, "<{}>"):
+                    refuse(inner, origin, f"<{tag}> has a <{inner_tag}>; {why}")
                 note(f"<{inner_tag}> in <{tag}>", inner)
                 continue
-            if WORDS[below].once and below in seen:
-                refuse(inner, origin, f"<{tag}> has a second <{inner_tag}>")
-            seen.add(below)
+            first = seen.setdefault(below, inner)
+            if WORDS[below].once and first is not inner:
+                if not _alike(first, inner):
+                    why = f"which differs from the first (line {first.sourceline})"
+                    refuse(inner, origin, f"<{tag}> has a second <{inner_tag}>, {why}")
+                why = f"<{tag}> repeats its <{inner_tag}> of line {first.sourceline}"
+                repeated.append(f"{origin}, line {inner.sourceline}: {why}, which counts once")
+                continue
             todo.append((inner, below))
-    return [
+    return repeated + [
         f"{origin}, line {lines[words]}: {words} is not read"
         + (f" (nor are {count - 1} more)" if count > 1 else "")
-        for words, count in unknown.items()
+        for words, count in unread.items()
     ]
+
+
+def _objection(path: str, word: str, known: Sequence[str], shown: str = "{}") -> str:
+    """Return why an element at a path cannot have a word that is not known; empty if it can."""
+    if meant := misspelt(word, known):
+        return f"did you mean {shown.format(meant)}?"
+    foreign = ":" in word and not word.startswith("drake:")
+    if path in _NOTED or foreign:
+        return ""
+    return f"it can have: {', '.join(map(shown.format, known)) or 'none'}"
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Return whether two elements say the same: attributes, their numbers, and what is inside."""
+    if tag_of(one) != tag_of(other) or set(one.attrib) != set(other.attrib):
+        return False
+    if any(_value(text) != _value(other.attrib[name]) for name, text in one.attrib.items()):
+        return False
+    inside, others = list(one.iterchildren("*")), list(other.iterchildren("*"))
+    return len(inside) == len(others) and all(map(_alike, inside, others))
+
+
+def _value(text: str) -> list[float] | str:
+    try:
+        return [float(part) for part in text.split()]
+    except ValueError:
+        return text
 
 
 def misspelt(word: str, known: Iterable[str]) -> str | None:
