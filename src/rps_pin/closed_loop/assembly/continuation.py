@@ -135,6 +135,9 @@ class Path:
         """Follow the path to its end, or to a singularity."""
         limit = self.system.max_condition
         point = _Point(self, self._start)
+        if self.system.rule.rank is not None:  # closed along U_1 of J, not quite along that of A
+            self._closed(point, last=True)
+            point = _Point(self, point.q)
         size, done, share = point.rank, 0.0, 1.0
         if not point.condition <= limit:
             return Followed(point.q, 0.0, point.condition, True)

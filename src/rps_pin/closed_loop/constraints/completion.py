@@ -218,13 +218,16 @@ class CompletedFactorisation:
         else:
             gram = motion.T @ (self._weights_d[:, None] * motion) + self._weights_open
         of_dependent = force.take(self._dependent)
-        along = dgemv(-1.0, motion, of_dependent, 1.0, force.take(self._open), trans=1)
+        along = force.take(self._open)
+        if motion.size:  # BLAS takes no empty ones
+            along = dgemv(-1.0, motion, of_dependent, 1.0, along, trans=1)
         if along.size == 1:  # several times as fast
             z, failed = along / gram[0, 0], 0
         else:
             _, z, failed = dposv(gram, along)
         lacking[self._open] = z
-        lacking[self._dependent] = dgemv(-1.0, motion, z)
+        if motion.size:
+            lacking[self._dependent] = dgemv(-1.0, motion, z)
         lacking *= self._weights
         return not failed
 

@@ -11,7 +11,7 @@ import copy
 import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -235,7 +235,8 @@ class CompiledMechanism:
         By the Pinocchio engine where the actuated joints leave motions open, or are more.
         """
         if self._is_actuated:
-            return each(condition_number, self.passive_jacobian(q, **options), float)
+            condition = partial(condition_number, tolerance=self.mechanism.system.rule.tolerance)
+            return each(condition, self.passive_jacobian(q, **options), float)
         found = self._by_samples(lambda m, q: (m.condition(q),), (q,), [()], **options)[0]
         return found if np.ndim(found) else float(found)
 

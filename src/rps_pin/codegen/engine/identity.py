@@ -43,7 +43,7 @@ def _contents(system: ConstraintSystem) -> Iterator[object]:
     for frame in model.frames:
         yield from (frame.name, frame.parentJoint, frame.placement.homogeneous)
     yield from system.equations.closures
-    yield system.equations.length
+    yield from (system.equations.length, system.rule)
     if effects is not None:
         yield from (effects.damping, effects.friction, effects.stiffness, effects.rest)
         yield effects.friction_speed

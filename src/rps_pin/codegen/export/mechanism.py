@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from rps_pin.closed_loop.constraints.equations import OPEN
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen.export import words
 from rps_pin.codegen.export.cases import UNCHECKED, Cases
@@ -199,7 +198,7 @@ def _orders(mechanism: ClosedLoopModel, x: MechanismExpressions) -> list[Order]:
 
 def _notes(mechanism: ClosedLoopModel, x: MechanismExpressions, real: str) -> list[str]:
     gravity = ", ".join(f"{number:g}" for number in mechanism.model.gravity.linear)
-    length = mechanism.characteristic_length
+    length, limit = mechanism.characteristic_length, mechanism.system.equations.open_limit
     error = float(np.sqrt(LIMITS[real])) * GROWTH * _EPSILONS[real]
     notes = [
         "Gravity is among the parameters."
@@ -207,7 +206,7 @@ def _notes(mechanism: ClosedLoopModel, x: MechanismExpressions, real: str) -> li
         else f"Gravity is ({gravity}) m/s^2 in world axes.",
         "World axes are those of the mechanism's root. The closures' forces act on the mechanism "
         "as J' multipliers.",
-        f"The loops count as open beyond a gap of {OPEN * length:.3g} m ({OPEN:g} of the "
+        f"The loops count as open beyond a gap of {limit:.3g} m ({limit / length:.3g} of the "
         f"characteristic length, {length:.6g} m), and a configuration as nearly singular where "
         f"rounding errors may grow to about {error:.0g}, relative.",
     ]

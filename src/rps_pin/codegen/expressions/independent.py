@@ -17,7 +17,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from rps_pin.arrays import Array, Bools, Indices
-from rps_pin.closed_loop.assembly.closing import close_gaps, closed_gap
+from rps_pin.closed_loop.assembly.closing import close_gaps, closed_gap, is_closed
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.numerics.linear_algebra import (
@@ -128,7 +128,7 @@ def _around(system: ConstraintSystem, q: Array, rng: np.random.Generator) -> lis
 def _regular(system: ConstraintSystem, places: list[Array]) -> Array:
     """Return the least singular value over the largest of J, or 0 where it is not regular."""
     values = [_values(system.scaled(system.equations.jacobian(q))) for q in places]
-    ranks = np.array([rank(one) for one in values])
+    ranks = np.array([rank(one, system.rule.tolerance) for one in values])
     best = int(ranks.max(initial=0))
     least = np.array([one[best - 1] / one[0] if best else 1.0 for one in values])
     least[ranks < best] = 0.0
@@ -153,10 +153,13 @@ def _moved(system: ConstraintSystem, q: Array, length: float, direction: Array) 
 
 
 def _closed(system: ConstraintSystem, q: Array) -> Array | None:
-    """Return a closed configuration near q by Newton's steps of least norm, or damped ones."""
+    """Return a closed configuration near q by Newton's steps of least norm, or damped ones.
+
+    Of a rounded file by damped ones, which leave out the nearly redundant rows.
+    """
     equations, tolerance = system.equations, closed_gap(system)
     start, first = q, np.inf
-    for _ in range(10):
+    for _ in range(10 if system.rule.rank is None else 0):
         gaps = equations.gaps(q)
         largest = equations.largest_gap(gaps)
         if largest <= tolerance:
@@ -168,7 +171,7 @@ def _closed(system: ConstraintSystem, q: Array) -> Array | None:
         step = _solution(jacobian, None, -system.row_scale * gaps)
         q = pin.integrate(system.model, q, system.column_scale * step)
     q = close_gaps(system, start, np.zeros(system.model.nv, dtype=bool), False, iterations=30)
-    return q if equations.largest_gap(equations.gaps(q)) <= tolerance else None
+    return q if is_closed(system, q) else None
 
 
 def _solution(jacobian: Array, near: Array | None, right: Array | None) -> Array:
@@ -250,7 +253,7 @@ def choose(system: ConstraintSystem, jacobians: Array, pattern: Bools | None = N
     if pattern is not None and pattern.shape != (rows, columns):
         raise InputError(f"the pattern has the shape ({rows}, {columns}), not {pattern.shape}")
     jacobians, idle = _without_noise(jacobians, pattern)
-    ranks = {rank(_values(jacobian)) for jacobian in jacobians}
+    ranks = {rank(_values(jacobian), system.rule.tolerance) for jacobian in jacobians}
     if len(ranks) > 1:
         raise MechanismError(
             f"the closures' Jacobian has rank {min(ranks)} at some samples and {max(ranks)} at "
@@ -298,7 +301,7 @@ def choose_shared(system: ConstraintSystem, jacobians: Array) -> Partition:
         As for `choose`.
     """
     jacobians, idle = _without_noise(jacobians, None)
-    found = rank(singular_values(jacobians[0]))
+    found = rank(singular_values(jacobians[0]), system.rule.tolerance)
     moved = np.abs(jacobians).max(axis=0) > RANK_TOLERANCE
     closures = [system.equations.rows(closure.name) for closure in system.equations.closures]
     shared = np.sum([moved[rows].any(axis=0) for rows in closures], axis=0)
@@ -325,7 +328,7 @@ def choose_shared(system: ConstraintSystem, jacobians: Array) -> Partition:
 def _actuated_rank(system: ConstraintSystem, jacobians: Array, found: int) -> int:
     """Return the largest rank of the actuators' part in the motions, J's rank being known."""
     motions = (_motions(jacobian, found)[system.actuated] for jacobian in jacobians)
-    return max(rank(singular_values(one)) for one in motions)
+    return max(rank(singular_values(one), system.rule.tolerance) for one in motions)
 
 
 def _first(shared: Array, least: Array) -> int:

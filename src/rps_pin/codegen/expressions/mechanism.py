@@ -24,7 +24,6 @@ import casadi as ca
 import numpy as np
 
 from rps_pin.arrays import Array, Indices
-from rps_pin.closed_loop.constraints.equations import OPEN
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
 from rps_pin.codegen.expressions.closures import ClosureRows, closure_rows
@@ -108,7 +107,7 @@ class MechanismExpressions:
         self._single = single
         #: Opening rate that `acceleration` accepts, relative to the speed; in double precision as
         #: `kinematics` does.
-        self.consistent = 1e-4 if single else 1e-8
+        self.consistent = max(1e-4, system.rule.consistent) if single else system.rule.consistent
         self.parameters = Parameters(system, parameters)
         self.tree = tree = Tree(self.parameters.model, self.parameters)
         self.rows: ClosureRows = closure_rows(tree, system.equations)
@@ -183,16 +182,25 @@ class MechanismExpressions:
 
     @cached_property
     def opening(self) -> Expression:
-        """Sum of the squared gaps, over that of `OPEN`."""
+        """Sum of the squared gaps, over that of an open configuration."""
         if self._single:  # whose rounding errors are larger than the squares that `rows` sums
-            return self.squared_gap / OPEN**2
-        return self.rows.opening / (OPEN * self.system.equations.length) ** 2
+            return self._squared(self.rows.gap) / self.system.equations.open_limit**2
+        return self.rows.opening / self.system.equations.open_limit**2
 
     @cached_property
     def squared_gap(self) -> Expression:
-        """Sum of the squared gaps, over the squared characteristic length; exact for small gaps."""
-        gaps = ca.DM(self.system.row_scale) * ca.densify(self.rows.gap)
-        return ca.sumsqr(gaps) / self.system.equations.length**2
+        """Sum of the squared gaps, over the squared characteristic length; exact for small gaps.
+
+        Of a rounded file (see `RankRule`) of those that can be closed, J_d J_d^+ e.
+        """
+        gap = self.rows.gap
+        if self.system.rule.rank is not None and self.partition.dependent.size:
+            gap = self.jacobian[:, self.partition.dependent.tolist()] @ self.factors.solve(gap)
+        return self._squared(gap) / self.system.equations.length**2
+
+    def _squared(self, gap: Expression) -> Expression:
+        """Return the sum of the squares of gaps (nc,), m^2."""
+        return ca.sumsqr(ca.DM(self.system.row_scale) * ca.densify(gap))
 
     @property
     def check(self) -> Expression:
