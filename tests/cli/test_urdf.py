@@ -10,6 +10,7 @@ import pytest
 from tests.cli.commands import rps_pin
 from tests.closed_loop.io.urdf.test_packages import stl
 from tests.closed_loop.io.urdf.texts import joint, link, robot
+from tests.closed_loop.test_rounded_files import FIVE_BAR
 
 EFFORT = 'effort="1" velocity="20"'
 FOUR_BAR = robot(
@@ -53,6 +54,23 @@ def test_limits_without_numbers_bound_nothing(tmp_path: Path) -> None:
     assert found["mobility"] == 1
     assert [one["lower"] for one in found["joints"]] == [[None]] * 3
     assert "'motor' (line 1), 'elbow' (line 1), 'swing' (line 1)" in found["notes"][0]
+
+
+@pytest.mark.filterwarnings("default::rps_pin.errors.AccuracyWarning")
+def test_accuracy_of_the_file_can_be_set(tmp_path: Path) -> None:
+    (tmp_path / "m.xml").write_text(FIVE_BAR.format(turn="1.5708"))
+    run = rps_pin("describe", "m.xml", "--json", folder=tmp_path)
+    assert json.loads(run.stdout)["mobility"] == 2
+    assert run.stderr.startswith("note: five_bar: the file's numbers are rounded, closure 'foot' (")
+    assert "Warning" not in run.stderr
+    run = rps_pin("describe", "m.xml", "--json", "--accuracy", "0", folder=tmp_path)
+    assert json.loads(run.stdout)["mobility"] == 1
+    (tmp_path / "m.yaml").write_text("mjcf: m.xml\naccuracy: 0\n")
+    run = rps_pin("describe", "m.yaml", "--json", folder=tmp_path)
+    assert json.loads(run.stdout)["mobility"] == 1
+    run = rps_pin("describe", "m.yaml", "--json", "--accuracy", "1e-4", folder=tmp_path)
+    assert json.loads(run.stdout)["mobility"] == 2
+    assert rps_pin("describe", "m.yaml", "--accuracy", "-1", folder=tmp_path).returncode == 2
 
 
 def test_limits_can_be_ignored(tmp_path: Path) -> None:

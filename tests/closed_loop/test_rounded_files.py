@@ -9,10 +9,13 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from rps_pin import ClosedLoopModel, LoopClosure
+from rps_pin.arrays import Array
 from rps_pin.errors import AccuracyWarning, ClosureError
+from tests.closed_loop.random_mechanisms import Case, case
 from tests.worst import worst
 
 #: A plane five-bar; its hinges are turned by `turn`.
@@ -238,3 +241,54 @@ def test_accuracy_is_the_user_s() -> None:
         _ = four_bar("revolute", aside=0.02).home
     with pytest.warns(AccuracyWarning, match=r"open by 0\.02 m"):
         _ = four_bar("revolute", aside=0.02, accuracy=0.03).home
+
+
+def moved(placement: pin.SE3, size: float, length: float, rng: np.random.Generator) -> pin.SE3:
+    def error() -> Array:
+        return size * rng.uniform(-1.0, 1.0, 3)
+
+    turned = placement.rotation @ pin.exp3(error())
+    return pin.SE3(turned, placement.translation + length * error())
+
+
+def as_a_file_has_it(c: Case, size: float) -> ClosedLoopModel:
+    """The mechanism with all placements of joints and frames off by random errors."""
+    rng, model = np.random.default_rng(0), c.mechanism.model.copy()
+    length = c.mechanism.characteristic_length
+    for i in range(1, model.njoints):
+        model.jointPlacements[i] = moved(model.jointPlacements[i], size, length, rng)
+    for frame in model.frames:
+        if frame.type != pin.FrameType.JOINT:
+            frame.placement = moved(frame.placement, size, length, rng)
+    effects, actuated = c.mechanism.effects, c.mechanism.actuated
+    return ClosedLoopModel(model, c.mechanism.closures, actuated, home=c.q, effects=effects)
+
+
+@pytest.mark.filterwarnings("ignore::rps_pin.errors.AccuracyWarning")
+@pytest.mark.parametrize("size", [1e-6, 1e-5])
+@pytest.mark.parametrize("planar", [True, False])
+def test_random_mechanisms_with_random_errors(planar: bool, size: float) -> None:
+    """Motions, and the forces of one, as those of the exact mechanism (of tests/random_mechanisms).
+
+    Most plane ones have redundant rows, which are not redundant any more.
+    """
+    rounded = 0
+    for seed in range(16):
+        c = case(seed, planar=planar)
+        exact, found = c.mechanism, as_a_file_has_it(c, size)
+        described = found.describe()
+        rounded += described.rounding is not None
+        assert described.mobility == exact.describe().mobility, seed
+        given = exact.actuated_indices
+        v = found.velocity(found.home, c.v[given])
+        a = found.acceleration(found.home, v, c.a[given])
+        forces, wanted = (
+            found.inverse_dynamics(found.home, v, a),
+            exact.inverse_dynamics(c.q, c.v, c.a),
+        )
+        error = worst(forces.tau - wanted.tau) / max(1.0, worst(wanted.tau))
+        assert error < 300 * size * wanted.condition, seed
+        assert worst(found.forward_dynamics(found.home, v, forces.tau) - a) < 1e-7 * max(
+            1.0, worst(a)
+        )
+    assert rounded > 8 or not planar

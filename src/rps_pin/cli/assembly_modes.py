@@ -36,6 +36,7 @@ def assembly_modes_command(
     seconds: Annotated[float, typer.Option(help="Longest time, s.")] = 60.0,
     seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 0,
     ignore_limits: options.IgnoreLimitsOption = False,
+    accuracy: options.AccuracyOption = None,
     as_json: common.JsonOption = False,
 ) -> None:
     """Search all closed configurations of a mechanism with given joint values.
@@ -52,7 +53,7 @@ def assembly_modes_command(
 
     - `rps-pin assembly-modes stewart --frame platform --ignore-limits`
     """
-    mechanism, _ = options.load_mechanism(file, ignore_limits)
+    mechanism, _ = options.load_mechanism(file, ignore_limits, accuracy)
     console = common.text_console(as_json, soft_wrap=True)
     with common.share_bar(console, "searching") as progress:
         found = mechanism.assembly_modes(

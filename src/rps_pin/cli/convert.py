@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from rps_pin.cli.mechanism_options import (
+    AccuracyOption,
     FileArgument,
     IgnoreLimitsOption,
     PackagePathOption,
@@ -58,6 +59,7 @@ def convert_command(
     ] = False,
     package_path: PackagePathOption = None,
     ignore_limits: IgnoreLimitsOption = False,
+    accuracy: AccuracyOption = None,
 ) -> None:
     """Write any mechanism for other programs, exactly: closures, joints, inertias, losses, home.
 
@@ -72,7 +74,7 @@ def convert_command(
 
     - `rps-pin convert robot.xml --to urdf -o out` writes *out/robot.urdf* and *out/robot.yaml*
     """
-    mechanism, found = load_mechanism(file, ignore_limits)
+    mechanism, found = load_mechanism(file, ignore_limits, accuracy)
     stem = file.resolve().name if file.is_dir() else found.stem
     output.mkdir(parents=True, exist_ok=True)
     targets = [output / f"{stem}{suffix}" for suffix in _SUFFIXES[to]]

@@ -7,11 +7,19 @@ import json
 import typer
 
 from rps_pin.cli.console import JsonOption
-from rps_pin.cli.mechanism_options import FileArgument, IgnoreLimitsOption, load_mechanism
+from rps_pin.cli.mechanism_options import (
+    AccuracyOption,
+    FileArgument,
+    IgnoreLimitsOption,
+    load_mechanism,
+)
 
 
 def describe_command(
-    file: FileArgument, ignore_limits: IgnoreLimitsOption = False, as_json: JsonOption = False
+    file: FileArgument,
+    ignore_limits: IgnoreLimitsOption = False,
+    accuracy: AccuracyOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Describe any mechanism: joints, closures, rank, mobility, and whether its actuators suffice.
 
@@ -23,7 +31,7 @@ def describe_command(
 
     - `rps-pin describe robot.xml --json` of a MuJoCo file
     """
-    description = load_mechanism(file, ignore_limits)[0].describe()
+    description = load_mechanism(file, ignore_limits, accuracy)[0].describe()
     if as_json:
         typer.echo(json.dumps(description.as_dict(), indent=2, allow_nan=False))
     else:

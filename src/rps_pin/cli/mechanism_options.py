@@ -46,6 +46,15 @@ IgnoreLimitsOption = Annotated[
     bool,
     typer.Option("--ignore-limits", help="Ignore the position limits of the joints."),
 ]
+AccuracyOption = Annotated[
+    float | None,
+    typer.Option(
+        min=0.0,
+        help="Largest error of the file's numbers, in characteristic lengths and rad: rows of the "
+        "closures that are redundant but for such errors count as redundant. 0: the numbers are "
+        "exact. Default: as the file says, or found out, at most 0.001.",
+    ),
+]
 PackagePathOption = Annotated[
     list[Path] | None,
     typer.Option(
@@ -56,7 +65,9 @@ PackagePathOption = Annotated[
 ]
 
 
-def load_mechanism(file: Path, ignore_limits: bool = False) -> tuple[ClosedLoopModel, Path]:
+def load_mechanism(
+    file: Path, ignore_limits: bool = False, accuracy: float | None = None
+) -> tuple[ClosedLoopModel, Path]:
     """Return the mechanism of a file, told by its suffix, or of a name; and its file.
 
     Of a URDF nothing is driven, and only the loops that it states itself are closed. A folder is
@@ -81,11 +92,14 @@ def load_mechanism(file: Path, ignore_limits: bool = False) -> tuple[ClosedLoopM
     suffix = file.suffix.lower()
     within_limits = False if ignore_limits else None
     if suffix in (".yaml", ".yml"):
-        return ClosedLoopModel.load(file, within_limits=within_limits), file
+        return ClosedLoopModel.load(file, within_limits=within_limits, accuracy=accuracy), file
     if suffix == ".xml":
-        return ClosedLoopModel.from_mjcf(file, within_limits=not ignore_limits), file
+        limits = not ignore_limits
+        return ClosedLoopModel.from_mjcf(file, within_limits=limits, accuracy=accuracy), file
     if suffix == ".urdf":
-        mechanism = ClosedLoopModel.from_urdf(file, [], [], within_limits=not ignore_limits)
+        mechanism = ClosedLoopModel.from_urdf(
+            file, [], [], within_limits=not ignore_limits, accuracy=accuracy
+        )
         mechanism.notes += (_OF_URDF.format(name=file.name),)
         return mechanism, file
     raise InputError(

@@ -64,6 +64,7 @@ def simulate_command(
         ),
     ] = False,
     ignore_limits: options.IgnoreLimitsOption = False,
+    accuracy: options.AccuracyOption = None,
     package_path: options.PackagePathOption = None,
     output: common.NamedFolderOption = None,
     layers: LayersOption = None,
@@ -85,7 +86,7 @@ def simulate_command(
     """
     from rps_pin.closed_loop.simulation.simulate import simulate
 
-    mechanism, file = options.load_mechanism(file, ignore_limits)
+    mechanism, file = options.load_mechanism(file, ignore_limits, accuracy)
     q = mechanism.close(mechanism.home)
     if start:
         q = mechanism.complete(options.by_joint(start, "--start"), q)

@@ -15,6 +15,7 @@ from rps_pin.cli import helix_options as helix
 from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.cli.layer_options import LayersOption, SizeOption, chosen_layers, chosen_size
 from rps_pin.cli.mechanism_options import (
+    AccuracyOption,
     IgnoreLimitsOption,
     PackagePathOption,
     load_mechanism,
@@ -65,6 +66,7 @@ def view_command(
         ),
     ] = None,
     ignore_limits: IgnoreLimitsOption = False,
+    accuracy: AccuracyOption = None,
     package_path: PackagePathOption = None,
     port: Annotated[
         int | None, typer.Option(help="Port of the server; default: a free one.")
@@ -89,7 +91,7 @@ def view_command(
     if pose is not None:
         common.doubt_pose("--pose", pose)
     if interactive:
-        loaded = None if mechanism is None else load_mechanism(mechanism, ignore_limits)
+        loaded = None if mechanism is None else load_mechanism(mechanism, ignore_limits, accuracy)
         _interact(robot, pose, loaded, package_path, port, layers)
         return
     if mechanism is not None:

@@ -219,7 +219,11 @@ class ClosedLoopModel:
 
     @classmethod
     def load(
-        cls, path: str | os.PathLike[str], *, within_limits: bool | None = None
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        within_limits: bool | None = None,
+        accuracy: float | None = None,
     ) -> ClosedLoopModel:
         """Build a mechanism from its description, a YAML file; see `description`.
 
@@ -232,6 +236,8 @@ class ClosedLoopModel:
             The file.
         within_limits
             Whether position limits count; left out, as the file says, or else they do.
+        accuracy
+            As for the class; left out, as the file says.
 
         Raises
         ------
@@ -240,7 +246,8 @@ class ClosedLoopModel:
         ClosureError
             If the loops do not close from there; says by how much, and which.
         """
-        return cls._from_parts(parts_from_yaml(path, within_limits))
+        parts = parts_from_yaml(path, within_limits)
+        return cls._from_parts(parts if accuracy is None else replace(parts, accuracy=accuracy))
 
     @classmethod
     def from_gepetto(
