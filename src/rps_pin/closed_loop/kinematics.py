@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from rps_pin.arrays import Array, Indices
-from rps_pin.closed_loop.constraints.system import ConstraintSystem
+from rps_pin.closed_loop.constraints.system import MAX_CONDITION, ConstraintSystem
 from rps_pin.closed_loop.freedoms import Rest, in_words, of_actuators, open_motions, rest_of
 from rps_pin.errors import ClosureError, SingularityError
 from rps_pin.numerics import linear_algebra
@@ -29,13 +29,19 @@ def motion_basis(system: ConstraintSystem, q: Array, chosen: Indices) -> Array:
         solved = system.factorisation.passive_motion(jacobian, jacobian.take(chosen, axis=1))
         if solved is not None:
             return actuated_basis(system, solved)
-    motions = allowed_motions(system, jacobian)
+    factors = system.decomposed(jacobian)
+    motions = system.column_scale[:, None] * factors.null_space()
     of_chosen = motions[chosen]
     if of_chosen.shape[0] < of_chosen.shape[1]:
         return _basis_without_idle(system, q, jacobian, chosen, _named(*of_chosen.shape))
     if of_chosen.shape[0] != of_chosen.shape[1]:
         reason = _named(*of_chosen.shape)
         raise SingularityError(reason, np.inf, system.max_condition)
+    if factors.rank:
+        condition = float(factors.values[0] / factors.values[factors.rank - 1])
+        limit = max(system.max_condition, MAX_CONDITION)
+        reason = "the closures are nearly singular here"
+        linear_algebra.refuse_condition(condition, limit, reason)
     # N is orthonormal in one unit: joints that take part in all motions have a block of size 1.
     scale = system.column_scale[chosen]
     reason = "these joints do not determine the motion here"
