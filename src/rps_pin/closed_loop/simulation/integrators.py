@@ -23,6 +23,8 @@ Acceleration = Callable[[float, Array, Array], Array]
 RK4_WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 #: Of the work among the entries of an adaptive step.
 _SCALE = 1e-100
+#: Motions and speeds of an adaptive step that are none: it is too long.
+_FAR = 1e12
 
 
 def rk4_step(
@@ -111,14 +113,17 @@ class AdaptiveStepper:
         Raises
         ------
         SingularityError
-            If no step is short enough for the tolerance.
+            If no step is short enough for the tolerance, or to stay off a singularity.
         """
         model, nv = self._model, self._model.nv
         start, v_start = state
+        met: list[SingularityError] = []
 
         def slope(time: float, y: Array) -> Array:
             u, v = y[:nv], y[nv:-1]
-            rate = np.empty(y.size)
+            rate = np.full(y.size, np.nan)
+            if not np.abs(y).max() < _FAR:
+                return rate
             rate[:nv], rate[nv:-1] = v, acceleration(time, pin.integrate(model, start, u), v)
             rate[-1] = _SCALE * power()
             if not self._flat:
@@ -126,11 +131,23 @@ class AdaptiveStepper:
                 rate[:nv] = np.linalg.solve(chart, v)
             return rate
 
+        def tried(time: float, y: Array) -> Array:
+            """Return the slope, or NaN where a step is too long to have one: it is shortened."""
+            try:
+                return slope(time, y)
+            except np.linalg.LinAlgError:
+                pass
+            except SingularityError as error:
+                if not y[:nv].any():  # where it stands
+                    raise
+                met.append(error)
+            return np.full(y.size, np.nan)
+
         # The work is scaled so that its error counts for nothing; DOP853 takes the root mean square
         # of all errors, which one more entry does not change then.
         tolerance = self._tolerance * math.sqrt(2 * nv / (2 * nv + 1))
         solver = DOP853(
-            slope,
+            tried,
             t,
             np.concatenate([np.zeros(nv), v_start, [0.0]]),
             until,
@@ -140,6 +157,8 @@ class AdaptiveStepper:
         )
         message = solver.step()
         if solver.status == "failed":
+            if met:
+                raise met[-1]
             raise SingularityError(f"no step is short enough: {message}", np.inf, np.inf)
         if solver.h_abs >= self._next or solver.t < until:
             self._next = solver.h_abs  # one cut short by `until` does not tell about the next
