@@ -31,7 +31,7 @@ from scipy.linalg.lapack import dposv
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.factorisation import HUGE, Factors, PassiveFactorisation
 from rps_pin.closed_loop.constraints.least_squares import PassiveLeastSquares
-from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, Decomposition, rank, singular_values
+from rps_pin.numerics.linear_algebra import Decomposition, rank, singular_values
 
 #: Part of the force that the actuators may leave, relative to it, before there is a residual force.
 RESIDUAL = 1e-9
@@ -234,7 +234,7 @@ class CompletedFactorisation:
     def _at_rest(self, rates: Array) -> bool:
         """Return whether the actuators b stand still in the motions that leave a at rest."""
         rates = rates * (self._scale[self._open] / self._scale[self._b][:, None])
-        return bool(np.abs(rates).max() <= RANK_TOLERANCE)
+        return bool(np.abs(rates).max() <= self._factorisation.scales.tolerance)
 
     def _of_others(
         self, factors: Factors, jacobian: Array, rest: Array, of_dependent: Array
