@@ -169,6 +169,21 @@ def test_every_call_takes_a_rounded_mechanism(kind: str) -> None:
         assert worst(rounded - exact) < 1e-4 * max(1.0, float(np.abs(exact).max()))
 
 
+@pytest.mark.filterwarnings("ignore::rps_pin.errors.AccuracyWarning")
+@pytest.mark.parametrize("turn", [repr(np.pi / 2), "1.5708"])
+def test_rows_that_no_joint_moves(turn: str) -> None:
+    """A planar closure of plane bodies forbids nothing: the arms hang on their own."""
+    mechanism = four_bar("planar", turn)
+    q, still = mechanism.close([0.6, -0.4, 1.5]), np.zeros(3)
+    described = mechanism.describe(q)
+    assert (described.mobility, described.rank) == (3, 0)
+    alone = pin.rnea(mechanism.model, mechanism.model.createData(), q, still, still)
+    found = mechanism.inverse_dynamics(q, still, still)
+    assert found.tau == pytest.approx(alone[:1], rel=1e-9)
+    assert found.unproduced is not None
+    assert found.unproduced == pytest.approx([0.0, *alone[1:]], rel=1e-9)
+
+
 def test_exact_file_stays_exact() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
