@@ -127,7 +127,8 @@ def _mass(tree: pin.Model, q: Array) -> Array:
 
 
 def _relative(ours: Array, theirs: Array) -> float:
-    return float(np.abs(ours - theirs).max() / max(np.abs(theirs).max(), 1e-9))
+    largest = np.abs(theirs).max(initial=0.0)
+    return float(np.abs(ours - theirs).max(initial=0.0) / max(largest, 1e-9))
 
 
 class Twin:
@@ -159,9 +160,10 @@ class Twin:
         tendons = []
         for tendon in range(model.ntendon):
             name = model.tendon(tendon).name or f"tendon_{tendon + 1}"
-            name = f"{name}_tendon" if name in given else name
-            if name in names and tree.nvs[names[name]] == 1:
-                tendons.append((tendon, names.pop(name)))
+            for option in (f"{name}_tendon", name):  # the first where another has its name
+                if option in names and option not in given and tree.nvs[names[option]] == 1:
+                    tendons.append((tendon, names.pop(option)))
+                    break
         own = [[names.pop(name)] if name in names else [] for name in given]
         for name, indices in zip(given, own, strict=True):
             if indices and tree.nqs[indices[0]] == 4 and f"{name}_position" in names:

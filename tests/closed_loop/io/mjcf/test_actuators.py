@@ -60,12 +60,70 @@ def test_actuators_of_one_kind_are_told_in_one_warning() -> None:
     ]
 
 
-def test_an_actuator_about_an_axis_of_a_ball_is_told() -> None:
-    text = mujoco_file(
-        f'<body><joint name="b" type="ball"/>{INERTIAL}</body>', actuators('<motor joint="b"/>')
+def several(*elements: str, free: str = "") -> str:
+    return mujoco_file(
+        f"""<body><joint name="b" type="ball"/>{INERTIAL}</body>
+        <body><joint name="f" type="free" {free}/>{INERTIAL}</body>""",
+        actuators(*elements),
     )
+
+
+BALL = [f'<motor joint="b" gear="{gear}"/>' for gear in ("1", "0 1", "0 0 1")]
+#: Actuators of a ball and a free joint, options of the free joint, and what is actuated.
+COORDINATES = [
+    (('<motor joint="b"/>',), "", ("b.x",)),
+    (('<motor joint="b" gear="0 -3 0" forcerange="-1 2"/>', BALL[0]), "", ("b.y", "b.x")),
+    ((*BALL, '<motor joint="f" gear="0 0 0 0 0 2"/>'), "", ("b", "f.rz")),
+    ((BALL[1], BALL[0], BALL[2]), "", ("b.y", "b.x", "b.z")),
+    ((BALL[0], BALL[0], *BALL[1:]), "", ("b",)),
+    (
+        ('<motor joint="f" gear="0 2"/>', '<motor joint="f" gear="0 0 0 0 3"/>'),
+        'armature="0.1"',
+        ("f_position.y", "f.y"),
+    ),
+]
+
+
+@each(("elements", "free", "names"), COORDINATES)
+def test_actuators_of_one_velocity_of_a_ball_or_free_joint_drive_it(
+    elements: tuple[str, ...], free: str, names: tuple[str, ...]
+) -> None:
+    """The acceleration under their forces is MuJoCo's."""
+    text = several(*elements, free=free)
+    mechanism, twin = ClosedLoopModel.from_mjcf(text), Twin(text)
+    assert mechanism.actuated == names
+    rng = np.random.default_rng(0)
+    twin.random(rng)
+    twin.d.ctrl[:] = rng.normal(size=twin.m.nu)
+    mujoco.mj_forward(twin.m, twin.d)
+    forces = np.linalg.lstsq(twin.L.T, twin.d.qfrc_actuator)[0]
+    tau = forces[mechanism.actuated_indices]
+    assert worst(np.delete(forces, mechanism.actuated_indices), 0) < 1e-12
+    a = mechanism.forward_dynamics(twin.q, twin.v, tau)
+    right = twin.L @ twin.d.qacc + twin.L_rate @ twin.d.qvel
+    assert worst(a - right) < 1e-10 * worst(right)
+
+
+def test_limits_of_forces_of_a_ball_are_of_the_velocity() -> None:
+    text = several('<motor joint="b" gear="0 -3 0" forcerange="-1 2"/>')
+    model = parts_from_mjcf(text).model
+    assert list(model.lowerEffortLimit[:3]) == [-np.inf, -6, -np.inf]
+    assert list(model.upperEffortLimit[:3]) == [np.inf, 3, np.inf]
+
+
+@each(
+    ("element", "free"),
+    [
+        ('<motor joint="b" gear="1 1"/>', ""),
+        ('<motor joint="b" gear="0"/>', ""),
+        ('<motor jointinparent="b"/>', ""),
+        ('<motor joint="f"/>', ""),  # along an axis of the world
+        ('<motor jointinparent="f" gear="0 0 0 1"/>', 'armature="0.1"'),
+    ],
+)
+def test_actuators_of_several_velocities_are_told(element: str, free: str) -> None:
     with pytest.warns(UserWarning, match="on a joint of several coordinates, so not an act"):
-        assert parts_from_mjcf(text).actuated == ()
+        assert parts_from_mjcf(several(element, free=free)).actuated == ()
 
 
 @each("option", ["armature", "damping"])

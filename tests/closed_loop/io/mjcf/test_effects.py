@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from rps_pin import MechanismError
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
+from rps_pin.closed_loop.io.mjcf.source import MjcfSource
 from tests.closed_loop.io.mjcf.twin import BODY, Twin, fourbar, mujoco_file
 from tests.each import each
 from tests.worst import worst
@@ -115,6 +117,16 @@ def test_no_medium_acts_where_all_passive_forces_are_off() -> None:
     twin = Twin(text)
     twin.random(np.random.default_rng(0))
     assert not twin.d.qfrc_passive.any()
+
+
+def test_older_mujocos_have_one_flag_for_springs_and_dampers() -> None:
+    """`passive`; 3.3.2 has it."""
+    source = MjcfSource(fourbar())
+    source.mujoco = SimpleNamespace(mjtDisableBit=SimpleNamespace(mjDSBL_PASSIVE=32))
+    assert not source.without_passive_forces
+    source.model.opt.disableflags = 32
+    assert source.disabled("spring") and source.disabled("damper")
+    assert source.without_passive_forces and not source.disabled("gravity")
 
 
 def test_wind_without_a_medium_is_nothing() -> None:

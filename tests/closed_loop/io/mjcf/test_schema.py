@@ -14,6 +14,7 @@ A MuJoCo with something new fails here first.
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,10 +25,12 @@ from lxml import etree
 
 from rps_pin import MechanismError
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
+from tests.closed_loop.io.mjcf.schema import table
 from tests.closed_loop.io.mjcf.twin import BODY, fourbar, mujoco_file, read
 from tests.each import each
 
 HERE = Path(__file__).parent
+PAGE = HERE.parents[3] / "docs" / "mjcf_words.md"
 KINDS = {"read", "compiled", "force", "harmless", "told", "refused"}
 
 
@@ -46,21 +49,6 @@ def mujocos_schema() -> dict[str, list[str]]:
     return found
 
 
-def table() -> dict[str, dict[str, list[str]]]:
-    """Attributes by element and kind, from the table here."""
-    found: dict[str, dict[str, list[str]]] = {}
-    kinds: dict[str, list[str]] = {}
-    for line in (HERE / "schema.txt").read_text("utf-8").splitlines():
-        words = line.split()
-        if not line.startswith(" "):
-            kinds = found[line] = {}
-        elif words[0].endswith(":"):
-            kinds[words[0][:-1]] = kind = words[1:]
-        else:
-            kind += words
-    return found
-
-
 SCHEMA, TABLE = mujocos_schema(), table()
 OWN = {name: attributes for name, attributes in SCHEMA.items() if not name.startswith("default")}
 
@@ -73,6 +61,20 @@ def test_every_element_and_attribute_is_in_the_table_and_nothing_else() -> None:
         listed = [attribute for attributes in kinds.values() for attribute in attributes]
         assert len(listed) == len(set(listed)), name
         assert set(listed) == set(OWN[name]), name
+
+
+def test_the_page_of_the_documentation_has_the_table() -> None:
+    spec = importlib.util.spec_from_file_location("mjcf_words", PAGE.with_suffix(".py"))
+    assert spec is not None and spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    shown = PAGE.read_text("utf-8").partition("mjcf_words.py: words -->")[2]
+    assert shown.partition("<!-- end -->")[0].strip() == script.words()
+    for name, kinds in TABLE.items():
+        if kinds.keys() - {"harmless"}:
+            assert f"| `{name}` |" in shown
+        else:
+            assert f"`{name}`" in shown
 
 
 def test_defaults_have_no_attributes_of_their_own() -> None:

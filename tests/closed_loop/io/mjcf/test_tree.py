@@ -239,6 +239,13 @@ def test_a_file_without_joints_is_no_mechanism() -> None:
         parts_from_mjcf(mujoco_file("<geom size='1'/>"))
 
 
+def test_scenes_of_many_loose_bodies_are_refused_before_they_take_all_memory() -> None:
+    loose = "<body><freejoint/><geom size='0.1'/></body>"
+    text = mujoco_file(f"<replicate count='67' offset='1 0 0'>{loose}</replicate>")
+    with pytest.raises(MechanismError, match="has 402 velocities, and at most 400 are read"):
+        parts_from_mjcf(text)
+
+
 def test_shapes_are_a_skeleton() -> None:
     from rps_pin.closed_loop.visuals import skeleton
 

@@ -23,7 +23,8 @@ def without_appearance(spec: Any, mujoco: Any) -> Any:
             geom.type, geom.size, geom.mass = kinds.mjGEOM_SPHERE, [0.01, 0.0, 0.0], 0.0
             geom.meshname = geom.hfieldname = ""
     for one in (*spec.geoms, *spec.sites, *spec.tendons, *spec.meshes):
-        one.material = ""
+        if hasattr(one, "material"):  # meshes of older MuJoCos have none
+            one.material = ""
     unused = [mesh for mesh in spec.meshes if mesh.name not in needed]
     for one in (*unused, *(one for name in _LISTS for one in getattr(spec, name))):
         spec.delete(one)

@@ -75,7 +75,8 @@ def joint_effects(
             place = tree.model.joints[tree.model.getJointId(name)]
             tree.model.armature[place.idx_v : place.idx_v + place.nv] = armature
             if place.nq == 1:
-                _add_limits(tree, kind, number, place, force_range(source, acting))
+                _add_limits(tree, kind, number, place)
+        _add_forces(tree, kind, number, names, acting)
         limited = getattr(m, f"{_prefix(kind)}_limited")[number] and not source.disabled("limit")
         if limited and kind == "joints" and m.jnt_type[number] not in (HINGE, SLIDE):
             source.tell(kind, number, "a range of several coordinates is not read")
@@ -117,21 +118,29 @@ def _rest(source: MjcfSource, kind: str, number: int) -> float:
     return float(m.qpos_spring[m.jnt_qposadr[number]])
 
 
-def _add_limits(
-    tree: MjcfTree, kind: str, number: int, place: Any, forces: tuple[float, float]
-) -> None:
-    """Put the limits of a coordinate, and of the force of its actuators, into the model."""
+def _add_limits(tree: MjcfTree, kind: str, number: int, place: Any) -> None:
+    """Put the limits of a coordinate into the model."""
     m, model, owner = tree.source.model, tree.model, _prefix(kind)
     if getattr(m, f"{owner}_limited")[number] and not (
         tree.source.disabled("limit") or tree.source.disabled("constraint")
     ):
         limits = getattr(m, f"{owner}_range")[number]
         model.lowerPositionLimit[place.idx_q], model.upperPositionLimit[place.idx_q] = limits
-    low, high = forces
-    if tree.source.read(f"{owner}_actfrclimited", number):
-        own = getattr(m, f"{owner}_actfrcrange")[number]
-        low, high = max(low, own[0]), min(high, own[1])
-    model.lowerEffortLimit[place.idx_v], model.upperEffortLimit[place.idx_v] = low, high
+
+
+def _add_forces(
+    tree: MjcfTree, kind: str, number: int, names: Sequence[str], actuators: Sequence[Actuator]
+) -> None:
+    """Put the limits of the forces that actuators make at a joint into the model."""
+    source, model, owner = tree.source, tree.model, _prefix(kind)
+    places = [model.joints[model.getJointId(name)] for name in names]
+    velocities = [place.idx_v + k for place in places for k in range(place.nv)]
+    for k, velocity in enumerate(velocities):
+        low, high = force_range(source, [one for one in actuators if one.place == k])
+        if source.read(f"{owner}_actfrclimited", number):
+            own = getattr(source.model, f"{owner}_actfrcrange")[number]
+            low, high = max(low, own[0]), min(high, own[1])
+        model.lowerEffortLimit[velocity], model.upperEffortLimit[velocity] = low, high
 
 
 def _prefix(kind: str) -> str:

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rps_pin.closed_loop.column_names import joint_coordinates
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.io.mjcf.actuators import Actuator, read_actuators
 from rps_pin.closed_loop.io.mjcf.closures import read_equalities
@@ -15,6 +16,10 @@ from rps_pin.closed_loop.io.mjcf.source import MjcfSource
 from rps_pin.closed_loop.io.mjcf.tendons import Tendons
 from rps_pin.closed_loop.io.mjcf.tree import MjcfTree
 from rps_pin.closed_loop.io.parts import MechanismParts
+from rps_pin.errors import MechanismError
+
+#: Velocities that a file may have. Pinocchio's data of so many takes 4 GB, and grows as the cube.
+MOST_VELOCITIES = 400
 
 
 def parts_from_mjcf(
@@ -45,10 +50,16 @@ def parts_from_mjcf(
         If the file cannot be read.
     MechanismError
         If MuJoCo refuses it, or it has forces or closures that are not read here; with the line.
+        If it has more than 400 velocities.
     RPSPinError
         If MuJoCo is not installed (``rps-pin[mjcf]``).
     """
     source = MjcfSource(path_or_xml)
+    if source.model.nv > MOST_VELOCITIES:
+        raise MechanismError(
+            f"{source.origin} has {source.model.nv} velocities, and at most {MOST_VELOCITIES} are "
+            "read: the memory for them grows as the cube of their number"
+        )
     refuse_other_forces(source)
     asked = (actuated,) if isinstance(actuated, str) else tuple(actuated or ())
     actuators = read_actuators(source)
@@ -73,8 +84,19 @@ def parts_from_mjcf(
 def _driven(tree: MjcfTree, tendons: Tendons, actuators: Sequence[Actuator]) -> tuple[str, ...]:
     """Return the joints that actuators act on, each once, in the order of the actuators."""
     names = [
-        tendons.names[one.target] if one.kind == "tendons" else tree.joints[one.target]
+        tendons.names[one.target] if one.kind == "tendons" else tree.velocity(one.target, one.place)
         for one in actuators
         if one.active
     ]
-    return tuple(dict.fromkeys(names))
+    return _with_whole_joints(tree, list(dict.fromkeys(names)))
+
+
+def _with_whole_joints(tree: MjcfTree, names: list[str]) -> tuple[str, ...]:
+    """Return names with a joint's in the place of those of all of its coordinates in turn."""
+    for joint in list(tree.model.names)[1:]:
+        each = list(joint_coordinates(tree.model, joint))
+        if each and each[0] in names:
+            start = names.index(each[0])
+            if names[start : start + len(each)] == each:
+                names[start : start + len(each)] = [joint]
+    return tuple(names)

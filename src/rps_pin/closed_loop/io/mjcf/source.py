@@ -148,9 +148,14 @@ class MjcfSource:
         return 0 if found is None else found[number]
 
     def disabled(self, flag: str) -> bool:
-        """Return whether ``<flag ...="disable"/>`` is set."""
-        bit = getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)
-        return bool(self.model.opt.disableflags & int(bit))
+        """Return whether ``<flag ...="disable"/>`` is set.
+
+        Older MuJoCos have one flag, ``passive``, for spring and damper.
+        """
+        names = (flag, "passive") if flag in ("spring", "damper") else (flag,)
+        kinds = self.mujoco.mjtDisableBit
+        bits = [int(getattr(kinds, f"mjDSBL_{name.upper()}", 0)) for name in names]
+        return any(self.model.opt.disableflags & bit for bit in bits)
 
     @property
     def without_passive_forces(self) -> bool:

@@ -8,11 +8,14 @@ placements of the file. Coordinates are those of MuJoCo's ``qpos`` in its order,
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop.column_names import joint_coordinates
 from rps_pin.closed_loop.io.mjcf.source import MjcfSource
 from rps_pin.errors import MechanismError
 
@@ -125,13 +128,13 @@ class MjcfTree:
     def _add_joint(self, number: int, parent: int, pose: pin.SE3) -> tuple[int, pin.SE3]:
         """Add a joint; return its index and the placement of what it carries."""
         m = self.source.model
-        kind, dof = m.jnt_type[number], m.jnt_dofadr[number]
+        kind = m.jnt_type[number]
         name, axis = self.joints[number], m.jnt_axis[number]
         ref = float(m.qpos0[m.jnt_qposadr[number]])
         still = pin.SE3.Identity()
         self.parts.append([name])
         if kind == FREE:
-            if not (m.dof_armature[dof] or m.dof_frictionloss[dof]):
+            if not axes_of_world(m, number):
                 return self._added(name, parent, pin.JointModelFreeFlyer(), still), still
             self.parts[-1].insert(0, self.fresh(f"{name}_position", ""))
             parent = self._added(self.parts[-1][0], parent, pin.JointModelTranslation(), still)
@@ -168,6 +171,15 @@ class MjcfTree:
         self.lengths.append(coefficients)
         return name
 
+    def velocity(self, number: int, place: int) -> str:
+        """Return the name of a joint, or of one of its velocities if it has several."""
+        for name in self.parts[number]:
+            coordinates = joint_coordinates(self.model, name) or (name,)
+            if place < len(coordinates):
+                return coordinates[place]
+            place -= len(coordinates)
+        raise IndexError(place)
+
     # Configurations -------------------------------------------------------------------------------
 
     def configuration(self, qpos: ArrayLike) -> Array:
@@ -195,6 +207,12 @@ class MjcfTree:
                 )
             configurations[name] = q
         return found.get("home", found["qpos0"])
+
+
+def axes_of_world(model: Any, number: int) -> bool:
+    """Return whether a free joint is two here: its rotors or dry friction are along the world's."""
+    dof = model.jnt_dofadr[number]
+    return bool(model.dof_armature[dof] or model.dof_frictionloss[dof])
 
 
 def _about(axis: Array, kinds: tuple[type, ...]) -> pin.JointModel:
