@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from rps_pin import ClosedLoopModel, LoopClosure, RPSRobot
 from rps_pin.errors import ClosureError, InputError
@@ -129,6 +130,99 @@ def test_rps_has_those_of_its_closed_form() -> None:
     apart = np.linalg.norm(places[:, None] - exact.position, axis=2)
     assert len(found.q) == len(exact.angle) >= 8
     assert worst(np.concatenate([apart.min(axis=0), apart.min(axis=1)])) < 1e-9
+
+
+def rrs_modes(arms: Array) -> Array:
+    """Shank angles of the 3-RRS of urdf/ with given arm angles, (k, 3), by its three tips alone.
+
+    The tips are on circles of radius b in the legs' planes, at angles p_i, and the platform says
+    how far they are from each other. That is A cos p_2 + B sin p_2 = C for a given p_1, and so for
+    p_3; where tips 2 and 3 are too, along all p_1, is found by changes of sign.
+    """
+    arm, b, out, side = 0.15, 0.25, 0.2, np.sqrt(3) * 0.12
+    radius, height = out + arm * np.cos(arms), arm * np.sin(arms)
+
+    def tip(i: int, p: Array) -> tuple[Array, Array]:
+        return radius[i] + b * np.cos(p), height[i] + b * np.sin(p)
+
+    def apart(one: tuple[Array, Array], other: tuple[Array, Array]) -> Array:
+        (r, z), (s, w) = one, other  # the legs' planes are at 120 degrees
+        return r * r + s * s + r * s + (z - w) ** 2 - side**2
+
+    def reached(i: int, from_: tuple[Array, Array], sign: int) -> Array:
+        r, z = from_
+        first = 2 * radius[i] * b + r * b, 2 * b * (height[i] - z)
+        rest = radius[i] ** 2 + b * b + r * r + r * radius[i] + (height[i] - z) ** 2 - side**2
+        with np.errstate(invalid="ignore"):  # out of reach: no root
+            turn = np.arccos(-rest / np.hypot(*first))
+        return np.arctan2(first[1], first[0]) + sign * turn
+
+    def left(p: Array, signs: tuple[int, int]) -> Array:
+        one = tip(0, p)
+        second, third = (reached(i, one, sign) for i, sign in zip((1, 2), signs, strict=True))
+        return apart(tip(1, second), tip(2, third))
+
+    found, grid = [], np.linspace(-np.pi, np.pi, 20_001)
+    for signs in itertools.product((-1, 1), repeat=2):
+        values = left(grid, signs)
+        for k in np.flatnonzero(values[:-1] * values[1:] < 0):
+            p = brentq(left, grid[k], grid[k + 1], args=(signs,), xtol=1e-15)
+            one = tip(0, p)
+            found.append([p, reached(1, one, signs[0]), reached(2, one, signs[1])])
+    return np.array(found) - arms
+
+
+@pytest.mark.parametrize("arms", [(0.6, 0.6, 0.6), (0.5, 0.9, 0.7), (-0.4, 0.3, 1.1)])
+def test_rrs_has_those_of_its_tips_on_circles(arms: tuple[float, float, float]) -> None:
+    mechanism = loaded("rrs")
+    found = mechanism.assembly_modes(arms, within_limits=False)
+    model = mechanism.model
+    shanks = [model.joints[model.getJointId(f"shank_{k}_joint")].idx_q for k in (1, 2, 3)]
+    exact = rrs_modes(np.array(arms))
+    assert found.q.shape[0] == len(exact) >= 2
+    assert same_sets(found.q[:, shanks], exact) < 1e-8
+
+
+def sarrus(first: float, second: float, outward: float) -> ClosedLoopModel:
+    """A platform on two legs of three hinges each, about x and about y: six rows of rank five."""
+    model = pin.Model()
+    for name, turn in (("a", np.eye(3)), ("b", pin.utils.rotate("z", np.pi / 2))):
+        foot = pin.SE3(turn, turn @ np.array([0.0, outward, 0.0]))
+        parent = 0
+        for k, length in enumerate((0.0, first, second)):
+            place = foot if parent == 0 else pin.SE3(np.eye(3), np.array([0.0, length, 0.0]))
+            parent = model.addJoint(parent, pin.JointModelRX(), place, f"{name}{k}")
+            model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Identity())
+        centre = pin.SE3(turn.T, np.array([0.0, -outward, 0.0]))
+        model.addFrame(pin.Frame(name, parent, centre, pin.FrameType.OP_FRAME))
+    return ClosedLoopModel(model, [LoopClosure("a", "b", "rigid", name="platform")], ["a0"])
+
+
+def test_sarrus_linkage_has_both_elbows_of_each_leg() -> None:
+    """Its platform stands above the base, and each leg spans the height with links of 0.3 and 0.2.
+
+    The height is that of leg a, whose second link leads back above the foot, upwards or downwards;
+    leg b reaches it with its elbow out or in, if it is from 0.1 to 0.5.
+    """
+    mechanism, angle = sarrus(0.3, 0.2, 0.4), 1.1
+    found = mechanism.assembly_modes([angle])
+    exact = []
+    for up in (1, -1):
+        elbow = np.array([0.3 * np.cos(angle), 0.3 * np.sin(angle)])
+        height = elbow[1] + up * np.sqrt(0.2**2 - elbow[0] ** 2)
+        assert 0.1 < abs(height) < 0.5
+        top = np.array([0.0, height])
+        knees = [(elbow, top), *((knee, top) for knee in circles(np.zeros(2), 0.3, top, 0.2))]
+        turns = []
+        for knee, end in knees:
+            one, two = np.arctan2(*knee[::-1]), np.arctan2(*(end - knee)[::-1])
+            turns.append([one, two - one, -two])  # the platform stays level
+        exact += [turns[0] + turns[1], turns[0] + turns[2]]
+    assert found.q.shape == (4, 6)
+    assert same_sets(found.q, np.array(exact)) < 1e-10
+    assert worst(found.condition) < 1e3
+    described = mechanism.describe(found.q[0])
+    assert (described.mobility, described.rank) == (1, 5)
 
 
 # Dietmaier, The Stewart-Gough platform of general geometry can have 40 real postures (1998).
