@@ -19,6 +19,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
+from rps_pin.contents import known_format, xml_root_tag
 from rps_pin.errors import InputError, MechanismError, did_you_mean, shown
 from rps_pin.files import opened
 
@@ -203,13 +204,23 @@ def read_yaml(path: str | os.PathLike[str], what: str) -> YamlFile:
     """
     with opened(path, what) as file:
         content = file.read(LARGEST_FILE + 1)
-        text = content[:LARGEST_FILE].decode("utf-8-sig")
-    origin = os.fspath(path)
-    if len(content) > LARGEST_FILE:
-        raise InputError(
-            f"{what} {origin} has more than {LARGEST_FILE} bytes, the most that is read"
-        )
+        origin = os.fspath(path)
+        if len(content) > LARGEST_FILE:
+            raise InputError(
+                f"{what} {origin} has more than {LARGEST_FILE} bytes, the most that is read"
+            )
+        _refuse_other_formats(content, origin, what)
+        text = content.decode("utf-8-sig")
+    if "\0" in text:
+        raise InputError(f"{origin} is not valid YAML: it has bytes of value 0, as UTF-16 has")
     return _parsed(text, origin)
+
+
+def _refuse_other_formats(content: bytes, origin: str, what: str) -> None:
+    if told := known_format(content):
+        raise InputError(f"{origin} is not a {what} but {told}")
+    if root := xml_root_tag(content):
+        raise InputError(f"{origin} is not a {what} but XML with the root element <{root}>")
 
 
 def _parsed(text: str, origin: str) -> YamlFile:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, InputError, LoopClosure, MechanismError, SingularityError
 from tests.closed_loop import mechanisms, random_mechanisms
-from tests.closed_loop.mechanisms import derivative
+from tests.closed_loop.mechanisms import derivative, joint, link, robot
 from tests.closed_loop.random_mechanisms import (
     EVERY_KIND,
     Case,
@@ -275,6 +275,21 @@ def test_motion_without_mass_is_refused() -> None:
         c.mechanism.forward_dynamics(c.q, c.v, forces(c))
     c.mechanism.model.armature = np.ones(c.mechanism.model.nv)
     assert np.isfinite(c.mechanism.forward_dynamics(c.q, c.v, forces(c))).all()
+
+
+def test_a_motion_without_mass_is_told_by_its_joints() -> None:
+    """A flag without mass at the end of two bars: it alone turns freely."""
+    urdf = robot(
+        link("one", 1.0),
+        link("two", 1.0, "0.1 0 0"),
+        link("flag"),
+        joint("revolute", "base", "one"),
+        joint("revolute", "one", "two"),
+        joint("revolute", "two", "flag"),
+    )
+    mechanism = ClosedLoopModel.from_urdf(urdf, [], ["one_joint"])
+    with pytest.raises(SingularityError, match=r"moves the joints flag_joint \(give the links"):
+        mechanism.forward_dynamics(np.zeros(3), np.zeros(3), np.zeros(1))
 
 
 def test_proximal_method_is_deprecated_and_computes_the_same() -> None:

@@ -12,6 +12,8 @@ by T' leaves a small system without lambda, regular also where links are massles
 
 from __future__ import annotations
 
+from typing import NoReturn
+
 import numpy as np
 import pinocchio as pin
 from scipy.linalg.lapack import dposv
@@ -22,11 +24,14 @@ from rps_pin.closed_loop.dynamics.generalised_forces import resisting_force, tre
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.kinematics import actuated_basis
 from rps_pin.closed_loop.regular import refuse_lost_rows
-from rps_pin.errors import SingularityError
+from rps_pin.errors import SingularityError, few
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, Decomposition
 
 #: A squared pivot below this, relative to the largest, counts as no inertia.
 _NO_INERTIA = 1e-14
+#: Motions that are told where that is so: of inertias below this, relative to the largest, and
+#: their joints that move by more than this, relative to the one that moves most.
+_MASSLESS, _TOLD = 1e-12, 1e-3
 
 
 def forward_dynamics(
@@ -90,7 +95,10 @@ def reduced_acceleration(
         force -= resisting
     force[system.actuated] += tau
     mass = basis.T @ tree_mass(system, q) @ basis
-    return basis @ solve_reduced(mass, basis.T @ force) + a_0, resisting
+    solution = solve_reduced(mass, basis.T @ force)
+    if solution is None:
+        _refuse_massless(system, basis, mass)
+    return basis @ solution + a_0, resisting
 
 
 def basis_and_bias(factors: Decomposition, bias: Array, scale: Array) -> tuple[Array, Array]:
@@ -108,23 +116,32 @@ def basis_and_bias(factors: Decomposition, bias: Array, scale: Array) -> tuple[A
     return scale[:, None] * factors.null_space(), -scale * factors.least_norm(bias)
 
 
-def solve_reduced(mass: Array, force: Array) -> Array:
-    """Return w of (T' M T) w = force, or say that a motion has no inertia.
-
-    Raises
-    ------
-    SingularityError
-        If the reduced mass matrix is not positive definite.
-    """
+def solve_reduced(mass: Array, force: Array) -> Array | None:
+    """Return w of (T' M T) w = force, or None if a motion has no inertia."""
     if mass.size == 0:
         return np.zeros(0)
     factor, solution, failed = dposv(mass, force)  # Cholesky
     diagonal = factor.diagonal()
     if not failed and diagonal.min() ** 2 > _NO_INERTIA * diagonal.max() ** 2:
         return np.asarray(solution, dtype=np.float64)
+    return None
+
+
+def _refuse_massless(system: ConstraintSystem, basis: Array, mass: Array) -> NoReturn:
+    """Raise `SingularityError` with the joints of the motions T w that have no inertia."""
+    inertias, motions = np.linalg.eigh(mass)
+    count = max(1, int((inertias <= _MASSLESS * inertias[-1]).sum()))
+    moved = np.abs(basis @ motions[:, :count]).max(axis=1)
+    model = system.model
+    names = [
+        model.names[index]
+        for index in range(1, model.njoints)
+        if moved[model.idx_vs[index] :][: model.nvs[index]].max(initial=0.0) > _TOLD * moved.max()
+    ]
     raise SingularityError(
-        "a motion that the closures allow moves no mass: its acceleration is not determined "
-        "(give the links that it moves a mass, or its joints an armature)",
+        "a motion that the closures allow moves no mass: its acceleration is not determined; it "
+        f"moves the joints {few(names)} (give the links that they carry a mass, or the joints an "
+        "armature)",
         np.inf,
         1 / RANK_TOLERANCE,
     )

@@ -98,6 +98,8 @@ def parts_from_gepetto(
     source = Path(path)
     if source.is_dir():
         source /= FILE
+        if not source.exists():
+            raise InputError(f"{path} is a folder without {FILE}, so it holds no mechanism")
     file = read_yaml(source, "description of example-parallel-robots")
     description = file.validated(GepettoFile, "a description of example-parallel-robots")
     for one, other in (("closed_loop", "type"), ("joint_name", "joint_type")):

@@ -13,14 +13,12 @@ from typing import Any
 
 from lxml import etree
 
+from rps_pin.contents import known_format
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.files import opened
 
 #: The longest XML text that is read, bytes. (Meshes are files of their own.)
 LARGEST_XML = 64 * 2**20
-
-#: Binary USD files begin with this.
-BINARY_USD = b"PXR-USDC"
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -28,7 +26,10 @@ _MARKS = (
     (codecs.BOM_UTF32_BE, "utf-32"),
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
+    (b"<\0", "utf-16-le"),
+    (b"\0<", "utf-16-be"),
 )
+
 _ENCODING = re.compile(rb"<\?xml[^>]*encoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
 #: The XML declaration, also of a version that there is not, or after comments.
 _DECLARATION = re.compile(r"\A((?:\s|<!--.*?-->)*)(<\?xml\s[^>]*\?>)", re.DOTALL)
@@ -48,12 +49,15 @@ def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
     ------
     InputError
         If the file cannot be read, or is larger than `LARGEST_XML`.
+    MechanismError
+        If it is a file of another kind that is known: an archive, a web page.
     """
     if not isinstance(path_or_xml, (str, os.PathLike)):
         raise InputError(f"a {form} is given by its path or its text, not by {path_or_xml!r}")
     text = os.fspath(path_or_xml).lstrip("\ufeff")  # without a byte-order mark
     if text.lstrip().startswith("<"):
         origin = f"the {form} text"
+        _refuse_known(text[:1000].encode("utf-8", "replace"), origin, form)
     else:
         origin = text
         with opened(text, form) as file:
@@ -62,16 +66,21 @@ def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
                 raise InputError(
                     f"the {form} {origin} has more than {LARGEST_XML} bytes, the most that is read"
                 )
+            _refuse_known(content, origin, form)
             text = _decoded(content)
     if len(text) > LARGEST_XML:
         raise InputError(f"{origin} has more than {LARGEST_XML} characters, the most that is read")
     return _DECLARATION.sub(lambda m: m[1] + "\n" * m[2].count("\n"), text, count=1), origin
 
 
+def _refuse_known(content: bytes, origin: str, form: str) -> None:
+    """Raise `MechanismError` if a content is of another kind that is known."""
+    if what := known_format(content):
+        raise MechanismError(f"{origin} is not a valid {form} but {what}")
+
+
 def _decoded(content: bytes) -> str:
     """Return a file's text by its byte-order mark or declared encoding; else it is UTF-8."""
-    if content.startswith(BINARY_USD):
-        return BINARY_USD.decode()  # enough to be told
     for mark, encoding in _MARKS:
         if content.startswith(mark):
             return content.decode(encoding)
@@ -97,7 +106,8 @@ def xml_root(text: str, origin: str, form: str) -> Any:
         root = etree.fromstring(content, parser)
     except etree.XMLSyntaxError as error:
         if any(entry.domain != etree.ErrorDomains.NAMESPACE for entry in parser.error_log):
-            raise MechanismError(f"{origin} is not a valid {form}: {error}") from None
+            why = str(error).replace(", use XML_PARSE_HUGE option", "")
+            raise MechanismError(f"{origin} is not a valid {form}: {why}") from None
         # A prefix that the file does not declare, as most readers of robots do not ask for.
         root = etree.fromstring(content, _parser(recover=True))
     if root.getroottree().docinfo.doctype:

@@ -26,8 +26,8 @@ WHY = "a stiffness that is not linear"
 @each(
     ("text", "why"),
     [
-        ("<robot/>", "its root element is <robot>, not <mujoco>"),
-        ("<mujocoinclude/>", "its root element is <mujocoinclude>"),
+        ("<robot/>", "is not a valid MJCF but a URDF; use ClosedLoopModel.from_urdf"),
+        ("<mujocoinclude/>", "but a part of a MuJoCo file; read the file that includes it"),
         ("<!DOCTYPE mujoco []><mujoco/>", "declares a document type"),
         ("<mujoco/>", "has no joints"),
         ("<mujoco", "is not a valid MJCF"),

@@ -83,7 +83,8 @@ def test_large_files_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         (ARM.replace('name="arm"', 'name="$(arg p)arm"', 1), "a xacro file (line 1: $(arg p))"),
         ("<COLLADA/>", "a COLLADA file"),
         ("<launch/>", "a ROS launch file"),
-        ("<html/>", "its root element is <html>, not <robot>"),
+        ("<html/>", "an HTML page, as a server sends"),
+        ("<svg/>", "its root element is <svg>, not <robot>"),
     ],
 )
 def test_files_of_other_formats_are_named(text: str, told: str) -> None:
@@ -94,10 +95,10 @@ def test_files_of_other_formats_are_named(text: str, told: str) -> None:
 
 def test_usd_is_named(tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text("#usda 1.0\ndef Xform")
-    with pytest.raises(MechanismError, match="is a USD file"):
+    with pytest.raises(MechanismError, match="not a valid URDF but a USD file; convert it"):
         model_from_urdf(tmp_path / "r.urdf")
     (tmp_path / "c.urdf").write_bytes(b"PXR-USDC\0\0\xff")
-    with pytest.raises(MechanismError, match="is a USD file"):
+    with pytest.raises(MechanismError, match="not a valid URDF but a USD file; convert it"):
         model_from_urdf(tmp_path / "c.urdf")
 
 

@@ -16,6 +16,7 @@ from xml.sax.saxutils import quoteattr
 
 from lxml import etree
 
+from rps_pin.closed_loop.io.foreign import refuse_other_formats
 from rps_pin.closed_loop.io.xml_file import LARGEST_XML
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.files import opened
@@ -69,10 +70,8 @@ class MjcfFiles:
             _content(path)  # which may be in an encoding that is read here and not by MuJoCo
         root = _root(text, origin)
         if root is None or root.tag != "mujoco":
-            fault = "it is not XML"
-            if root is not None:
-                fault = f"its root element is <{root.tag}>, not <mujoco>"
-            raise MechanismError(f"{origin} is not a valid MJCF: {fault}")
+            refuse_other_formats(text, origin, "MJCF")
+            raise MechanismError(f"{origin} is not a valid MJCF: it is not XML")
         self.name = str(root.get("model", ""))
         self.folder = path.parent if path else Path()
         self._places: list[Place] = []

@@ -16,11 +16,11 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.editing.rebuild import JointRow, NewJoint, rebuilt
+from rps_pin.closed_loop.io.foreign import refuse_other_formats
 from rps_pin.closed_loop.io.parts import MechanismParts
 from rps_pin.closed_loop.io.urdf.check import check_tree
 from rps_pin.closed_loop.io.urdf.elements import SIMPLE, UrdfFile, UrdfJoint, read_elements
 from rps_pin.closed_loop.io.urdf.extensions import armature_of, look_into_extensions
-from rps_pin.closed_loop.io.urdf.foreign import refuse_other_formats
 from rps_pin.closed_loop.io.urdf.inertials import read_inertials
 from rps_pin.closed_loop.io.urdf.loops import closures_of
 from rps_pin.closed_loop.io.urdf.mimics import couplings_of
@@ -43,7 +43,7 @@ def urdf_file(path_or_xml: str | os.PathLike[str]) -> UrdfFile:
         As `model_from_urdf`.
     """
     text, origin = xml_text(path_or_xml, "URDF")
-    refuse_other_formats(text, origin)
+    refuse_other_formats(text, origin, "URDF")
     file = read_elements(xml_root(text, origin, "URDF"), origin)
     read_inertials(file)
     check_tree(file)
