@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rps_pin import ClosedLoopModel, JointCoupling, JointEffects, LoopClosure
 from rps_pin.closed_loop.constraints.closures import KINDS, Closure
@@ -207,14 +208,18 @@ def random_inertia(rng: Rng) -> pin.Inertia:
 
 
 def random_effects(rng: Rng, model: pin.Model) -> JointEffects:
-    """Damping and friction of all joints, springs on those of one coordinate."""
-    simple = np.zeros(model.nv)
+    """Damping and friction of all joints, springs on those that can have one."""
+    stiffness = rng.uniform(0, 20, size=model.nv)
     for joint in list(model.joints)[1:]:
-        simple[joint.idx_v] = joint.nq == joint.nv == 1
+        own = stiffness[joint.idx_v : joint.idx_v + joint.nv]
+        if joint.shortname() in ("JointModelSpherical", "JointModelFreeFlyer"):
+            own[:] = np.repeat(own[::3], 3)  # one of turns, one of shifts
+        elif joint.nq != joint.nv:
+            own[:] = 0.0
     return JointEffects(
         damping=rng.uniform(0, 1, size=model.nv),
         friction=rng.uniform(0, 1, size=model.nv),
-        stiffness=simple * rng.uniform(0, 20, size=model.nv),
+        stiffness=stiffness,
         rest=rng.normal(size=model.nv),
         friction_speed=0.5,
     )
@@ -491,9 +496,15 @@ def resisting_force(model: pin.Model, effects: JointEffects, q: Array, v: Array)
     """Damping, friction and springs, joint by joint."""
     force = effects.damping * v + effects.friction * np.tanh(v / effects.friction_speed)
     for joint in list(model.joints)[1:]:
-        if joint.nq == joint.nv == 1:
-            at = joint.idx_v
-            force[at] += effects.stiffness[at] * (q[joint.idx_q] - effects.rest[at])
+        at = slice(joint.idx_v, joint.idx_v + joint.nv)
+        own, rest = q[joint.idx_q : joint.idx_q + joint.nq], effects.rest[at].copy()
+        if joint.nq == joint.nv:
+            force[at] += effects.stiffness[at] * (own - rest)
+        elif effects.stiffness[at].any():  # a ball or a free-flyer
+            turn = Rotation.from_quat(own[-4:])
+            stretch = (Rotation.from_rotvec(rest[-3:]).inv() * turn).as_rotvec()
+            shift = turn.inv().apply(own[:-4] - rest[:-3]) if joint.nv == 6 else np.empty(0)
+            force[at] += effects.stiffness[at] * np.concatenate([shift, stretch])
     return np.asarray(force)
 
 

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, InputError, JointEffects, MechanismError
-from rps_pin.closed_loop.dynamics.passive_joint_forces import coordinate_indices
+from rps_pin.closed_loop.dynamics.springs import Springs
 from tests.closed_loop.mechanisms import joint, link, robot
 from tests.closed_loop.random_mechanisms import slopes
 
@@ -64,42 +64,33 @@ def test_names_find_their_velocities() -> None:
     np.testing.assert_array_equal(effects.rest, [0, 0, 0, -0.1, 0.7, 0, 0, 0])
 
 
-def test_velocities_find_their_coordinates() -> None:
-    """Of joints whose coordinates are plain numbers: after a ball's four come the hinge's."""
-    indices = coordinate_indices(tree())
-    np.testing.assert_array_equal(indices[[3, 4, 6, 7]], [4, 5, 8, 9])
-
-
 def test_force_is_the_law() -> None:
     effects = of_pendulum(damping=0.3, friction=0.2, stiffness=5.0, rest=0.4, friction_speed=0.1)
-    found = effects.force(np.array([1.0]), np.array([0.1]), np.array([0]))
+    found = effects.resistance(np.array([0.1]))
+    found = found + Springs(pendulum(None).model, effects).force(np.array([1.0]))
     assert found == pytest.approx([0.3 * 0.1 + 0.2 * np.tanh(1.0) + 5.0 * 0.6], rel=1e-14)
 
 
 def test_friction_nears_its_full_size() -> None:
     effects = of_pendulum(friction=0.2)
     for speed, share in ((0.01, np.tanh(1.0)), (0.1, 1.0), (-50.0, -1.0), (0.0, 0.0)):
-        force = effects.force(np.zeros(1), np.array([speed]), np.array([0]))
+        force = effects.resistance(np.array([speed]))
         assert force == pytest.approx([0.2 * share], rel=1e-8)
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.004, -0.03, 1.0, 7.0, -100.0])
 def test_slopes_are_those_of_the_force(speed: float) -> None:
     """At any speed: 100 rad/s are 10000 times the friction speed."""
-    effects = of_pendulum(damping=0.3, friction=0.2, stiffness=5.0, rest=0.4)
-    at, only = np.array([speed]), np.array([0])
-    by_q, by_v = effects.slopes(at)
-    found = slopes(lambda dv: effects.force(np.zeros(1), at + dv, only), 1, h=1e-5)
-    assert by_v == pytest.approx(found[0], rel=1e-7)
-    assert by_q == pytest.approx([5.0])
+    effects, at = of_pendulum(damping=0.3, friction=0.2), np.array([speed])
+    found = slopes(lambda dv: effects.resistance(at + dv), 1, h=1e-5)
+    assert effects.slopes(at) == pytest.approx(found[0], rel=1e-7)
 
 
 def test_springs_hold_the_energy_that_stretching_takes() -> None:
-    effects = of_pendulum(stiffness=5.0, rest=0.4)
-    only = np.array([0])
-    slope = slopes(lambda dq: np.array(effects.energy(1.0 + dq, only)), 1)
-    assert slope == pytest.approx(effects.force(np.ones(1), np.zeros(1), only), rel=1e-9)
-    assert effects.energy(np.array([0.4]), only) == 0
+    springs = Springs(pendulum(None).model, of_pendulum(stiffness=5.0, rest=0.4))
+    slope = slopes(lambda dq: np.array(springs.energy(1.0 + dq)), 1)
+    assert slope == pytest.approx(springs.force(np.ones(1)), rel=1e-9)
+    assert springs.energy(np.array([0.4])) == 0
 
 
 def test_arrays_are_copies_that_nobody_changes() -> None:
@@ -152,21 +143,6 @@ def test_springs_count_as_potential_energy() -> None:
 def test_unknown_joints_are_refused_with_those_there_are() -> None:
     with pytest.raises(MechanismError, match="damping: no joint 'knee'; there are: ball, hinge"):
         JointEffects.named(tree(), damping={"knee": 1.0})
-
-
-@pytest.mark.parametrize("name", ["ball", "turn", "cross"])
-@pytest.mark.parametrize("what", ["stiffness", "rest"])
-def test_springs_are_for_joints_of_one_coordinate(name: str, what: str) -> None:
-    with pytest.raises(MechanismError, match=f"{what}: joint '{name}' has . coordinates, not one"):
-        JointEffects.named(tree(), **{what: {name: 1.0}})
-
-
-def test_springs_on_balls_are_refused_by_the_mechanism_too() -> None:
-    """Given as arrays they cannot be checked before: a ball's q is a quaternion, no angle."""
-    model = tree()
-    effects = JointEffects(*np.zeros((2, model.nv)), np.ones(model.nv), np.zeros(model.nv))
-    with pytest.raises((InputError, MechanismError), match="ball"):
-        ClosedLoopModel(model, [], ["hinge"], effects=effects)
 
 
 @pytest.mark.parametrize("value", [[1.0, 2.0], "much"])

@@ -111,3 +111,11 @@ def test_moving_bodies_that_carry_both_ends_of_a_closure() -> None:
     for seed, kind in ((30, "spherical"), (31, "rigid"), (21, "rigid")):
         c = case(seed, kinds=[kind], planar=seed == 21)
         check(compiled(c), motions(c), ("derivatives",))
+
+
+@pytest.mark.parametrize("seed", [0, 2])
+def test_springs_of_balls_and_free_joints(seed: int) -> None:
+    c = case(seed, effects=True, joints=("ball", "free", "revolute"))
+    springs = c.mechanism.system.springs
+    assert springs is not None and springs.turns and springs.shifts
+    assert check(compiled(c), motions(c), ALL) > 20

@@ -27,7 +27,8 @@ from rps_pin.closed_loop.constraints.completion import (
 from rps_pin.closed_loop.constraints.equations import ClosureEquations, refuse_twice
 from rps_pin.closed_loop.constraints.factorisation import PassiveFactorisation
 from rps_pin.closed_loop.constraints.rank_rule import EXACT, RankRule
-from rps_pin.closed_loop.dynamics import passive_joint_forces
+from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
+from rps_pin.closed_loop.dynamics.springs import Springs
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.errors import ClosureError, InputError, MechanismError
 from rps_pin.numerics.linear_algebra import Decomposition, refuse_condition
@@ -60,7 +61,9 @@ class ConstraintSystem:
     rule : RankRule
         By which the rank of the closures' Jacobian is decided; found out when first asked for.
     effects : JointEffects or None
-        Passive joint forces; `coordinates` are the indices in q that their springs act on.
+        Passive joint forces.
+    springs : Springs or None
+        None where no joint has one.
     limits : JointLimits
     max_condition : float
     """
@@ -71,7 +74,7 @@ class ConstraintSystem:
         closures: Sequence[Closure],
         actuated: Sequence[str],
         *,
-        effects: passive_joint_forces.JointEffects | None = None,
+        effects: JointEffects | None = None,
         characteristic_length: float | None = None,
         max_condition: float = MAX_CONDITION,
         rule: RankRule | None = EXACT,
@@ -86,8 +89,6 @@ class ConstraintSystem:
             raise InputError(f"max_condition = {max_condition}: it must be at least 1")
         if effects is not None and effects.damping.size != model.nv:
             raise InputError(f"effects are of {effects.damping.size} velocities, not {model.nv}")
-        if effects is not None:
-            passive_joint_forces.refuse_springs(model, effects)
         self.data = equations.data
         self.actuated = self.velocity_indices(self.actuated_names, "to actuate")
         self.passive = np.setdiff1d(np.arange(model.nv), self.actuated)
@@ -104,7 +105,9 @@ class ConstraintSystem:
         self.ranks: tuple[int, int] | None = None
         #: For actuators that are more or fewer than the motions, or not independent, once needed.
         self.completion: CompletedFactorisation | None = None
-        self.effects, self.coordinates = effects, passive_joint_forces.coordinate_indices(model)
+        self.effects, self.springs = effects, None
+        if effects is not None and effects.stiffness.any():
+            self.springs = Springs(model, effects)
         self.limits = JointLimits(model)
         self._frame_ids: dict[str, int] = {}
 

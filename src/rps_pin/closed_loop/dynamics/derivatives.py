@@ -177,9 +177,9 @@ class DynamicsDerivatives:
         )
         by_q -= beyond
         if system.effects is not None:
-            stiffness, damping = system.effects.slopes(motion[1])
-            by_q += np.diag(stiffness)
-            by_v += np.diag(damping)
+            by_v += np.diag(system.effects.slopes(motion[1]))
+        if system.springs is not None:
+            by_q += system.springs.slope(motion[0])
         return (by_q, by_v, mass), rows
 
     def _solution(self, q: Array, chosen: Indices) -> tuple[Solved, IdleSlopes]:

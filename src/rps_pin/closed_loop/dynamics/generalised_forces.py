@@ -29,7 +29,9 @@ def resisting_force(
     """Return passive joint forces less external forces, (nv,); after `computeJointJacobians`."""
     force = -external_force(system, wrenches)
     if system.effects is not None:
-        force += system.effects.force(q, v, system.coordinates)
+        force += system.effects.resistance(v)
+    if system.springs is not None:
+        force += system.springs.force(q)
     return force
 
 
@@ -53,6 +55,6 @@ def energy(system: ConstraintSystem, q: Array, v: Array) -> tuple[float, float]:
     """Return kinetic energy, rotors included, and potential energy, springs included, J."""
     kinetic = float(v @ tree_mass(system, q) @ v) / 2  # with armature, unlike Pinocchio's own
     potential = pin.computePotentialEnergy(system.model, system.data, q)
-    if system.effects is not None:
-        potential += system.effects.energy(q, system.coordinates)
+    if system.springs is not None:
+        potential += system.springs.energy(q)
     return kinetic, float(potential)

@@ -2,9 +2,10 @@
 
 They resist the motion with the generalised force
 
-    e(q, v) = d v + f tanh(v / v_s) + k (q - q_0),
+    e(q, v) = d v + f tanh(v / v_s) + k s(q),
 
-which adds to what `rnea` returns. Dry friction is smooth: it reaches 76 % of f at the speed v_s,
+which adds to what `rnea` returns. The stretch s of a spring is q - q_0, or the turn from rest of a
+ball; see `springs`. Dry friction is smooth: it reaches 76 % of f at the speed v_s,
 and creeps below it instead of sticking. Rotor inertia is not a passive force: set
 ``model.armature``, which Pinocchio's algorithms include.
 """
@@ -18,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array, Indices
+from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import joint_id
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.numerics.elementary import Number, tanh
@@ -54,9 +55,11 @@ class JointEffects:
     friction
         f, shape (nv,), N m or N; not negative.
     stiffness
-        k, shape (nv,), N m/rad or N/m; not negative, and zero but for joints of one coordinate.
+        k, shape (nv,), N m/rad or N/m; not negative. The turns of a ball, and the turns and the
+        shifts of a free-flyer, have one.
     rest
-        q_0, shape (nv,), rad or m.
+        Where springs are at rest, shape (nv,), rad or m: coordinates; of a ball its rotation
+        vector; of a free-flyer its position, then its rotation vector.
     friction_speed
         v_s, rad/s or m/s; positive.
 
@@ -88,8 +91,8 @@ class JointEffects:
         *,
         damping: Mapping[str, ArrayLike] | None = None,
         friction: Mapping[str, ArrayLike] | None = None,
-        stiffness: Mapping[str, float] | None = None,
-        rest: Mapping[str, float] | None = None,
+        stiffness: Mapping[str, ArrayLike] | None = None,
+        rest: Mapping[str, ArrayLike] | None = None,
         friction_speed: float = FRICTION_SPEED,
     ) -> JointEffects:
         """Return effects given by joint names; joints not named have none.
@@ -98,60 +101,27 @@ class JointEffects:
         ----------
         model
             The tree with these joints.
-        damping, friction
+        damping, friction, stiffness, rest
             A number for all of a joint's velocities, or one for each.
-        stiffness, rest
-            Of joints of one coordinate.
         friction_speed
             As for the class.
 
         Raises
         ------
         MechanismError
-            If there is no such joint (lists those there are), or a spring is put on a joint of
-            several coordinates.
+            If there is no such joint (lists those there are), or not as many numbers.
         """
         given = {"damping": damping, "friction": friction, "stiffness": stiffness, "rest": rest}
         arrays = {what: by_joint(model, values or {}, what) for what, values in given.items()}
         return cls(**arrays, friction_speed=friction_speed)
 
-    def force(self, q: Array, v: Array, q_of_v: Indices) -> Array:
-        """Return e(q, v), shape (nv,); `q_of_v` from `coordinate_indices`."""
-        resisting = friction_force(v, self.damping, self.friction, self.friction_speed)
-        return np.asarray(resisting + self.springs(q, q_of_v))
+    def resistance(self, v: Array) -> Array:
+        """Return damping and friction at v, shape (nv,)."""
+        return np.asarray(friction_force(v, self.damping, self.friction, self.friction_speed))
 
-    def springs(self, q: Array, q_of_v: Indices) -> Array:
-        """Return the springs' part of e(q, v), shape (nv,)."""
-        return self.stiffness * (q[q_of_v] - self.rest)
-
-    def slopes(self, v: Array) -> tuple[Array, Array]:
-        """Return the derivatives of e with respect to q and v, both diagonal, shapes (nv,)."""
-        return self.stiffness, friction_slope(v, self.damping, self.friction, self.friction_speed)
-
-    def energy(self, q: Array, q_of_v: Indices) -> float:
-        """Return the energy of the springs, k (q - q_0)^2 / 2, J."""
-        return float(self.stiffness @ (q[q_of_v] - self.rest) ** 2) / 2
-
-
-def coordinate_indices(model: pin.Model) -> Indices:
-    """Return, for each velocity, the index of its coordinate in q.
-
-    Joints with more coordinates than velocities (balls, free-flyers, unbounded turns) have none:
-    their entries are those of the joint's first coordinate, and mean nothing.
-    """
-    indices = np.zeros(model.nv, dtype=np.intp)
-    for joint in list(model.joints)[1:]:
-        offsets = np.arange(joint.nv) if joint.nq == joint.nv else np.zeros(joint.nv, np.intp)
-        indices[joint.idx_v : joint.idx_v + joint.nv] = joint.idx_q + offsets
-    return indices
-
-
-def refuse_springs(model: pin.Model, effects: JointEffects) -> None:
-    """Raise `MechanismError` if a spring acts on a joint of several coordinates."""
-    for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
-        stiffness = effects.stiffness[joint.idx_v : joint.idx_v + joint.nv]
-        if stiffness.any() and not joint.nq == joint.nv == 1:
-            raise MechanismError(f"stiffness: joint {name!r} has {joint.nq} coordinates, not one")
+    def slopes(self, v: Array) -> Array:
+        """Return the derivatives of damping and friction by v, which are diagonal, shape (nv,)."""
+        return np.asarray(friction_slope(v, self.damping, self.friction, self.friction_speed))
 
 
 def by_joint(model: pin.Model, values: Mapping[str, ArrayLike], what: str) -> Array:
@@ -159,8 +129,6 @@ def by_joint(model: pin.Model, values: Mapping[str, ArrayLike], what: str) -> Ar
     array = np.zeros(model.nv)
     for name, value in values.items():
         joint = model.joints[joint_id(model, name, what)]
-        if what in ("stiffness", "rest") and not joint.nq == joint.nv == 1:
-            raise MechanismError(f"{what}: joint {name!r} has {joint.nq} coordinates, not one")
         try:
             array[joint.idx_v : joint.idx_v + joint.nv] = np.asarray(value, dtype=np.float64)
         except (TypeError, ValueError):

@@ -76,8 +76,8 @@ class Description(Entry):
     merge: list[MergeEntry] = Field(default_factory=list)
     damping: dict[str, NonNegative | list[NonNegative]] = Field(default_factory=dict)
     friction: dict[str, NonNegative | list[NonNegative]] = Field(default_factory=dict)
-    stiffness: dict[str, NonNegative] = Field(default_factory=dict)
-    rest: dict[str, Finite] = Field(default_factory=dict)
+    stiffness: dict[str, NonNegative | list[NonNegative]] = Field(default_factory=dict)
+    rest: dict[str, Finite | list[Finite]] = Field(default_factory=dict)
     armature: dict[str, NonNegative | list[NonNegative]] = Field(default_factory=dict)
     friction_speed: Positive | None = None
     characteristic_length: Positive | None = None

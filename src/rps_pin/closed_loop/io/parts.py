@@ -34,8 +34,8 @@ class MechanismParts:
     home
         A configuration to close the loops from, shape (nq,), or None.
     damping, friction, stiffness, rest
-        By joint name: N s/m or N m s/rad; N or N m; N/m or N m/rad; m or rad. Joints that are
-        not named have none.
+        By joint name, a number or one for each velocity: N s/m or N m s/rad; N or N m; N/m or
+        N m/rad; m or rad. Joints that are not named have none.
     friction_speed
         Speed at which dry friction has risen to tanh(1) of itself, m/s or rad/s; None if the
         description does not say.
@@ -57,10 +57,10 @@ class MechanismParts:
     closures: tuple[Closure, ...] = ()
     actuated: tuple[str, ...] = ()
     home: Array | None = None
-    damping: Mapping[str, float] = field(default_factory=dict)
-    friction: Mapping[str, float] = field(default_factory=dict)
-    stiffness: Mapping[str, float] = field(default_factory=dict)
-    rest: Mapping[str, float] = field(default_factory=dict)
+    damping: Mapping[str, ArrayLike] = field(default_factory=dict)
+    friction: Mapping[str, ArrayLike] = field(default_factory=dict)
+    stiffness: Mapping[str, ArrayLike] = field(default_factory=dict)
+    rest: Mapping[str, ArrayLike] = field(default_factory=dict)
     friction_speed: float | None = None
     name: str = ""
     characteristic_length: float | None = None

@@ -84,7 +84,7 @@ def damping_at(system: ConstraintSystem, q: Array, v: Array, basis: Array) -> Da
     effects = system.effects
     if effects is None or not (effects.damping.any() or effects.friction.any()):
         return None
-    slopes = effects.slopes(v)[1]
+    slopes = effects.slopes(v)
     basis = basis.copy()
     mass = basis.T @ tree_mass(system, q) @ basis
     return Damping(basis, slopes, mass, basis.T @ (slopes[:, None] * basis))

@@ -160,8 +160,8 @@ class ClosedManifold:
         power = float(tau.dot(v.take(system.actuated)))
         if resisting is not None:
             power -= float(resisting.dot(v))
-        if system.effects is not None:
-            power += float(system.effects.springs(q, system.coordinates).dot(v))
+        if system.springs is not None:
+            power += float(system.springs.force(q).dot(v))
         return a, power
 
     def _basis_and_bias(self, jacobian: Array, bias: Array) -> tuple[Array, Array]:

@@ -241,10 +241,10 @@ def _planar_tangent(q: Expression) -> Expression:
 
 
 def _spherical(q: Expression, linear: Array, angular: Array) -> Placement:
-    return _rotation(q), ca.SX(3, 1)
+    return rotation_of(q), ca.SX(3, 1)
 
 
-def _rotation(quaternion: Expression) -> Expression:
+def rotation_of(quaternion: Expression) -> Expression:
     """Return the rotation matrix of a unit quaternion (x, y, z, w)."""
     x, y, z, w = quaternion.elements()
     x2, y2, z2 = 2 * x, 2 * y, 2 * z
@@ -271,7 +271,7 @@ def _product(q: Expression, vector: Expression, scalar: Expression) -> Expressio
     return ca.vertcat(w * vector + scalar * u + ca.cross(u, vector), w * scalar - ca.dot(u, vector))
 
 
-def _spherical_difference(q: Expression, other: Expression) -> Expression:
+def turn_between(q: Expression, other: Expression) -> Expression:
     """Return the rotation vector of q^-1 other, of at most half a turn."""
     relative = _product(ca.vertcat(-q[:3], q[3]), other[:3], other[3])
     relative = ca.if_else(relative[3] < 0, -1, 1) * relative
@@ -285,7 +285,7 @@ def _spherical_tangent(q: Expression) -> Expression:
 
 
 def _free(q: Expression, linear: Array, angular: Array) -> Placement:
-    return _rotation(q[3:]), q[:3]
+    return rotation_of(q[3:]), q[:3]
 
 
 def _free_moved(q: Expression, dv: Expression) -> Expression:
@@ -299,13 +299,13 @@ def _free_moved(q: Expression, dv: Expression) -> Expression:
     chord = v + sinc * sinc / 2 * across + cubic * ca.cross(w, across)
     quaternion = _near_unit(_product(q[3:], sinc / 2 * w, cosine))
     sign = ca.if_else(cosine < 0, -1, 1)
-    return ca.vertcat(q[:3] + _rotation(q[3:]) @ chord, sign * quaternion)
+    return ca.vertcat(q[:3] + rotation_of(q[3:]) @ chord, sign * quaternion)
 
 
 def _free_difference(q: Expression, other: Expression) -> Expression:
     """Undo the screw's chord: v = e - w x e / 2 + k w x (w x e), e = R' (p - p_q)."""
-    w = _spherical_difference(q[3:], other[3:])
-    e = _rotation(q[3:]).T @ (other[:3] - q[:3])
+    w = turn_between(q[3:], other[3:])
+    e = rotation_of(q[3:]).T @ (other[:3] - q[:3])
     squared = ca.sumsqr(w)
     sinc, cosine, _ = _half_angle(squared)
     factor = ca.if_else(
@@ -318,7 +318,7 @@ def _free_difference(q: Expression, other: Expression) -> Expression:
 
 
 def _free_tangent(q: Expression) -> Expression:
-    return ca.diagcat(_rotation(q[3:]), _spherical_tangent(q[3:]))
+    return ca.diagcat(rotation_of(q[3:]), _spherical_tangent(q[3:]))
 
 
 def _half_angle(squared: Expression) -> tuple[Expression, Expression, Expression]:
@@ -364,7 +364,7 @@ _FAMILIES = {
     ),
     "Translation": _Family(_translation, _sum, _minus, _identity),
     "Planar": _Family(_planar, _planar_moved, _planar_difference, _planar_tangent),
-    "Spherical": _Family(_spherical, _spherical_moved, _spherical_difference, _spherical_tangent),
+    "Spherical": _Family(_spherical, _spherical_moved, turn_between, _spherical_tangent),
     "FreeFlyer": _Family(_free, _free_moved, _free_difference, _free_tangent),
 }
 

@@ -29,6 +29,7 @@ from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
 from rps_pin.codegen.expressions.closures import ClosureRows, closure_rows
 from rps_pin.codegen.expressions.elimination import LDL, Householder
 from rps_pin.codegen.expressions.independent import Partition
+from rps_pin.codegen.expressions.joints import clean, rotation_of, turn_between
 from rps_pin.codegen.expressions.parameters import Parameters
 from rps_pin.codegen.expressions.tree import Tree
 from rps_pin.errors import MechanismError
@@ -224,22 +225,31 @@ class MechanismExpressions:
     def springs(self) -> Expression:
         """The springs' part of e(q, v), shape (nv,)."""
         force = ca.SX(self.tree.model.nv, 1)
-        for i, stiffness, stretch in self._stretched():
-            force[i] = stiffness * stretch
+        for start, stiffness, stretch in self._stretched():
+            force[start : start + stretch.numel()] = stiffness * stretch
         return force
 
     @property
     def spring_energy(self) -> Expression:
         """Potential energy of the springs, J."""
-        return sum((k * x * x / 2 for _, k, x in self._stretched()), ca.SX(0))
+        return sum((k * ca.sumsqr(s) / 2 for _, k, s in self._stretched()), ca.SX(0))
 
     def _stretched(self) -> Iterator[tuple[int, float, Expression]]:
-        """Return velocity, stiffness and q - q_0 of each spring."""
-        effects = self.system.effects
-        if effects is not None:
-            for i, (k, rest) in enumerate(zip(effects.stiffness, effects.rest, strict=True)):
-                if k:
-                    yield i, float(k), self.q[int(self.system.coordinates[i])] - float(rest)
+        """Yield the first velocity, the stiffness and the stretch of each spring; see `springs`."""
+        springs, q = self.system.springs, self.q
+        if springs is None:
+            return
+        for i, coordinate in springs.single:
+            if springs.stiffness[i]:
+                yield i, float(springs.stiffness[i]), q[coordinate] - float(springs.rest[i])
+        for turn in springs.turns:
+            rest = ca.SX(clean(turn.rest.coeffs()))
+            here = q[turn.idx_q : turn.idx_q + 4]
+            yield turn.idx_v, turn.stiffness, turn_between(rest, here)
+        for shift in springs.shifts:
+            moved = q[shift.idx_q : shift.idx_q + 3] - ca.SX(shift.rest)
+            back = rotation_of(q[shift.idx_q + 3 : shift.idx_q + 7]).T
+            yield shift.idx_v, shift.stiffness, back @ moved
 
     @cached_property
     def external_forces(self) -> Expression:

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from rps_pin import MechanismError
+from rps_pin import JointEffects, MechanismError
+from rps_pin.closed_loop.dynamics.springs import Springs
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.mjcf.source import MjcfSource
 from tests.closed_loop.io.mjcf.twin import BODY, Twin, fourbar, mujoco_file
@@ -76,6 +78,52 @@ def test_damping_of_balls_and_free_joints_is_mujocos() -> None:
         assert worst(twin.passive()[0] - twin.passive()[1]) < 1e-12
 
 
+BALL = BODY.replace('"j"', '"j" type="ball" stiffness="0.8"').replace(
+    '"b"', '"b" quat="0.8 0.2 -0.5 0.3"'
+)
+FREE = BODY.replace('"b"', '"c" pos="0.3 -0.2 1" quat="0.8 0.2 -0.5 0.3"')
+BALL_AND_FREE = {
+    "ball": BALL,
+    "free": FREE.replace('"j"', '"k" type="free" stiffness="7" damping="0.2"'),
+    "free with a rotor": FREE.replace('"j"', '"k" type="free" stiffness="7" armature="0.1"'),
+    "both": BALL + FREE.replace('"j"', '"k" type="free" stiffness="7"'),
+    "spring and damper": BALL.replace('stiffness="0.8"', 'springdamper="0.5 1"'),
+}
+
+
+@each("text", BALL_AND_FREE.values(), ids=BALL_AND_FREE)
+def test_springs_of_balls_and_free_joints_are_mujocos(text: str) -> None:
+    """A free joint is at rest where its body is in the file, a ball at the unit quaternion."""
+    twin = Twin(mujoco_file(text, flags(energy="enable", gravity="disable")))
+    rng, springs = np.random.default_rng(0), []
+    for _ in range(20):
+        twin.random(rng, 2.0)
+        own, right = twin.passive()
+        assert worst(own - right) < 1e-12 * max(1.0, worst(right))
+        springs.append(worst(twin.d.qfrc_spring))
+        energy = Springs(twin.model, twin.effects()).energy(twin.q)
+        assert energy == pytest.approx(twin.d.energy[0], rel=1e-12)
+    assert min(springs) > 0.1
+    twin.set(twin.m.qpos0, 0 * twin.d.qvel)
+    assert worst(*twin.passive()) < 1e-15
+
+
+@each("kind", ["ball", "free"])
+def test_springs_at_rest_elsewhere_are_mujocos(kind: str) -> None:
+    """MuJoCo's files cannot say so, its models can: ``qpos_spring``."""
+    twin, rng = Twin(mujoco_file(BALL_AND_FREE[kind])), np.random.default_rng(1)
+    name, m = twin.parts.model.names[1], twin.m
+    for _ in range(10):
+        turn = Rotation.random(random_state=rng)
+        m.qpos_spring[-4:] = turn.as_quat(scalar_first=True)
+        m.qpos_spring[:-4] = rng.normal(size=m.nq - 4)
+        rest = np.concatenate([m.qpos_spring[:-4], turn.as_rotvec()])
+        effects = JointEffects.named(twin.model, stiffness=twin.parts.stiffness, rest={name: rest})
+        twin.random(rng, 2.0)
+        own = -twin.L.T @ Springs(twin.model, effects).force(twin.q)
+        assert worst(own - twin.d.qfrc_spring) < 1e-12 * worst(twin.d.qfrc_spring)
+
+
 MEDIUM = "forces of a medium are not read; a mechanism in vacuum has 0"
 FLEX = """<body><joint axis="0 1 0"/><geom size="0.1"/></body>
     <flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" radius=".01" dim="2"/>"""
@@ -89,14 +137,6 @@ REFUSED: dict[str, Any] = {
     "density": (mujoco_file(BODY, '<option density="1.2"/>'), "option has density = 1.2: "),
     "viscosity": (mujoco_file(BODY, '<option viscosity="0.1"/>'), MEDIUM),
     "flex": (mujoco_file(FLEX), "flexcomp is flexible, which is not read"),
-    "spring of a ball": (
-        joint('type="ball" stiffness="1"'),
-        "joint 'j' has a spring on several coordinates",
-    ),
-    "spring of a free joint": (
-        joint('type="free" stiffness="1"'),
-        "joint 'j' has a spring on several coordinates",
-    ),
     "stiffness": (joint('stiffness="1 2"'), "joint 'j' has a stiffness that is not linear"),
     "damping": (joint('damping="1 2"'), "joint 'j' has a damping that is not linear"),
     "negative": (joint('damping="-1"'), "joint 'j' has a negative damping"),

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from rps_pin.closed_loop.constraints.closures import JointCoupling
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
-from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects, coordinate_indices
+from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
+from rps_pin.closed_loop.dynamics.springs import Springs
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts
 
@@ -123,10 +124,7 @@ class Twin:
     def passive(self) -> tuple[Array, Array]:
         """Springs and dampers, without gravity compensation and dry friction."""
         effects = self.effects()
-        smooth = JointEffects(
-            effects.damping, 0 * effects.friction, effects.stiffness, effects.rest
-        )
-        own = smooth.force(self.q, self.v, coordinate_indices(self.model))
+        own = effects.damping * self.v + Springs(self.model, effects).force(self.q)
         return -self.L.T @ own, self.d.qfrc_spring + self.d.qfrc_damper
 
     def effects(self) -> JointEffects:

@@ -48,9 +48,9 @@ def passive(model: pin.Model, effects: JointEffects | None, q: Array, v: Array) 
     if effects is not None:
         force -= effects.damping * v
         for joint in list(model.joints)[1:]:
-            if joint.nq == joint.nv == 1:
-                k = joint.idx_v
-                force[k] -= effects.stiffness[k] * (q[joint.idx_q] - effects.rest[k])
+            if joint.nq == joint.nv:
+                k, own = (slice(i, i + joint.nv) for i in (joint.idx_v, joint.idx_q))
+                force[k] -= effects.stiffness[k] * (q[own] - effects.rest[k])
     return force
 
 

@@ -131,6 +131,47 @@ def test_damping_springs_and_rotors(seed: int, tmp_path: Path) -> None:
     assert_agrees(agreement(mechanism, mechanism.to_mjcf(tmp_path / "m.xml")))
 
 
+def sprung_ball(below: pin.JointModel, **given: object) -> ClosedLoopModel:
+    """A joint on the world, placed anywhere, a ball below it; both with springs."""
+    rng, model = np.random.default_rng(3), pin.Model()
+    for name, joint in (("first", below), ("ball", pin.JointModelSpherical())):
+        index = model.addJoint(model.njoints - 1, joint, random_placement(rng), name)
+        model.addJointFrame(index)
+        model.appendBodyToJoint(index, SOLID, random_placement(rng))
+        model.addBodyFrame(f"{name}_link", index, pin.SE3.Identity(), model.nframes - 1)
+    effects = JointEffects.named(model, damping={"ball": 0.3}, **given)
+    return ClosedLoopModel(model, [], [], effects=effects)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "rest", "written"),
+    [
+        (7.0, 0.0, "free"),
+        ([7.0] * 3 + [2.0] * 3, 0.0, "slides"),
+        (7.0, [0.2, -0.1, 0.4, 0.0, 0.0, 0.0], "slides"),
+    ],
+)
+def test_springs_of_balls_and_free_joints(
+    stiffness: object, rest: object, written: str, tmp_path: Path
+) -> None:
+    springs = {"stiffness": {"first": stiffness, "ball": 5.0}, "rest": {"first": rest}}
+    mechanism = sprung_ball(pin.JointModelFreeFlyer(), **springs)
+    path = mechanism.to_mjcf(tmp_path / "m.xml")
+    assert_agrees(agreement(mechanism, path))
+    assert ('type="free"' in path.read_text()) == (written == "free")
+
+
+@pytest.mark.parametrize("name", ["first", "ball"])
+def test_turns_at_rest_elsewhere_are_refused(name: str, tmp_path: Path) -> None:
+    turned = {"first": [0.0, 0.0, 0.0, 0.1, 0.2, 0.3], "ball": [0.1, 0.2, 0.3]}[name]
+    springs = {"stiffness": {name: 5.0}, "rest": {name: turned}}
+    mechanism = sprung_ball(pin.JointModelFreeFlyer(), **springs)
+    why = rf"joint '{name}': its spring is at rest where it is turned by \[0.1, 0.2, 0.3\] rad; Mu"
+    with pytest.raises(MechanismError, match=why):
+        mechanism.to_mjcf(tmp_path / "m.xml")
+    assert not (tmp_path / "m.xml").exists()
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_loops_of_a_plane_with_redundant_rows(seed: int, tmp_path: Path) -> None:
     mechanism = drivable(case(seed, planar=True).mechanism)

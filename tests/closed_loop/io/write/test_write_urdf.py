@@ -302,6 +302,22 @@ def test_effects_of_each_velocity_of_a_joint_come_back(tmp_path: Path) -> None:
     assert back.effects.friction.tolist() == [0.25] * 3
 
 
+@pytest.mark.parametrize("kind", [pin.JointModelSpherical(), pin.JointModelFreeFlyer()])
+def test_springs_of_balls_and_free_joints_come_back(kind: pin.JointModel, tmp_path: Path) -> None:
+    model = alone(kind)
+    stiffness = [4.0] * 3 if model.nv == 3 else [7.0] * 3 + [4.0] * 3
+    rest = np.linspace(-0.5, 0.6, model.nv)
+    effects = JointEffects.named(model, stiffness={"joint": stiffness}, rest={"joint": rest})
+    mechanism = ClosedLoopModel(model, [], ["joint"], effects=effects)
+    back = ClosedLoopModel.load(mechanism.to_urdf(tmp_path / "m.urdf"))
+    assert back.effects is not None
+    assert back.effects.stiffness.tolist() == stiffness
+    assert back.effects.rest.tolist() == rest.tolist()
+    q = pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq))
+    forces = [one.generalised_force(q, 0 * rest, 0 * rest) for one in (mechanism, back)]
+    assert worst(forces[0] - forces[1]) < 1e-12
+
+
 def test_shapes_are_carried_over(tmp_path: Path) -> None:
     from rps_pin.closed_loop.visuals import visual_model
 

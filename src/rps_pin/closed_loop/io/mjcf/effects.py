@@ -12,11 +12,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop.io.mjcf.actuators import Actuator, force_range
 from rps_pin.closed_loop.io.mjcf.source import MjcfSource
 from rps_pin.closed_loop.io.mjcf.tendons import Tendons
-from rps_pin.closed_loop.io.mjcf.tree import HINGE, SLIDE, MjcfTree
+from rps_pin.closed_loop.io.mjcf.tree import BALL, HINGE, SLIDE, MjcfTree, pose_of
 from rps_pin.closed_loop.io.parts import EFFECTS
 from rps_pin.errors import MechanismError
 
@@ -48,7 +50,7 @@ def refuse_other_forces(source: MjcfSource) -> None:
 
 def joint_effects(
     tree: MjcfTree, tendons: Tendons, actuators: Sequence[Actuator]
-) -> dict[str, dict[str, float]]:
+) -> dict[str, dict[str, Any]]:
     """Return damping, friction, stiffness and rest by joint, as `MechanismParts` has them.
 
     Armature and limits are put into the tree's model.
@@ -59,7 +61,7 @@ def joint_effects(
         If a joint or tendon has a force that is not read; with its line.
     """
     source, m = tree.source, tree.source.model
-    effects: dict[str, dict[str, float]] = {name: {} for name in EFFECTS}
+    effects: dict[str, dict[str, Any]] = {name: {} for name in EFFECTS}
     holders = [("joints", number, names) for number, names in enumerate(tree.parts)]
     holders += [("tendons", number, [name]) for number, name in tendons.names.items()]
     for kind, number, names in holders:
@@ -69,7 +71,9 @@ def joint_effects(
             if value and not any(map(source.disabled, flags)):
                 effects[effect] |= dict.fromkeys(names, value)
                 if force == "stiffness":
-                    effects["rest"][names[0]] = _rest(source, kind, number)
+                    effects["rest"] |= zip(
+                        names, _rests(source, kind, number, len(names)), strict=True
+                    )
         armature = _linear(source, kind, number, "armature", acting)
         for name in names:
             place = tree.model.joints[tree.model.getJointId(name)]
@@ -103,8 +107,8 @@ def _linear(
     return value
 
 
-def _rest(source: MjcfSource, kind: str, number: int) -> float:
-    """Return the coordinate at which a spring is at rest."""
+def _rests(source: MjcfSource, kind: str, number: int, parts: int) -> list[Any]:
+    """Return where a spring is at rest, as `JointEffects` has it, for each part of a joint."""
     m = source.model
     if source.read(f"{_prefix(kind)}_springyield", number):
         source.refuse(kind, number, "has a spring that yields, which is not read")
@@ -112,10 +116,20 @@ def _rest(source: MjcfSource, kind: str, number: int) -> float:
         low, high = m.tendon_lengthspring[number]
         if low != high:
             source.refuse(kind, number, f"is slack from {low:g} to {high:g}, which is not read")
-        return float(low)
-    if m.jnt_type[number] not in (HINGE, SLIDE):
-        source.refuse(kind, number, "has a spring on several coordinates, which is not read")
-    return float(m.qpos_spring[m.jnt_qposadr[number]])
+        return [float(low)]
+    rest = m.qpos_spring[m.jnt_qposadr[number] :]
+    if m.jnt_type[number] in (HINGE, SLIDE):
+        return [float(rest[0])]
+    if m.jnt_type[number] == BALL:
+        return [_rotation_vector(rest[:4])]
+    position, turn = rest[:3].tolist(), _rotation_vector(rest[3:7])
+    return [position, turn] if parts == 2 else [[*position, *turn]]
+
+
+def _rotation_vector(quaternion: Array) -> list[float]:
+    """Return the rotation vector of a quaternion (w, x, y, z), rad."""
+    found: list[float] = pin.log3(pose_of(np.zeros(3), quaternion).rotation).tolist()
+    return found
 
 
 def _add_limits(tree: MjcfTree, kind: str, number: int, place: Any) -> None:

@@ -49,9 +49,9 @@ def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, An
         lines += _mapping("home", home)
     lines += _mapping("damping", _by_joint(model, effects.damping))
     lines += _mapping("friction", _by_joint(model, effects.friction))
-    stiffness = _by_joint(model, effects.stiffness)
+    stiffness, rest = (_by_joint(model, a) for a in (effects.stiffness, effects.rest))
     lines += _mapping("stiffness", stiffness)
-    lines += _mapping("rest", {k: effects.rest[_idx_v(model, k)] for k in stiffness})
+    lines += _mapping("rest", {name: rest.get(name, 0.0) for name in stiffness})
     lines += _mapping("armature", _by_joint(model, model.armature))
     if effects.friction.any():
         lines.append(f"friction_speed: {number(effects.friction_speed)}")
@@ -72,10 +72,6 @@ def _coordinates(model: pin.Model, joint: int, q: Array) -> Array:
     own = coordinates(model, joint, q)
     is_turn = kind_of(model.joints[joint]) == "continuous"
     return np.arctan2(own[1:], own[:1]) if is_turn else own
-
-
-def _idx_v(model: pin.Model, name: str) -> int:
-    return int(model.joints[model.getJointId(name)].idx_v)
 
 
 def _by_joint(model: pin.Model, array: Array) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from rps_pin.closed_loop.io.write.source import (
     pitch_of,
     velocities,
 )
-from rps_pin.errors import MechanismError
+from rps_pin.errors import MechanismError, shown
 
 _X, _Y, _Z = np.eye(3)
 
@@ -112,6 +112,7 @@ def mujoco_joints(
         return found, screws
     if kind == "ball":
         _refuse_uneven(source, joint, slice(0, 3), "")
+        _refuse_rest(source, joint, slice(0, 3))
         return [MujocoJoint(name, "ball", None, np.roll(own, 1), None, one.idx_v)], []
     if kind == "planar":
         angle = np.array([math.atan2(own[3], own[2])])
@@ -125,7 +126,9 @@ def mujoco_joints(
             placed = model.jointPlacements[joint] * pin.XYZQUATToSE3(own)
             pose = np.concatenate([placed.translation, quaternion(placed.rotation)])
             _refuse_uneven(source, joint, slice(0, 3), "translations of ", moving_axes=True)
+            _refuse_rest(source, joint, slice(0, 6))
             return [MujocoJoint(name, "free", None, pose, None, one.idx_v)], []
+        _refuse_rest(source, joint, slice(3, 6))
         return [
             *_slides(source, joint, own[:3], names),
             MujocoJoint(name, "ball", None, np.roll(own[3:], 1), None, one.idx_v + 3),
@@ -163,8 +166,34 @@ def _losses(source: Source, joint: int, part: slice) -> dict[str, Array]:
 
 
 def _is_even(source: Source, joint: int) -> bool:
-    """Return whether each effect is one number for all velocities of a joint."""
-    return all(np.ptp(values) == 0 for values in _losses(source, joint, slice(None)).values())
+    """Return whether a joint's effects are MuJoCo's of free joints: one number for all velocities.
+
+    Springs of free joints are at rest in the pose of the file's body.
+    """
+    stiffness, rest = _spring(source, joint, slice(None))
+    even = [*_losses(source, joint, slice(None)).values(), stiffness]
+    shifted = stiffness.any() and rest[:3].any()
+    return not shifted and all(np.ptp(values) == 0 for values in even)
+
+
+def _spring(source: Source, joint: int, part: slice) -> tuple[Array, Array]:
+    """Return stiffness and rest of some of a joint's velocities."""
+    stiffness, rest = (
+        velocities(source.model, joint, array)[part]
+        for array in (source.effects.stiffness, source.effects.rest)
+    )
+    return stiffness, rest
+
+
+def _refuse_rest(source: Source, joint: int, part: slice) -> None:
+    """Refuse a spring of a ball that is not at rest at the neutral coordinates."""
+    stiffness, rest = _spring(source, joint, part)
+    if stiffness.any() and rest.any():
+        raise MechanismError(
+            f"joint {source.model.names[joint]!r}: its spring is at rest where it is turned by "
+            f"{shown(rest[-3:].tolist())} rad; MuJoCo has springs of turns that are at rest at the "
+            "neutral coordinates only"
+        )
 
 
 def _refuse_uneven(
