@@ -8,9 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel
 from tests.cli.commands import rps_pin
+
+Array = NDArray[np.float64]
 
 URDF = Path(__file__).resolve().parents[2] / "urdf"
 
@@ -139,6 +142,61 @@ _FLOATING = """<mujoco model="floating"><worldbody>
 <body name="tail" pos=".1 0 0"><joint name="hip" axis="0 1 0"/>
 <geom type="capsule" size=".01" fromto="0 0 0 .2 0 0" mass=".3"/></body></body>
 </worldbody><actuator><motor joint="hip"/></actuator></mujoco>"""
+
+
+_WRONG_VALUES = [
+    (["nowhere=1"], "no joint 'nowhere' to give a value; there are: crank_joint, coupler_joint"),
+    (["crank_joint=abc"], "'crank_joint=abc': it must be JOINT=NUMBER"),
+    (["crank_joint"], "'crank_joint': it must be JOINT=NUMBER"),
+    (["crank_joint=nan"], "the value of joint 'crank_joint' is not finite"),
+    (["crank_joint=1", "crank_joint=2"], "joint 'crank_joint' is named twice"),
+    (["crank_joint=99"], "outside their limits: 'crank_joint' at 99 (-6.28319 to 6.28319)"),
+    (["rocker_joint=3.1"], "closure 'knee' stays open by 0.246978 m"),
+    (["crank_joint=1", "rocker_joint=1"], "closure 'knee' stays open by 0.0828846 m"),
+]
+
+
+@pytest.mark.parametrize("command", ["assembly-modes", "simulate"])
+@pytest.mark.parametrize(("values", "said"), _WRONG_VALUES)
+def test_joint_values_that_cannot_be_are_refused(
+    command: str, values: list[str], said: str, tmp_path: Path
+) -> None:
+    """Smallest gaps: see `test_the_gaps_are_the_smallest`."""
+    option = {"assembly-modes": "--at", "simulate": "--start"}[command]
+    pairs = [text for value in values for text in (option, value)]
+    run = rps_pin(command, "four_bar", *pairs, folder=tmp_path)
+    assert run.returncode == 1
+    assert said in run.stderr
+    assert "Traceback" not in run.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("cranks", "rocker", "gap"),
+    [(np.linspace(-np.pi, np.pi, 100_001), 3.1, 0.246978), (np.array([1.0]), 1.0, 0.0828846)],
+)
+def test_the_gaps_are_the_smallest(cranks: Array, rocker: float, gap: float) -> None:
+    """Bars of 0.2, 0.5, 0.4 and 0.45 m: the coupler's end comes no nearer to the rocker's."""
+    apart = 0.45 + 0.4 * np.exp(1j * rocker) - 0.2 * np.exp(1j * cranks)
+    assert np.abs(np.abs(apart) - 0.5).min() == pytest.approx(gap, abs=1e-6)
+
+
+def test_a_start_may_leave_the_assembly_mode(tmp_path: Path) -> None:
+    """The mirror image of home: the rocker comes there through its dead point only."""
+    start = ("simulate", "four_bar", "--start", "rocker_joint=-1.3", "--duration", "0.01")
+    run = rps_pin(*start, folder=tmp_path)
+    assert run.returncode == 1
+    assert "a singularity is met" in run.stderr
+    assert rps_pin(*start, "--jump", folder=tmp_path).returncode == 0
+
+
+def test_assembly_modes_are_printed_as_wide_as_they_fit(tmp_path: Path) -> None:
+    run = rps_pin("assembly-modes", "rps", "--ignore-limits", folder=tmp_path, COLUMNS="80")
+    assert run.returncode == 0, run.stderr
+    lines = run.stdout.splitlines()
+    assert max(map(len, lines[:-1])) <= 80
+    assert "…" not in run.stdout
+    assert "more: --json prints all; --frame NAME" in run.stdout
 
 
 def test_what_cannot_be_held_is_told(tmp_path: Path) -> None:

@@ -304,6 +304,26 @@ def test_idle_freedoms_make_no_further_modes() -> None:
     np.testing.assert_allclose(np.sort(found.q[:, -1]), [side - reach, side + reach], atol=1e-12)
 
 
+def test_joints_that_no_closure_moves_keep_their_values() -> None:
+    """A four-bar on a floating base, with a tail: the modes are those of the fixed one."""
+    model = pin.Model()
+    base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
+    for name, bars, x in (("a", (0.5, 1.2), 0.0), ("b", (0.8,), 1.0), ("tail", (0.3,), -0.2)):
+        parent, place = base, x
+        for k, bar in enumerate(bars):
+            parent = model.addJoint(parent, pin.JointModelRZ(), at(place), f"{name}{k}")
+            model.appendBodyToJoint(parent, pin.Inertia.Random(), pin.SE3.Identity())
+            place = bar
+        model.addFrame(pin.Frame(name, parent, at(place), pin.FrameType.OP_FRAME))
+    mechanism = ClosedLoopModel(model, [LoopClosure("a", "b")], ["a0", "tail0"])
+    guess = np.concatenate([[1.0, 2.0, 3.0, 0.6, 0.0, 0.0, 0.8], [0.3, -0.5, 1.0, 0.7]])
+    found = mechanism.assembly_modes({"a0": 0.3}, guess)
+    fixed = four_bar().assembly_modes([0.3])
+    np.testing.assert_array_equal(found.q[:, :8], np.array([guess[:8]] * 2))
+    np.testing.assert_array_equal(found.q[:, 10], [0.7, 0.7])
+    assert same_sets(found.q[:, 7:10], fixed.q) < 1e-12
+
+
 def test_values_that_leave_motions_open_are_refused_by_name() -> None:
     with pytest.raises(InputError, match=r"leave 1 motion\(s\) open, of joints 'a"):
         four_bar().assembly_modes({})

@@ -13,8 +13,11 @@ from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.closed_loop.column_names import column_names
 
-#: Modes in the printed table.
-_MOST = 8
+#: Modes in the printed table at most, and the width of one.
+_MOST, _WIDTH = 8, 15
+#: Values below this are printed as zero.
+_ZERO = 1e-12
+_CONDITION = "condition number"
 
 
 def assembly_modes_command(
@@ -74,17 +77,24 @@ def assembly_modes_command(
         expected = {"expected": _plain(found.expected)}
         common.print_json({"mechanism": mechanism.name, "modes": modes} | told | expected)
         return
-    columns = [f"{k + 1} ({hits})" for k, hits in enumerate(found.hits[:_MOST])]
-    rows = [
-        (name, *(f"{q[i]:.6g}" for q in found.q[:_MOST]))
-        for i, name in enumerate(column_names(mechanism.model)[0])
-    ]
-    rows.append(("condition number", *(f"{c:.3g}" for c in found.condition[:_MOST])))
+    names = column_names(mechanism.model)[0]
+    room = console.width - max(map(len, [*names, _CONDITION])) - 4
+    shown = max(1, min(room // _WIDTH, _MOST))
+    columns = [f"{k + 1} ({hits})" for k, hits in enumerate(found.hits[:shown])]
+    rows = [(name, *(_short(q[i]) for q in found.q[:shown])) for i, name in enumerate(names)]
+    rows.append((_CONDITION, *(f"{c:.3g}" for c in found.condition[:shown])))
     if found.hits.size:
         console.print(common.table_of(rows, "mode (starts)", *columns))
-    if found.hits.size > _MOST:
-        console.print(f"{found.hits.size - _MOST} more: --json prints all")
+    if found.hits.size > shown:
+        console.print(
+            f"{found.hits.size - shown} more: --json prints all"
+            + ("" if frame else "; --frame NAME tells modes apart by that frame alone")
+        )
     console.print(str(found))
+
+
+def _short(number: float) -> str:
+    return f"{0.0 if abs(number) < _ZERO else number:.6g}"
 
 
 def _plain(number: float) -> float | None:

@@ -48,6 +48,9 @@ def simulate_command(
         options.JointValues,
         options.joint_values("Initial position of a joint, rad or m; the others start from home."),
     ] = None,
+    jump: Annotated[
+        bool, typer.Option("--jump", help="Let --start leave the assembly mode of home.")
+    ] = False,
     speed: Annotated[
         options.JointValues,
         options.joint_values("Initial speed of an actuated joint, rad/s or m/s; default: 0."),
@@ -89,7 +92,7 @@ def simulate_command(
     mechanism, file = options.load_mechanism(file, ignore_limits, accuracy)
     q = mechanism.close(mechanism.home)
     if start:
-        q = mechanism.complete(options.by_joint(start, "--start"), q)
+        q = mechanism.complete(options.by_joint(start, "--start"), q, jump=jump)
     still = np.zeros(mechanism.model.nv)
     speeds = _of_actuated(mechanism, speed, "--speed")
     v = mechanism.velocity(q, speeds) if speeds.any() else still

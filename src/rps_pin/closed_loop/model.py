@@ -730,7 +730,8 @@ class ClosedLoopModel:
             guess's actuated joints.
         q_guess
             Configuration that the starts are drawn about, and the first of them, shape (nq,). Left
-            out: `home`, or the neutral configuration if that cannot be closed.
+            out: `home`, or the neutral configuration if that cannot be closed. Joints that no
+            closure moves, such as a robot's floating base, keep its values.
         frames
             Frames by whose places modes are told apart, ``["platform"]``. Left out: all links; so
             a leg turned by half a turn on its universal joint makes another mode.

@@ -174,7 +174,15 @@ def _overdetermined(
 ) -> Array:
     """Return the configuration with more given values than there are motions."""
     q, left = approached(system, given, coordinates_of(system.model, given), start, target)
-    ended = close(system, with_values(system, q, named), fixed=list(named), within_limits=False)
+    wanted = with_values(system, q, named)
+    try:
+        ended = close(system, wanted, fixed=list(named), within_limits=False)
+    except ClosureError as error:
+        raise ClosureError(
+            f"{given.size} values are given, more than there are motions, and no configuration "
+            f"with all of them was found: {error}",
+            error.gap,
+        ) from None
     moved = np.abs(pin.difference(system.model, q, ended) / system.column_scale).max(initial=0.0)
     if moved > _NEAR * system.equations.length:
         raise ClosureError(

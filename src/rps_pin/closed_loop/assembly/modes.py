@@ -1,7 +1,8 @@
 """Assembly modes: the closed configurations with given joint values, as far as a search finds them.
 
-The loops are closed from random configurations (`random_starts`), in batches (`many`), with the
-given joints held; what comes out is closed to rounding (`closing`) and counted once (`sameness`).
+The loops are closed from random configurations (`random_starts`), in batches (`many`). The given
+joints are held, and those that no closure moves. What comes out is closed to rounding (`closing`)
+and counted once (`sameness`).
 
 The search has no proof: it finds what starts lead to. Each mode has a share of the starts that end
 in it. If nothing is known about these shares, and w modes were found in n closed starts, the
@@ -114,7 +115,7 @@ def assembly_modes(
         if within_limits:
             refuse_values_outside(system, about, named)
     held = np.zeros(system.model.nv, dtype=bool)
-    held[given] = True
+    held[given] = held[system.unmoving()] = True
     system.settle_rule(about)
     equations = equations or equations_of(system)
     same = Sameness(system, about, frames)

@@ -263,12 +263,12 @@ class ConstraintSystem:
             self.factorisation_of(dependent, independent),
             self.actuated,
             PassiveVelocities(self.passive, idle),
-            self._unmoving(),
+            self.unmoving(),
             self.column_scale,
         )
         return self.completion
 
-    def _unmoving(self) -> Indices:
+    def unmoving(self) -> Indices:
         """Return velocities whose columns of J are zero: they move both frames of each closure."""
         model, moving = self.model, np.zeros(self.model.nv, dtype=bool)
         for closed in self.equations.closed_frames:
