@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
+import tarfile
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -11,8 +14,11 @@ pytest.importorskip("mujoco")
 
 from benchmarks.robot_files.beside_mujoco import compiled, differences
 from benchmarks.robot_files.find import RobotFile, kind_of, robot_files
+from benchmarks.robot_files.packages import packages
 from benchmarks.robot_files.trial import loaded, tried
 from benchmarks.zoo import main
+from benchmarks.zoo_fetch import main as fetch
+from benchmarks.zoo_fetch import unpacked
 
 HINGES = """<mujoco><worldbody>
   <body name="one"><joint name="a" axis="0 1 0" damping="0.3" armature="0.1"/>
@@ -109,3 +115,53 @@ def test_parts_and_limits_of_time(tmp_path: Path) -> None:
     assert part.included and not whole.included
     assert tried(part).message == "part of an MJCF"
     assert isinstance(whole, RobotFile)
+
+
+def test_an_inertia_without_mass_is_compared(tmp_path: Path) -> None:
+    """MuJoCo leaves it out, so it is given some dust; the same for a link that moves."""
+    for kind in ("fixed", "continuous"):
+        more = (
+            '<link name="flag"><inertial><mass value="0.0"/><inertia ixx="0.1" iyy="0.2" '
+            f'izz="0.3" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="f" type="{kind}">'
+            '<parent link="tip"/><child link="flag"/><origin xyz="1 0 0"/><axis xyz="0 0 1"/>'
+            "</joint></robot>"
+        )
+        path = tmp_path / f"{kind}.urdf"
+        path.write_text(ARM.replace("</robot>", more), encoding="utf-8")
+        model, why = compiled(path, "URDF")
+        assert model is not None, why
+        assert max(differences(loaded(path, "URDF"), model).values()) < 1e-12
+
+
+def test_packages_have_versions_and_licences() -> None:
+    found = packages()
+    assert len(found) > 40
+    assert [one.name for one in found] == sorted(one.name for one in found)
+    assert all(one.version[0].isdigit() and one.licence for one in found)
+
+
+@pytest.mark.parametrize("form", ["whl", "tar.gz"])
+def test_archives_are_unpacked_without_code(form: str, tmp_path: Path) -> None:
+    archive, target = tmp_path / f"robots-1.0.{form}", (tmp_path / "robots").resolve()
+    members = {"robots/a.urdf": ARM, "robots/run.py": "1 / 0", "../outside.urdf": ARM}
+    if form == "whl":
+        with zipfile.ZipFile(archive, "w") as wheel:
+            for name, text in members.items():
+                wheel.writestr(name, text)
+    else:
+        with tarfile.open(archive, "w:gz") as source:
+            for name, text in members.items():
+                entry = tarfile.TarInfo(name)
+                entry.size = len(text.encode())
+                source.addfile(entry, io.BytesIO(text.encode()))
+    assert unpacked(archive, target) == 1
+    assert [path.name for path in tmp_path.rglob("*.*") if path != archive] == ["a.urdf"]
+
+
+def test_robots_are_not_fetched_into_the_repository(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        fetch([str(Path(__file__).parent / "robots")])
+    assert "is in the repository" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        fetch(["/tmp/robots", "no-such-package"])
+    assert "no package 'no-such-package'" in capsys.readouterr().err

@@ -27,6 +27,8 @@ _SIZES = {"mjJNT_HINGE": (1, 1), "mjJNT_SLIDE": (1, 1), "mjJNT_BALL": (4, 3), "m
 _CONTINUOUS = (2, 1)
 """Sizes of a turn without limits: cosine and sine."""
 _OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS")
+DUST = 1e-14
+"""Mass of a link with an inertia and no mass, kg: enough for MuJoCo to take it."""
 _HEADER = (
     '<mujoco><compiler balanceinertia="false" fusestatic="true" discardvisual="true"/></mujoco>'
 )
@@ -55,7 +57,17 @@ def _without_shapes(path: Path) -> str:
     for tag in ("visual", "collision", "mujoco", "gazebo", "transmission"):
         text = re.sub(rf"<{tag}\b[^>]*?/>", "", text)
         text = re.sub(rf"<{tag}\b.*?</{tag}\s*>", "", text, flags=re.DOTALL)
+    text = re.sub(r"<inertial\b.*?</inertial\s*>", _with_mass, text, flags=re.DOTALL)
     return text.replace("</robot>", f"{_HEADER}</robot>")
+
+
+def _with_mass(inertial: re.Match[str]) -> str:
+    """Give an inertia without mass some dust, without which MuJoCo leaves it out."""
+    if not re.search(r"\bi[xyz]{2}\s*=\s*[\"']\s*[-+.0eE]*[1-9]", inertial[0]):
+        return inertial[0]
+    return re.sub(
+        r"(<mass\b[^>]*value\s*=\s*[\"'])\s*[-+]?0*\.?0*([\"'])", rf"\g<1>{DUST}\2", inertial[0]
+    )
 
 
 def not_a_mechanism(model: Any, why: str) -> str:

@@ -89,14 +89,14 @@ def by_package(found: Sequence[Tried]) -> str:
     ]
     for package in sorted({one.package for one in found}):
         own = [one for one in found if one.package == package]
-        numbers = [_numbers(own, kind) for kind in (MJCF, URDF)]
-        if any(count for count, *_ in numbers):
-            cells = [str(cell) for row in numbers for cell in row]
+        rows = [numbers(own, kind) for kind in (MJCF, URDF)]
+        if any(count for count, *_ in rows):
+            cells = [str(cell) for row in rows for cell in row]
             lines.append(f"| {package} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
-def _numbers(found: Sequence[Tried], kind: str) -> tuple[int, int, str]:
+def numbers(found: Sequence[Tried], kind: str) -> tuple[int, int, str]:
     """Return how many of a kind are tried, load, and agree of how many."""
     agree = _count(found, kind, lambda t: t.agrees is True)
     compared = _count(found, kind, lambda t: t.agrees is not None)

@@ -280,8 +280,8 @@ def test_motion_without_mass_is_refused() -> None:
 def test_a_motion_without_mass_is_told_by_its_joints() -> None:
     """A flag without mass at the end of two bars: it alone turns freely."""
     urdf = robot(
-        link("one", 1.0),
-        link("two", 1.0, "0.1 0 0"),
+        link("one", 1.0, "0.1 0 0", 0.01),
+        link("two", 1.0, "0.1 0 0", 0.01),
         link("flag"),
         joint("revolute", "base", "one"),
         joint("revolute", "one", "two"),
