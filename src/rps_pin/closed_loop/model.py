@@ -339,7 +339,10 @@ class ClosedLoopModel:
             mechanism._home = mechanism.home  # closed, or not to be built
         else:
             mechanism._start = mechanism.system.normalised(parts.home, "home")
-            mechanism._start = mechanism._home = mechanism.close(parts.home)
+            try:
+                mechanism._start = mechanism._home = mechanism.close(parts.home)
+            except ClosureError as error:
+                raise parts.located(error) from None
         return mechanism
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED, JointEffects
-from rps_pin.errors import InputError
+from rps_pin.errors import ClosureError, InputError
 
 #: Effects at joints, by their names in a description.
 EFFECTS = ("damping", "friction", "stiffness", "rest")
@@ -51,6 +51,8 @@ class MechanismParts:
         Revolute joints that the file calls continuous; a home may give their cosine and sine.
     notes
         Sentences on what the reader has decided.
+    place_of
+        Where the file has a closure, by its name; "" where another file has it. None: not known.
     """
 
     model: pin.Model
@@ -68,6 +70,13 @@ class MechanismParts:
     accuracy: float | None = None
     continuous: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
+    place_of: Callable[[str], str] | None = field(default=None, compare=False)
+
+    def located(self, error: ClosureError) -> ClosureError:
+        """Return an error of a closure that stays open, with the place of the closure."""
+        names = [closure.name for closure in self.closures if repr(closure.name) in str(error)]
+        place = self.place_of(names[0]) if self.place_of and names else ""
+        return ClosureError(f"{place}: {error}", error.gap) if place else error
 
 
 def with_effects(

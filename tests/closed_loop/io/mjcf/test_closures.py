@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from rps_pin import ClosedLoopModel, LoopClosure, MechanismError
+from rps_pin import ClosedLoopModel, ClosureError, LoopClosure, MechanismError
 from rps_pin.closed_loop.constraints.closures import JointCoupling
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
@@ -250,6 +250,31 @@ def test_closures_given_come_after_the_files() -> None:
     parts = parts_from_mjcf(fourbar(equalities(CONNECTS["to the world"])), closures=[more])
     assert [closure.name for closure in parts.closures] == ["pin", "tip = knee"]
     assert parts.closures[0].frame_a == "pin:1"
+
+
+def test_a_loop_that_cannot_close_is_told_with_its_line() -> None:
+    """Within 1.51 degrees, two fingers cannot be 1.6 degrees apart."""
+    text = mujoco_file(
+        f"""<body><joint name="a" range="0 1.51" ref="1.1"/>{INERTIAL}</body>
+        <body><joint name="b" range="0 2" ref="-.5"/>{INERTIAL}</body>""",
+        """<tendon><fixed name="t"><joint joint="a" coef=".4"/><joint joint="b" coef="-.4"/></fixed>
+        </tendon>""",
+        '<equality><joint joint1="a" active="false"/>\n<tendon name="tie" tendon1="t"/></equality>',
+    )
+    with pytest.raises(
+        ClosureError, match="line 3: tendon 'tie': the loops do not close"
+    ) as caught:
+        ClosedLoopModel.from_mjcf(text)
+    assert caught.value.gap == pytest.approx(np.radians(0.09), rel=1e-6)
+    mechanism = ClosedLoopModel.from_mjcf(text, within_limits=False)
+    q = mechanism.close(mechanism.home)
+    assert q[0] - q[1] == pytest.approx(np.radians(1.6), abs=1e-12)
+    far = pin.SE3(np.eye(3), np.array([0.0, 0.0, 9.0]))
+    more = LoopClosure("tip", "universe", "spherical", "more", placement_b=far)
+    with pytest.raises(
+        ClosureError, match="^the loops do not close from this guess: closure 'more"
+    ):
+        ClosedLoopModel.from_mjcf(fourbar(), closures=[more])
 
 
 ROPE = """<tendon><spatial name="rope">{}</spatial></tendon>"""

@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
+
+import numpy as np
 
 from rps_pin.closed_loop.column_names import joint_coordinates
 from rps_pin.closed_loop.constraints.closures import Closure
@@ -78,7 +81,14 @@ def parts_from_mjcf(
         home,
         **effects,
         name=source.name,
+        place_of=partial(_place_of, source, [closure.name for closure in equalities]),
     )
+
+
+def _place_of(source: MjcfSource, names: Sequence[str], closure: str) -> str:
+    """Return where the file has the equality of a closure; "" if it is none of its."""
+    active = [int(number) for number in np.flatnonzero(source.model.eq_active0)]
+    return source.at("equalities", active[names.index(closure)]) if closure in names else ""
 
 
 def _driven(tree: MjcfTree, tendons: Tendons, actuators: Sequence[Actuator]) -> tuple[str, ...]:
