@@ -271,9 +271,7 @@ def test_a_loop_that_cannot_close_is_told_with_its_line() -> None:
     assert q[0] - q[1] == pytest.approx(np.radians(1.6), abs=1e-12)
     far = pin.SE3(np.eye(3), np.array([0.0, 0.0, 9.0]))
     more = LoopClosure("tip", "universe", "spherical", "more", placement_b=far)
-    with pytest.raises(
-        ClosureError, match="^the loops do not close from this guess: closure 'more"
-    ):
+    with pytest.raises(ClosureError, match=r"^the loops do not close .*: closure 'more"):
         ClosedLoopModel.from_mjcf(fourbar(), closures=[more])
 
 
