@@ -19,7 +19,7 @@ from benchmarks.timing import ROUNDS, medians
 from rps_pin import ClosedLoopModel
 from rps_pin.closed_loop.column_names import joint_coordinates
 from rps_pin.closed_loop.constraints.completion import choose
-from rps_pin.numerics.linear_algebra import Decomposition
+from rps_pin.numerics.linear_algebra import RANK_TOLERANCE, Decomposition
 
 URDF = Path(__file__).parent.parent / "urdf"
 MECHANISMS: dict[str, Callable[[], ClosedLoopModel]] = {
@@ -33,7 +33,7 @@ MECHANISMS: dict[str, Callable[[], ClosedLoopModel]] = {
 def regular(mechanism: ClosedLoopModel) -> ClosedLoopModel:
     """Return the mechanism, whose actuators are independent, with one on each other freedom."""
     jacobian = mechanism.system.scaled(mechanism.jacobian(mechanism.home))
-    chosen = choose(Decomposition(jacobian), mechanism.actuated_indices)
+    chosen = choose(Decomposition(jacobian), mechanism.actuated_indices, RANK_TOLERANCE)
     names = [
         coordinate
         for joint in list(mechanism.model.names)[1:]
