@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rps_pin import cli
 from tests.cli.commands import rps_pin
 from tests.closed_loop.io.urdf.test_packages import stl
 from tests.closed_loop.io.urdf.texts import joint, link, robot
@@ -85,6 +86,44 @@ def test_limits_can_be_ignored(tmp_path: Path) -> None:
     found = described(tmp_path)
     assert found["mobility"] == 1
     assert "position limits are ignored, as was asked" in found["notes"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "describe m.yaml",
+        "simulate m.yaml --duration 0.01 -o out",
+        "assembly-modes m.yaml --at motor=-1 --starts 40",
+        "convert m.yaml --to urdf -o out",
+        "convert m.yaml --to mjcf -o out",
+        "export c m.yaml -o out",
+    ],
+)
+def test_every_command_can_ignore_limits(tmp_path: Path, command: str) -> None:
+    """By its option, and by the file's own word."""
+    if command.startswith("export"):
+        pytest.importorskip("casadi")
+    words = command.split()
+    write(tmp_path, BOUNDED, CLOSURE)
+    run = rps_pin(*words, folder=tmp_path)
+    assert run.returncode == 1
+    assert "limit" in run.stderr
+    run = rps_pin(*words, "--ignore-limits", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    write(tmp_path, BOUNDED, CLOSURE + "within_limits: false\n")
+    again = ["--overwrite"] * (words[0] in ("convert", "export"))
+    run = rps_pin(*words, *again, folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+
+
+def test_no_command_that_loads_a_mechanism_lacks_the_option() -> None:
+    commands = [*Path(cli.__file__).parent.glob("*.py")]
+    loading = [path for path in commands if "load_mechanism(" in path.read_text("utf-8")]
+    assert len(loading) >= 7
+    for path in loading:
+        assert "ignore_limits, accuracy" in path.read_text("utf-8").replace("\n", " ") or (
+            path.name == "mechanism_options.py"
+        ), path
 
 
 @pytest.mark.parametrize("home", ["0.3", "[0.955336489125606, 0.29552020666133955]"])

@@ -73,6 +73,7 @@ def export_c_command(
         list[str] | None,
         typer.Option(metavar="FRAME", help="A frame at which an external wrench acts; repeat it."),
     ] = None,
+    ignore_limits: options.IgnoreLimitsOption = False,
     accuracy: options.AccuracyOption = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace files that were not exported, too.")
@@ -107,7 +108,7 @@ def export_c_command(
     if (file is None) == (robot is None):
         raise typer.BadParameter("one of FILE|NAME and --robot is to be given")
     if file is not None:
-        mechanism, path = options.load_mechanism(file, accuracy=accuracy)
+        mechanism, path = options.load_mechanism(file, ignore_limits, accuracy)
         title = mechanism.name
         package = mechanism_package(
             mechanism,
