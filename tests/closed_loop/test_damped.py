@@ -86,6 +86,46 @@ def test_light_rod_as_in_mujoco() -> None:
     assert abs(found.q[-1, 0] - data.qpos[0]) < 1e-4
 
 
+def test_order_of_stiff_steps_of_a_mechanism() -> None:
+    """A rate of 75,000 per second: each step here is implicit, and errors fall as its power 4."""
+    mechanism, duration = slider_crank(0.1), 0.048
+    q, options = mechanism.home, {"method": "adaptive", "tolerance": 1e-11}
+    exact = mechanism.simulate(q, duration=duration, step=duration, **options)
+    steps = np.array([2e-3, 1e-3, 5e-4])
+    ends = [mechanism.simulate(q, duration=duration, step=step) for step in steps]
+    for name in ("q", "v"):
+        errors = [np.abs(getattr(end, name)[-1] - getattr(exact, name)[-1]).max() for end in ends]
+        np.testing.assert_allclose(-np.diff(np.log2(errors)), 4, rtol=0, atol=0.5)
+
+
+def test_mujocos_implicit_steps_tend_to_the_same_motion() -> None:
+    """A light rod on a damped ball under a pendulum: no closures, which are soft there.
+
+    The error of implicitfast halves with its step, and what it tends to is our motion in steps of
+    2 ms: at a rate of 3,000 per second.
+    """
+    mujoco = pytest.importorskip("mujoco")
+    text = """<mujoco><compiler inertiafromgeom="false"/>
+    <option integrator="implicitfast" timestep="{step}"/><worldbody>
+    <body name="arm"><joint name="hinge" axis="0 1 0"/>
+    <inertial pos=".1 0 0" mass=".5" diaginertia="1e-5 2e-3 2e-3"/>
+    <body name="rod" pos=".2 0 0"><joint name="ball" type="ball" damping="0.01"/>
+    <inertial pos="0 .02 -.1" mass=".05" diaginertia="1e-5 1e-5 3e-6"/></body></body></worldbody>
+    <actuator><motor joint="hinge"/></actuator></mujoco>"""
+    ends = []
+    for step in (1e-4, 5e-5, 2.5e-5):
+        model = mujoco.MjModel.from_xml_string(text.format(step=step))
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, round(0.1 / step))
+        ends.append(data.qvel.copy())
+    mechanism = ClosedLoopModel.from_mjcf(text.format(step=1e-3))
+    motion = mechanism.simulate(mechanism.home, duration=0.1, step=2e-3)
+    errors = [np.abs(end - motion.v[-1]).max() for end in ends]
+    np.testing.assert_allclose(-np.diff(np.log2(errors)), 1, rtol=0, atol=0.1)
+    limit = 2 * ends[2] - ends[1]
+    assert worst(np.abs(limit - motion.v[-1])) < 0.02 * errors[2]
+
+
 def test_order_and_stability_against_an_exponential() -> None:
     """v' = g - rate v, whose end is exact: order 4 in short steps, bounded in any."""
     model = pin.Model()
