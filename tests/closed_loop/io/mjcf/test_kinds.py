@@ -347,7 +347,9 @@ REFUSED = {
     ),
     "density": mujoco_file(BODY, '\n<option density="1.2"/>'),
     "gravcomp": mujoco_file('<body gravcomp="1"><joint/><geom size="1"/></body>\n' + BODY),
-    "stiffness": mujoco_file('\n<body><joint type="ball" stiffness="1"/><geom size=".1"/></body>'),
+    "springyield": mujoco_file(
+        '\n<body><joint type="ball" stiffness="1" springyield="3"/><geom size=".1"/></body>'
+    ),
     "springlength": mujoco_file(
         BODY,
         '<tendon>\n<fixed stiffness="1" springlength="0 1"><joint joint="j" coef="1"/></fixed>'
