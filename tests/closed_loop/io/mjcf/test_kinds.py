@@ -118,6 +118,9 @@ TREES = {
     "inertia of shapes": shaped('<compiler inertiafromgeom="true"/>', SHAPES + INERTIAL),
     "inertia of no shapes": shaped('<compiler inertiafromgeom="false"/>', SHAPES + INERTIAL),
     "inertia of some shapes": shaped('<compiler inertiagrouprange="0 2"/>'),
+    "springs of balls": mujoco_file(
+        chain(hinge("j0"), '<joint type="ball" stiffness="3" damping=".2"/>')
+    ),
     "shapes of no contact left out": shaped('<compiler discardvisual="true"/>'),
     "static bodies fused": shaped('<compiler fusestatic="true"/>'),
     "total mass": shaped('<compiler settotalmass="7"/>'),

@@ -229,9 +229,58 @@ def test_key_frames_that_are_not_finite_are_refused() -> None:
         read(text)
 
 
-def test_masses_that_are_not_finite_are_refused() -> None:
-    with pytest.raises(MechanismError, match="body 'b' has a mass or inertia that is not finite"):
-        parts_from_mjcf(mujoco_file("<body name='b'><joint/><geom size='1e150'/></body>"))
+SITE = '<site name="s" pos="0 1 nan"/></body>'
+NOT_FINITE = {
+    "mass": "<body name='b'><joint/><geom size='1e150'/></body>",
+    "pos": BODY.replace('name="b"', 'name="b" pos="inf 0 0"'),
+    "quat": BODY.replace('name="b"', 'name="b" quat="nan 0 0 0"'),
+    "joint": BODY.replace("<joint", '<joint pos="0 nan 0"'),
+    "axis": BODY.replace("<joint", '<joint axis="0 nan 0"'),
+    "site": BODY.replace("</body>", SITE),
+    **{
+        word: BODY.replace("<joint", f'<joint {word}="inf"')
+        for word in ("armature", "damping", "frictionloss", "stiffness")
+    },
+    "gravity": f"{BODY}</worldbody><option gravity='0 0 nan'/><worldbody>",
+    "torquescale": BODY
+    + '</worldbody><equality><weld body1="b" torquescale="nan"/></equality><worldbody>',
+    "coef": BODY + '</worldbody><tendon><fixed name="t"><joint joint="j" coef="inf"/></fixed>'
+    "</tendon><worldbody>",
+    "gear": BODY + '</worldbody><actuator><motor joint="j" gear="nan"/></actuator><worldbody>',
+}
+
+
+@each("world", NOT_FINITE.values())
+def test_numbers_that_are_not_finite_are_refused_with_their_line(world: str) -> None:
+    with pytest.raises(MechanismError, match=r"line 1: .* not finite"):
+        parts_from_mjcf(mujoco_file(world))
+
+
+RADIANS = "<compiler angle='radian'/>"
+
+
+@each("word", ["range", "actuatorfrcrange"])
+def test_ranges_that_are_reversed_are_none_and_told(word: str) -> None:
+    """As in MuJoCo, unless the file says that there is a limit; an end may be infinite."""
+    text = mujoco_file(
+        BODY.replace("<joint", f'<joint {word}="1 -1"'), "<compiler angle='radian'/>"
+    )
+    parts, told = read(text)
+    assert told == ["the MJCF text, line 1: joint 'j': a range of 1 to -1 counts for none"]
+    assert parts.model.lowerPositionLimit[0] == parts.model.lowerEffortLimit[0] == -np.inf
+    with pytest.raises(MechanismError, match="has a range of nan to 1"):
+        parts_from_mjcf(text.replace("1 -1", "nan 1"))
+    assert read(text.replace("1 -1", "-inf 1"))[1] == []
+
+
+def test_a_coordinate_and_a_joint_of_one_name_are_told_apart() -> None:
+    text = mujoco_file(
+        f"""<body><joint name="q" type="ball"/>{INERTIAL}</body>
+        <body><joint name="q.x"/>{INERTIAL}</body>""",
+        '<actuator><motor joint="q"/></actuator>',
+    )
+    with pytest.raises(MechanismError, match=r"joint 'q' is driven in 'q\.x', also a joint"):
+        parts_from_mjcf(text)
 
 
 def test_a_file_without_joints_is_no_mechanism() -> None:

@@ -15,6 +15,7 @@ from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.io.mjcf.actuators import Actuator, read_actuators
 from rps_pin.closed_loop.io.mjcf.closures import read_equalities
 from rps_pin.closed_loop.io.mjcf.effects import joint_effects, refuse_other_forces
+from rps_pin.closed_loop.io.mjcf.numbers import refuse_wrong_numbers
 from rps_pin.closed_loop.io.mjcf.source import MjcfSource
 from rps_pin.closed_loop.io.mjcf.tendons import Tendons
 from rps_pin.closed_loop.io.mjcf.tree import MjcfTree
@@ -63,6 +64,7 @@ def parts_from_mjcf(
             f"{source.origin} has {source.model.nv} velocities, and at most {MOST_VELOCITIES} are "
             "read: the memory for them grows as the cube of their number"
         )
+    refuse_wrong_numbers(source)
     refuse_other_forces(source)
     asked = (actuated,) if isinstance(actuated, str) else tuple(actuated or ())
     actuators = read_actuators(source)

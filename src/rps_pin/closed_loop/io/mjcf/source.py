@@ -23,6 +23,7 @@ from rps_pin.errors import MechanismError, RPSPinError
 _TAGS: dict[str, tuple[str, ...] | None] = {
     "bodies": ("body",),
     "joints": ("joint", "freejoint"),
+    "sites": ("site",),
     "tendons": ("fixed", "spatial"),
     "equalities": None,
     "actuators": None,

@@ -117,8 +117,6 @@ class MjcfTree:
             joint, pose = self._add_joint(number, joint, pose)
         self._on.append((joint, pose))
         if joint:
-            if not np.isfinite([m.body_mass[body], *m.body_inertia[body]]).all():
-                self.source.refuse("bodies", body, "has a mass or inertia that is not finite")
             inertia = np.diag(m.body_inertia[body])
             own = pose_of(m.body_ipos[body], m.body_iquat[body])
             at_com = pin.Inertia(float(m.body_mass[body]), np.zeros(3), inertia)
@@ -176,7 +174,10 @@ class MjcfTree:
         for name in self.parts[number]:
             coordinates = joint_coordinates(self.model, name) or (name,)
             if place < len(coordinates):
-                return coordinates[place]
+                found = coordinates[place]
+                if found != name and self.model.existJointName(found):
+                    self.source.refuse("joints", number, f"is driven in {found!r}, also a joint")
+                return found
             place -= len(coordinates)
         raise IndexError(place)
 
