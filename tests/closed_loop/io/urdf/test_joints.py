@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from rps_pin import ClosedLoopModel, JointCoupling, JointEffects, MechanismError
+from rps_pin import ClosedLoopModel, JointCoupling, JointEffects, LoopClosure, MechanismError
 from rps_pin.closed_loop.io.urdf import model_from_urdf, parts_from_urdf
 from tests.closed_loop.io.urdf.texts import body, joint, link, robot
 from tests.each import each
@@ -365,3 +366,66 @@ def test_random_trees_have_mujocos_mass_matrix(seed: int) -> None:
     np.testing.assert_allclose(mass[np.ix_(order, order)], full, atol=1e-12)
     bias = pin.nonLinearEffects(model, data, q, v)
     np.testing.assert_allclose(bias[order], there.qfrc_bias, atol=1e-10)
+
+
+# As people met them -------------------------------------------------------------------------------
+
+
+def test_losses_of_a_file_and_of_its_description_are_the_same(tmp_path: Path) -> None:
+    """A beam of 1 kg, 0.5 m out, at 2 rad/s: -g m r + 0.7 * 2 + 0.3 = -3.205 N m."""
+    (tmp_path / "a.urdf").write_text(LOSSES)
+    (tmp_path / "a.yaml").write_text("urdf: a.urdf\nactuated: [j]\n")
+    for mechanism in (
+        ClosedLoopModel.from_urdf(tmp_path / "a.urdf", [], ["j"]),
+        ClosedLoopModel.load(tmp_path / "a.yaml"),
+    ):
+        assert mechanism.inverse_dynamics(*STATE).tau[0] == pytest.approx(-3.205, rel=1e-12)
+
+
+def test_a_gripper_whose_fingers_mimic_each_other_balances() -> None:
+    """Two fingers of 0.05 kg in opposite directions: gravity cancels, and they weigh 0.1 kg."""
+    text = robot(
+        link("palm"),
+        link("f1", 0.05, "0 0.03 0"),
+        link("f2", 0.05, "0 0.03 0"),
+        joint("one", "prismatic", "palm", "f1", axis="1 0 0"),
+        joint(
+            "two",
+            "prismatic",
+            "palm",
+            "f2",
+            axis="1 0 0",
+            more='<mimic joint="one" multiplier="-1.0" offset="0"/>',
+        ),
+    )
+    gripper = ClosedLoopModel.from_urdf(text, [], ["one"], gravity=(-9.81, 0, 0))
+    assert gripper.describe().mobility == 1
+    q, still = np.array([0.01, -0.01]), np.zeros(2)
+    assert gripper.inverse_dynamics(q, still, still).tau[0] == pytest.approx(0, abs=1e-14)
+    tau = gripper.inverse_dynamics(q, still, np.array([1.0, -1.0])).tau
+    assert tau[0] == pytest.approx(0.1, rel=1e-12)
+
+
+def test_a_limit_of_effort_and_velocity_bounds_no_closed_chain_that_floats() -> None:
+    """Exported by Onshape: a four-bar on a free root moves in 6 + 1 ways, and has no limits."""
+    no_bounds = 'effort="1" velocity="20"'
+    text = robot(
+        link("ground", 1.0),
+        link("crank", 0.2, "0.05 0 0"),
+        link("coupler", 0.3, "0.15 0 0"),
+        link("rocker", 0.2, "0.1 0 0"),
+        link("coupler_end"),
+        link("rocker_end"),
+        joint("motor", "revolute", "ground", "crank", limit=no_bounds),
+        joint("elbow", "revolute", "crank", "coupler", xyz="0.1 0 0", limit=no_bounds),
+        joint("swing", "revolute", "ground", "rocker", xyz="0.3 0 0", limit=no_bounds),
+        joint("a", "fixed", "coupler", "coupler_end", xyz="0.3 0 0"),
+        joint("b", "fixed", "rocker", "rocker_end", xyz="0.2 0 0"),
+    )
+    pin_ = LoopClosure("coupler_end", "rocker_end", "revolute", axis=(0, 1, 0))
+    home = np.array([0, 0, 0, 0, 0, 0, 1, -1.0, 0.6, -1.6])
+    for root, mobility in (("free", 7), ("fixed", 1)):
+        start = home if root == "free" else home[7:]
+        found = ClosedLoopModel.from_urdf(text, [pin_], ["motor"], root=root, home=start)
+        assert found.describe().mobility == mobility
+        assert found.loop_gap(found.home) < 1e-9
