@@ -11,9 +11,10 @@ expected number of modes, found or not, is
     w (n - 1) / (n - w - 2)
 
 (Boender and Rinnooy Kan, Bayesian stopping rules for multistart global optimization methods, 1987).
-The search ends where that is at most w + 1/2, which takes n = 2 w^2 + 3 w + 2 closed starts, and
-`LEAST_CLOSED` at least. A mode of a share far below 1/n is missed, as one is that no start near it
-leads to.
+The search ends where that is at most w + 1/2, which takes n = 2 w^2 + 3 w + 2 closed starts,
+`LEAST_CLOSED` at least, and where each mode was found by `LEAST_HITS` starts: if some were found by
+one, there are likely others of their kind. A mode of a share far below 1/n is missed, as one is
+that no start near it leads to.
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ from rps_pin.validation import positive_number, whole_number
 
 #: Closed starts that a search takes at least; starts without any closed one that it gives up after.
 LEAST_CLOSED, MOST_OPEN = 100, 1000
+#: Starts that each mode is found by before the search ends.
+LEAST_HITS = 3
 _BATCH = 128
 #: Modes whose places differ by less are one; near a singularity they are less sharp.
 _SAME, _SAME_SINGULAR, _SINGULAR = 1e-6, 1e-3, 1e5
@@ -129,7 +132,7 @@ def assembly_modes(
             if progress is not None:
                 shares = search.closed / search.needed, search.starts / starts, spent / longest
                 progress(min(max(shares), 1.0))
-            if search.closed >= search.needed:
+            if search.has_settled:
                 stopped = "settled"
                 break
             if spent >= longest:
@@ -171,6 +174,11 @@ class _Search:
         """Closed starts after which the search ends with the modes found so far."""
         count = len(self._q)
         return max(LEAST_CLOSED, 2 * count * count + 3 * count + 2)
+
+    @property
+    def has_settled(self) -> bool:
+        """Whether no further mode is expected."""
+        return self.closed >= self.needed and min(self._hits) >= LEAST_HITS
 
     def take(self, rng: np.random.Generator, count: int) -> None:
         """Close the loops from some more starts; the first of all is the guess itself."""
