@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 
+from rps_pin.closed_loop.io.xml_file import without_comments
 from rps_pin.errors import MechanismError
 
 _XACRO_ELEMENT = re.compile(r"<xacro:\w+")
-_XACRO_VALUE = re.compile(r"\$\{[^}]*\}|\$\((?:find|arg|env|optenv|eval|dirname)\b[^)]*\)")
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_XACRO_VALUE = re.compile(r"\$\{[^}$]*\}|\$\((?:find|arg|env|optenv|eval|dirname)\b[^)$]*\)")
 _ROOT = re.compile(r"<([A-Za-z_][\w:.-]*)")
 _DESCRIPTION = re.compile(r"^(urdf|mjcf|closed_loop|name_mot):", re.MULTILINE)
 #: The root element of what is read.
@@ -43,7 +43,7 @@ def refuse_other_formats(text: str, origin: str, form: str) -> None:
     invalid, start = f"{origin} is not a valid {form}", text.lstrip("\ufeff \t\r\n")
     if not start.startswith("<"):
         raise MechanismError(f"{invalid}{_no_xml(start)}")
-    plain = _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), text)
+    plain = without_comments(text)
     root = _ROOT.search(plain)
     tag, own = root[1] if root else "", _OWN[form]
     if tag in ("robot", own):

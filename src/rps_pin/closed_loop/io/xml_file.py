@@ -29,10 +29,8 @@ _MARKS = (
     (b"<\0", "utf-16-le"),
     (b"\0<", "utf-16-be"),
 )
-
 _ENCODING = re.compile(rb"<\?xml[^>]*encoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
-#: The XML declaration, also of a version that there is not, or after comments.
-_DECLARATION = re.compile(r"\A((?:\s|<!--.*?-->)*)(<\?xml\s[^>]*\?>)", re.DOTALL)
+_SPACE = re.compile(r"\s*")
 
 
 def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
@@ -70,7 +68,37 @@ def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
             text = _decoded(content)
     if len(text) > LARGEST_XML:
         raise InputError(f"{origin} has more than {LARGEST_XML} characters, the most that is read")
-    return _DECLARATION.sub(lambda m: m[1] + "\n" * m[2].count("\n"), text, count=1), origin
+    return _without_declaration(text), origin
+
+
+def _without_declaration(text: str) -> str:
+    """Take out the XML declaration, also of a version that there is not, or after comments."""
+    start = 0
+    while True:
+        space = _SPACE.match(text, start)
+        start = space.end() if space else start
+        if not text.startswith("<!--", start):
+            break
+        end = text.find("-->", start + 4)
+        if end < 0:
+            return text
+        start = end + 3
+    end = text.find("?>", start)
+    if not re.match(r"<\?xml\s", text[start : start + 6]) or end < 0:
+        return text
+    return text[:start] + "\n" * text.count("\n", start, end) + text[end + 2 :]
+
+
+def without_comments(text: str) -> str:
+    """Return an XML text without its comments, lines kept."""
+    first, *others = text.split("<!--")
+    parts = [first]
+    inside = False
+    for other in others:
+        comment, end, after = other.partition("-->")
+        inside = not end
+        parts += ["\n" * comment.count("\n"), after]
+    return text if inside else "".join(parts)
 
 
 def _refuse_known(content: bytes, origin: str, form: str) -> None:

@@ -35,6 +35,22 @@ def test_declarations_do_no_harm(start: str) -> None:
     assert model_from_urdf(start + ARM).name == "Jörg"
 
 
+def test_many_comments_before_the_declaration_take_no_time() -> None:
+    """Patterns that try every way to read them took hours for 60."""
+    comments = "<!-- by hand -->\n" * 3000
+    for text in (ARM, f'<?xml version="1.0"?>{ARM}'):
+        assert model_from_urdf(comments + text).name == "Jörg"
+    with pytest.raises(MechanismError, match=r"line 3002: <robot> has a <lnk>"):
+        model_from_urdf(f"{comments}<?xml version='1.0'?>\n{ARM}".replace("<link", "<lnk", 1))
+
+
+@each("unended", ["<!--", "${", "$(arg ", "<?xml ", '<link a="', "<link ", "]]>", "&amp;"])
+def test_what_does_not_end_takes_no_time(unended: str) -> None:
+    for start in ("", "<robot>"):
+        with pytest.raises(MechanismError):
+            model_from_urdf(f"<robot>{start}{unended * 50_000}")
+
+
 @each(
     ("declared", "encoding"),
     [

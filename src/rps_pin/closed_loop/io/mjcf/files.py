@@ -8,7 +8,6 @@ files it counts: the text begins with so many empty lines that none of its own h
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,11 +16,10 @@ from xml.sax.saxutils import quoteattr
 from lxml import etree
 
 from rps_pin.closed_loop.io.foreign import refuse_other_formats
-from rps_pin.closed_loop.io.xml_file import LARGEST_XML
+from rps_pin.closed_loop.io.xml_file import LARGEST_XML, without_comments
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.files import opened
 
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 #: How deep files include or attach others, at most.
 DEEPEST = 100
 
@@ -214,7 +212,7 @@ def _content(path: Path) -> str:
 
 def _root(text: str, origin: str) -> Any:
     """Return the root element of a text, which MuJoCo's parser reads with less rigour, or None."""
-    if "<!DOCTYPE" in text and "<!DOCTYPE" in _COMMENT.sub("", text):
+    if "<!DOCTYPE" in text and "<!DOCTYPE" in without_comments(text):
         raise MechanismError(f"{origin} declares a document type, which no MJCF needs: refused")
     try:
         return etree.fromstring(text.encode("utf-8", "surrogatepass"), _parser(recover=True))
