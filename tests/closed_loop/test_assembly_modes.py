@@ -372,7 +372,7 @@ def test_the_search_repeats_ends_in_time_and_keeps_what_it_has_on_ctrl_c() -> No
     assert len(found.q) > 5
     assert "interrupted" in str(found)
     assert 0 < shares[0] < 1
-    for wrong in ({"starts": 0}, {"seed": -1}, {"seconds": -1.0}):
+    for wrong in ({"starts": 0}, {"seed": -1}, {"seconds": -1.0}, {"frames": []}):
         with pytest.raises(InputError):
             mechanism.assembly_modes(**wrong)  # type: ignore[arg-type]
 

@@ -17,7 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, JointCoupling, LoopClosure
-from rps_pin.errors import ClosureError, SingularityError
+from rps_pin.errors import ClosureError, InputError, SingularityError
 from tests.proofs.common import both_engines, through
 from tests.worst import worst
 
@@ -396,6 +396,13 @@ def test_says_where_the_assembly_mode_ends() -> None:
     assert caught.value.condition > 1e4
     jumped = mechanism.complete([0.6 + 2 * np.pi], q, jump=True)
     assert mechanism.loop_gap(jumped) < 1e-12
+
+
+def test_a_way_too_long_is_no_singularity(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rps_pin.closed_loop.assembly.continuation._MOST_STEPS", 200)
+    mechanism, _ = crank_rocker()
+    with pytest.raises(InputError, match=r"too long to be followed: \d\.\d+% of it was"):
+        mechanism.complete([1e4])
 
 
 def test_values_that_no_configuration_has() -> None:

@@ -16,6 +16,7 @@ from rps_pin import ClosedLoopModel, LoopClosure
 from rps_pin.arrays import Array
 from rps_pin.errors import AccuracyWarning, ClosureError
 from tests.closed_loop.random_mechanisms import Case, case
+from tests.proofs.common import both_engines, through
 from tests.worst import worst
 
 #: A plane five-bar; its hinges are turned by `turn`.
@@ -182,6 +183,22 @@ def test_rows_that_no_joint_moves(turn: str) -> None:
     assert found.tau == pytest.approx(alone[:1], rel=1e-9)
     assert found.unproduced is not None
     assert found.unproduced == pytest.approx([0.0, *alone[1:]], rel=1e-9)
+
+
+@both_engines
+@pytest.mark.filterwarnings("ignore::rps_pin.errors.AccuracyWarning")
+@pytest.mark.parametrize("kind", ["revolute", "point_on_line"])
+def test_rounded_crank_turns_around_in_one_assembly_mode(kind: str, engine: str) -> None:
+    """From home to 61 angles, against circles; what the rounding turns is its square."""
+    mechanism = through(engine, four_bar(kind, "1.5708", home=[0.6, -0.4, 1.5]))
+    for crank in np.linspace(-np.pi, np.pi, 61):
+        knee = 0.5 * np.exp(1j * crank)
+        apart = abs(1.0 - knee)
+        along = (1.2**2 - 0.8**2 + apart**2) / (2 * apart)
+        tip = knee + (1.0 - knee) / apart * (along + 1j * np.sqrt(1.2**2 - along**2))
+        turns = np.angle([np.exp(1j * crank), (tip - knee) * np.exp(-1j * crank), tip - 1.0])
+        apart_by = mechanism.complete([crank]) - turns
+        assert worst(np.abs((apart_by + np.pi) % (2 * np.pi) - np.pi)) < 1e-9
 
 
 def test_exact_file_stays_exact() -> None:

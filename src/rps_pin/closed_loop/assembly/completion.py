@@ -138,6 +138,12 @@ def _refuse(
     closed: bool,
 ) -> None:
     """Raise the error of a path that ends in a singularity."""
+    if found.is_long:
+        raise InputError(
+            f"the way from the guess's values to those asked for is too long to be followed: "
+            f"{found.share:.4%} of it was; take values nearer, such as angles less whole turns, "
+            "lead there in parts, or take jump=True"
+        )
     where = f"after {found.share:.4%} of the way from the guess's values to those asked for"
     if not closed:
         where = f"after the guess, which is open, was closed, and {where[6:]}"
@@ -149,14 +155,19 @@ def _refuse(
             "mode ends in a singularity",
             error.gap,
         ) from None
+    met = (
+        f"{where}, a singularity is met (condition number {found.condition:.3g} where the steps "
+        "became too short to go on): configurations with these values exist, but the assembly mode "
+        "of the guess does not lead to them on a straight line of the given coordinates"
+    )
     if found.share == 0 and not found.condition <= system.max_condition:
-        where = "there is no way to tell which: the guess itself is singular"
+        met = (
+            f"the guess itself is singular (condition number {found.condition:.3g}): there is no "
+            "way to tell to which of the configurations with these values it leads"
+        )
     raise SingularityError(
-        f"{where}, a singularity is met (condition number {found.condition:.3g}, at most "
-        f"{system.max_condition:.3g} is followed): configurations with these values exist, but the "
-        "assembly mode of the guess does not lead to them on a straight line of the given "
-        "coordinates. Take a guess nearer to them, lead there in parts, or take jump=True, which "
-        "may change the assembly mode",
+        f"{met}. Take a guess nearer to them, lead there in parts, or take jump=True, which may "
+        "change the assembly mode",
         found.condition,
         system.max_condition,
     )

@@ -63,6 +63,8 @@ class Followed(NamedTuple):
     """Condition number of A there."""
     consistent: bool
     """False where the closures do not let the given coordinates move so."""
+    is_long: bool = False
+    """Whether it ended after the most steps, at no singularity."""
 
 
 class _Point:
@@ -158,8 +160,8 @@ class Path:
                     return Followed(point.q, 1.0, point.condition, True)
             share *= min(3.0, max(0.1, 0.8 * _CHANGE / max(change, 1e-9)))
             if share < _SHORTEST:
-                break
-        return Followed(point.q, done, point.condition, True)
+                return Followed(point.q, done, point.condition, True)
+        return Followed(point.q, done, point.condition, True, is_long=True)
 
     def _tangent(self, point: _Point) -> tuple[Array, bool]:
         """Return the velocity for the whole path in unit time, (nv,), and whether it is one."""

@@ -121,7 +121,10 @@ def assembly_modes(
     held[given] = held[system.unmoving()] = True
     system.settle_rule(about)
     equations = equations or equations_of(system)
-    same = Sameness(system, about, frames)
+    chosen = [frames] if isinstance(frames, str) else frames
+    if chosen is not None and not len(chosen):
+        raise InputError("frames is empty: name one by whose place modes differ, or leave it out")
+    same = Sameness(system, about, chosen)
     search = _Search(system, about, held, equations, same, within_limits)
     rng, begin = np.random.default_rng(seed), time.monotonic()
     stopped: Stopped = "starts"
