@@ -229,7 +229,10 @@ def test_files_of_any_suffix_are_read_with_what_they_include(tmp_path: Path) -> 
             <worldbody><body><joint name="k"/><geom type="mesh" mesh="t"/></body>
             <attach model="leg" prefix="left_"/></worldbody></mujoco>""",
         parts__one='<mujoco><include file="parts/two.xml"/></mujoco>',
-        parts__two=mujoco_file(BODY),
+        parts__two=mujoco_file(
+            BODY.replace("</body>", '<geom type="mesh" mesh="u"/></body>'),
+            '<asset><mesh name="u" file="u.stl"/></asset>',
+        ),
         parts__leg=mujoco_file(BODY),
     )
     (tmp_path / "meshes").mkdir()
@@ -238,7 +241,8 @@ def test_files_of_any_suffix_are_read_with_what_they_include(tmp_path: Path) -> 
         struct.pack("<12fH", 0, 0, 0, *corners[face].ravel(), 0)
         for face in ([0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2])
     )
-    (tmp_path / "meshes" / "t.stl").write_bytes(b"\0" * 80 + struct.pack("<I", 4) + faces)
+    for mesh in ("t.stl", "u.stl"):
+        (tmp_path / "meshes" / mesh).write_bytes(b"\0" * 80 + struct.pack("<I", 4) + faces)
     right = parts_from_mjcf(path)
     assert set(right.model.names) == {"universe", "j", "k", "left_j"}
     for suffix in (".mjcf", ".XML", ".txt", ""):

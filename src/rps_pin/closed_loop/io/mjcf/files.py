@@ -51,8 +51,6 @@ class MjcfFiles:
         Of the model.
     folder : Path
         Of the main file.
-    parts : dict of str to bytes
-        Contents of included and attached files by their names as they are written.
 
     Raises
     ------
@@ -75,7 +73,6 @@ class MjcfFiles:
         self._places: list[Place] = []
         self._attached: list[Place] = []
         self._lines: list[str] = []
-        self.parts: dict[str, bytes] = {}
         self._others: list[Path] = []
         chain: tuple[Path, ...] = (path.resolve(),) if path else ()
         models: list[tuple[Path, tuple[Path, ...]]] = []
@@ -166,8 +163,6 @@ class MjcfFiles:
             if event == "start" and xml.tag in ("include", "model") and xml.get("file"):
                 nearest_first = xml.tag == "model"
                 other = _other(place, folders[::-1] if nearest_first else folders, chain)
-                if other:
-                    self.parts.setdefault(xml.get("file"), _content(other).encode())
             if other and xml.tag == "include":
                 replaced.append(xml)
                 inner = self._root_of(other)

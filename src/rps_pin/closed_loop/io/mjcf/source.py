@@ -106,15 +106,14 @@ class MjcfSource:
             raise MechanismError(f"{self.origin} is not a valid MJCF: {why}") from None
 
     def _parsed(self) -> Any:
-        """Return MuJoCo's specification; it reads files only whose names end in .xml by itself."""
+        """Return MuJoCo's specification; it takes names that end in .xml, so others get that."""
         spec = self.mujoco.MjSpec
         if self._path is not None and self._path.suffix == ".xml":
             return spec.from_file(str(self._path))
         if self._path is None:
             return spec.from_string(self._text)
-        found = spec.from_string(self._text, include=self._files.parts)
-        found.modelfiledir = str(self._path.absolute().parent)
-        return found
+        named = f"{self._path.absolute()}.xml"  # which is read from memory
+        return spec.from_file(named, include={named: self._text.encode()})
 
     def _reason(self, error: ValueError) -> str:
         """Return MuJoCo's reason, with file and line where it names none."""
