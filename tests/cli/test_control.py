@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from rps_pin import SingularityError
+from rps_pin.cli import console
 from rps_pin.cli.control import control_command
 from rps_pin.control import Plant
 from tests.cli.commands import rps_pin
@@ -43,6 +44,17 @@ def test_it_writes_everything(finished: tuple[Path, str]) -> None:
     assert {path.name for path in folder.iterdir()} == FILES
     told = {Path(name).name for name in json.loads(printed)["files"]}
     assert told == FILES
+
+
+def test_the_size_of_the_table_is_told_in_advance(
+    finished: tuple[Path, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with (finished[0] / "loop.csv").open(encoding="utf-8") as file:
+        columns = len(file.readline().split(","))
+    monkeypatch.setattr(console, "LARGE", 1e3)
+    (tmp_path / "day.yaml").write_text(SCENARIO)
+    said = rps_pin("control", "day.yaml", folder=tmp_path).stderr
+    assert f"loop.csv will have 500 rows of {columns} columns, about 0.24 MB" in said
 
 
 def test_the_table_holds_what_the_summary_says(finished: tuple[Path, str]) -> None:

@@ -25,6 +25,21 @@ def test_tilts_beyond_half_a_turn_are_doubted(tilt: tuple[str, str], doubted: bo
         assert f"degrees would be {degrees}" in said.stderr
 
 
+@pytest.mark.parametrize(
+    ("command", "doubted"),
+    [
+        (["ik", "--pose", "400", "0.1", "0"], "--pose: a height of 400 m? Lengths are in metres; "),
+        (["ik", "--pose", "0.4", "0.1", "0"], ""),
+        (["fk", "--lengths", "460", "460.5", "460"], "460 460.5 460 mm would be 0.46 0.4605 0.46"),
+        (["fk", "--lengths", "0.46", "0.46", "0.46"], ""),
+    ],
+)
+def test_lengths_in_millimetres_are_doubted(command: list[str], doubted: str) -> None:
+    said = rps_pin(*command).stderr
+    assert doubted in said
+    assert ("Lengths are in metres" in said) == bool(doubted)
+
+
 def test_the_size_of_a_table_is_told_in_advance(
     tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
 ) -> None:

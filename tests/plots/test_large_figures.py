@@ -1,4 +1,4 @@
-"""SVGs of long motions: areas of many points are pictures, small figures stay as they are."""
+"""SVGs of long motions: areas and markers of many points are pictures, small figures stay."""
 
 from __future__ import annotations
 
@@ -28,3 +28,15 @@ def test_areas_of_many_points_are_pictures(tmp_path: Path, samples: int, picture
     assert text.count("<image") == pictures
     assert len(text) < 500_000
     assert not any(one.get_rasterized() for one in figure.axes[0].collections)
+
+
+@pytest.mark.parametrize(("samples", "pictures"), [(1000, 0), (100_000, 1)])
+def test_many_markers_are_a_picture(tmp_path: Path, samples: int, pictures: int) -> None:
+    figure = Figure()
+    axes = figure.add_subplot()
+    axes.plot(np.random.default_rng(0).normal(size=samples), ".")
+    _, svg = save_figure(figure, tmp_path, "markers")
+    text = svg.read_text("utf-8")
+    assert text.count("<image") == pictures
+    assert len(text) < 500_000
+    assert not axes.lines[0].get_rasterized()

@@ -18,7 +18,7 @@ from rich.table import Table
 from rps_pin.cli.completion import names_or_files, preset_names
 from rps_pin.rps import robot_file
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.rps.unit_doubts import unit_doubts
+from rps_pin.rps.unit_doubts import LARGEST, unit_doubts
 
 #: Bytes of a number in a table; and of a file whose size is told before it is written.
 BYTES, LARGE = 20, 100e6
@@ -62,8 +62,9 @@ def load_robot(name_or_file: str) -> RPSRobot:
 
 
 def doubt_pose(name: str, pose: Three) -> None:
-    """Print a note on a pose whose tilt is more than half a turn."""
-    _, *tilts = pose
+    """Print a note on a pose of a height beyond `LARGEST`, or of a tilt beyond half a turn."""
+    height, *tilts = pose
+    doubt_lengths(name, "a height", [height])
     if math.hypot(*tilts) > math.pi:
         given, radians = (
             " ".join(f"{value:g}" for value in values) for values in (tilts, np.radians(tilts))
@@ -71,6 +72,19 @@ def doubt_pose(name: str, pose: Three) -> None:
         typer.echo(
             f"note: {name}: a tilt of {given} rad is more than half a turn. Tilts are in radians; "
             f"{given} degrees would be {radians}",
+            err=True,
+        )
+
+
+def doubt_lengths(name: str, what: str, values: Sequence[float]) -> None:
+    """Print a note on lengths of which one is beyond `LARGEST`."""
+    if any(abs(value) > LARGEST for value in values):
+        given, metres = (
+            " ".join(f"{scale * value:g}" for value in values) for scale in (1.0, 1e-3)
+        )
+        typer.echo(
+            f"note: {name}: {what} of {given} m? Lengths are in metres; {given} mm would be "
+            f"{metres}",
             err=True,
         )
 

@@ -49,7 +49,7 @@ def control_command(
 
     - `rps-pin control docs/scenarios/micro_helix.yaml`
     """
-    from rps_pin.control.simulation.loop_run import write_loop_csv
+    from rps_pin.control.simulation.loop_run import COLUMNS, write_loop_csv
     from rps_pin.control.simulation.loop_summary import LoopSummary, status_name
     from rps_pin.control.simulation.report import report
     from rps_pin.control.simulation.scenario import load_scenario
@@ -57,6 +57,7 @@ def control_command(
     loaded = load_scenario(scenario)
     name = loaded.model.parameters.name
     console = common.text_console(as_json)
+    common.tell_size("loop.csv", loaded.duration / loaded.entry.period, COLUMNS)
     run, broken = _run(loaded, console)
     window = loaded.entry.settle if run.time[-1] > loaded.entry.settle else 0.0
     summary = LoopSummary.of(run, begin=window)

@@ -42,6 +42,7 @@ def fk_command(
     - `rps-pin fk --lengths 0.45 0.47 0.46 --near 0.4 0 0` the one near the level pose
     """
     machine = common.load_robot(robot)
+    common.doubt_lengths("--lengths", "leg lengths", lengths)
     low, high = machine.parameters.leg_length_limits
     if not all(low <= length <= high for length in lengths):
         typer.echo(f"note: the legs' limits are {low:g} to {high:g} m", err=True)

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from rps_pin.arrays import Array
@@ -103,32 +104,38 @@ def legend_above(axes: Axes, columns: int) -> None:
 def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure as PNG and SVG, each whole or not at all; return the two paths.
 
-    In the SVG, areas of more than `MOST_POINTS` points are pictures. (Curves are simplified by
-    Matplotlib, areas are not.)
+    In the SVG, areas of more than `MOST_POINTS` points, and as many markers, are pictures. (Lines
+    are simplified by Matplotlib, areas and markers are not.)
     """
     written = []
     svg: Any = {"metadata": {"Date": None}, "dpi": PICTURE_DPI}
     for suffix, options in ((".png", {}), (".svg", svg)):
         path = folder / f"{name}{suffix}"
-        with matplotlib.rc_context(STYLE), whole_file(path) as scratch, _areas_as_pictures(figure):
+        with matplotlib.rc_context(STYLE), whole_file(path) as scratch, _large_as_pictures(figure):
             figure.savefig(scratch, **options)
         written.append(path)
     return written
 
 
 @contextmanager
-def _areas_as_pictures(figure: Figure) -> Iterator[None]:
-    """Let vector formats have pictures of areas that have many points."""
-    areas = [one for one in figure.findobj(Collection) if _points(one) > MOST_POINTS]
-    before = [one.get_rasterized() for one in areas]
+def _large_as_pictures(figure: Figure) -> Iterator[None]:
+    """Let vector formats have pictures of areas and markers that have many points."""
+    found: list[Any] = [one for one in figure.findobj(Collection) if _points(one) > MOST_POINTS]
+    found += [one for one in figure.findobj(Line2D) if _markers(one) > MOST_POINTS]
+    before = [one.get_rasterized() for one in found]
     try:
-        for one in areas:
+        for one in found:
             one.set_rasterized(True)
         yield
     finally:
-        for one, was in zip(areas, before, strict=True):
+        for one, was in zip(found, before, strict=True):
             one.set_rasterized(was)
 
 
 def _points(areas: Any) -> int:
     return sum(len(path.vertices) for path in areas.get_paths())
+
+
+def _markers(line: Any) -> int:
+    drawn = line.get_marker() not in ("None", "none", "", " ", None)
+    return len(line.get_xdata()) if drawn else 0

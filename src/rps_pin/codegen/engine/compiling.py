@@ -72,7 +72,8 @@ def compile_mechanism(
         If a joint has no expressions.
     CompileError
         If there is no compiler, or it fails; or if the code does not agree with the Pinocchio
-        engine to 1e-10.
+        engine to 1e-10; accelerations of bodies of very different inertia to less, as their
+        condition number says.
     """
     choice(device, "device", ("cpu", "cuda"))
     groups, frames = _names(parameters, "parameters"), _names(wrench_frames, "wrench_frames")

@@ -227,6 +227,10 @@ class _Record:
         return LoopRun(self._controller.robot.parameters, events=events, **rows)
 
 
+#: Of the table that `write_loop_csv` writes.
+COLUMNS = 24
+
+
 def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
     """Write a run as CSV, one row per tick, with units in the header.
 

@@ -74,6 +74,12 @@ class Scenario:
         """The trajectory's first pose, shape (3,)."""
         return self.trajectory.sample(0.0).pose
 
+    @property
+    def duration(self) -> float:
+        """Of a run, s."""
+        given = self.entry.duration
+        return self.entry.settle + self.trajectory.duration if given is None else given
+
     def controller(self) -> Controller:
         """Return a new controller."""
         entry = self.entry.controller
@@ -92,7 +98,7 @@ class Scenario:
 
     def run(self, progress: Callable[[float], object] | None = None) -> LoopRun:
         """Return a run of the controller with the plant; see `run_loop`."""
-        settings = self.entry.model_dump(include={"duration", "settle"})
+        settings = self.entry.model_dump(include={"settle"}) | {"duration": self.duration}
         settings |= self.entry.controller.model_dump(include={"speeds", "paced"})
         loop = self.controller(), self.plant(), self.trajectory
         return run_loop(*loop, faults=self.faults, progress=progress, **settings)
