@@ -4,7 +4,7 @@
 
 The folder is outside of the repository, since robots have licences of their own. Names, versions
 and licences are in benchmarks/robot_files/packages.txt; nothing is installed, nothing of the
-packages is run. What is there already is not fetched again. About 6 GB are downloaded.
+packages is run. What is there already is not fetched again. 1.6 GB are downloaded, 4.4 GB unpacked.
 """
 
 from __future__ import annotations

@@ -78,7 +78,14 @@ def table(found: Sequence[Tried]) -> str:
     for name, test in rows.items():
         counts = [_count(found, kind, test) for kind in KINDS]
         lines.append(f"| {name} | " + " | ".join(map(str, counts)) + " |")
+        if name == "load":
+            lines.append("| share that loads | " + " | ".join(_shares(found, counts)) + " |")
     return "\n".join(lines)
+
+
+def _shares(found: Sequence[Tried], counts: Sequence[int]) -> list[str]:
+    all_of = [len(tried(found, kind)) for kind in KINDS]
+    return [f"{n / of:.1%}" if of else "" for n, of in zip(counts, all_of, strict=True)]
 
 
 def by_package(found: Sequence[Tried]) -> str:
@@ -135,6 +142,7 @@ def causes(found: Sequence[Tried]) -> list[Cause]:
 def _general(message: str) -> str:
     """Return a message without what belongs to one file: paths, names, numbers, lists."""
     message = re.sub(r"; there are:.*|there are: .*", "", message)
+    message = re.sub(r"(it moves the joints) [^(]*", r"\1 NAMES ", message)
     message = re.sub(r"\S*/\S+", "FILE", message)
     message = re.sub(r"'[^']*'|\"[^\"]*\"", "NAME", message)
     message = re.sub(r"(?<![A-Za-z])[-+]?\d[\d.]*(e[-+]?\d+)?", "N", message)
