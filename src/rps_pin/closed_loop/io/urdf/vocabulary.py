@@ -11,7 +11,6 @@ with another program's prefix, it is told in a note.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -198,53 +197,76 @@ def check_words(robot: Any, origin: str) -> list[str]:
     MechanismError
         With the line.
     """
-    unread: Counter[str] = Counter()
-    lines: dict[str, int] = {}
-    repeated: list[str] = []
-
-    def note(words: str, element: Any) -> None:
-        unread[words] += 1
-        lines[words] = min(lines.get(words, element.sourceline), element.sourceline)
-
+    found = _Words(origin)
     todo = [(robot, "robot")]
     while todo:
         element, path = todo.pop()
-        tag, word = tag_of(element), WORDS[path]
-        if word.refused:
-            refuse(element, origin, f"<{tag}> {word.refused}")
-        if word.is_open:
-            continue
-        attributes = (*word.read, *word.harmless)
+        if WORDS[path].refused:
+            refuse(element, origin, f"<{tag_of(element)}> {WORDS[path].refused}")
+        if not WORDS[path].is_open:
+            found.check_attributes(element, path)
+            todo += found.checked_children(element, path)
+    return found.notes()
+
+
+class _Words:
+    """Words of a file that are not read, and elements that are repeated."""
+
+    def __init__(self, origin: str) -> None:
+        self._origin = origin
+        self._lines: dict[str, list[int]] = {}
+        self._repeated: list[str] = []
+
+    def notes(self) -> list[str]:
+        """Return a note on each."""
+        return self._repeated + [
+            f"{self._origin}, line {min(lines)}: {words} is not read"
+            + (f" (nor are {len(lines) - 1} more)" if len(lines) > 1 else "")
+            for words, lines in self._lines.items()
+        ]
+
+    def check_attributes(self, element: Any, path: str) -> None:
+        """Refuse or note the attributes of an element that are not known."""
+        word, tag = WORDS[path], tag_of(element)
+        known = (*word.read, *word.harmless)
         for name in (_plain(name, element) for name in element.attrib):
-            if name in attributes:
+            if name in known:
                 continue
-            why = "" if name in word.told else _objection(path, name, attributes, "{!r}")
+            why = "" if name in word.told else _objection(path, name, known, "{!r}")
             if why:
-                refuse(element, origin, f"<{tag}> has no attribute {name!r}; {why}")
-            note(f"the attribute {name!r} of <{tag}>", element)
-        seen: dict[str, Any] = {}
+                refuse(element, self._origin, f"<{tag}> has no attribute {name!r}; {why}")
+            self._note(f"the attribute {name!r} of <{tag}>", element)
+
+    def checked_children(self, element: Any, path: str) -> Iterator[tuple[Any, str]]:
+        """Yield the known elements inside, with their paths; refuse or note others."""
+        tag, seen = tag_of(element), dict[str, Any]()
         for inner in element.iterchildren("*"):
             below, inner_tag = f"{path}/{tag_of(inner)}", tag_of(inner)
             if below not in WORDS:
                 known = [one.rpartition("/")[2] for one in WORDS if one.rpartition("/")[0] == path]
                 if why := _objection(path, inner_tag, known, "<{}>"):
-                    refuse(inner, origin, f"<{tag}> has a <{inner_tag}>; {why}")
-                note(f"<{inner_tag}> in <{tag}>", inner)
+                    refuse(inner, self._origin, f"<{tag}> has a <{inner_tag}>; {why}")
+                self._note(f"<{inner_tag}> in <{tag}>", inner)
                 continue
             first = seen.setdefault(below, inner)
-            if WORDS[below].once and first is not inner:
-                if not _alike(first, inner):
-                    why = f"which differs from the first (line {first.sourceline})"
-                    refuse(inner, origin, f"<{tag}> has a second <{inner_tag}>, {why}")
-                why = f"<{tag}> repeats its <{inner_tag}> of line {first.sourceline}"
-                repeated.append(f"{origin}, line {inner.sourceline}: {why}, which counts once")
-                continue
-            todo.append((inner, below))
-    return repeated + [
-        f"{origin}, line {lines[words]}: {words} is not read"
-        + (f" (nor are {count - 1} more)" if count > 1 else "")
-        for words, count in unread.items()
-    ]
+            if not WORDS[below].once or first is inner:
+                yield inner, below
+            else:
+                self._repeat(tag, first, inner)
+
+    def _note(self, words: str, element: Any) -> None:
+        self._lines.setdefault(words, []).append(element.sourceline)
+
+    def _repeat(self, tag: str, first: Any, again: Any) -> None:
+        """Note an element that says what the first of its tag says; refuse another."""
+        what, line = tag_of(again), first.sourceline
+        if not _alike(first, again):
+            why = f"<{tag}> has a second <{what}>, which differs from the first (line {line})"
+            refuse(again, self._origin, why)
+        self._repeated.append(
+            f"{self._origin}, line {again.sourceline}: <{tag}> repeats its <{what}> of line "
+            f"{line}, which counts once"
+        )
 
 
 def _objection(path: str, word: str, known: Sequence[str], shown: str = "{}") -> str:
