@@ -94,6 +94,34 @@ def test_stiff_damping_in_steps_of_a_millisecond(tmp_path: Path, damping: float)
     assert found["v_crank"][-1] == pytest.approx(data.qvel[0], rel=1e-3, abs=1e-3)
 
 
+_SPRING = """<mujoco model="spring"><compiler inertiafromgeom="false"/><worldbody>
+<body name="mass"><joint name="slide" type="slide" axis="1 0 0" stiffness="{stiffness}"/>
+<inertial pos="0 0 0" mass="0.5" diaginertia="1 1 1"/></body></worldbody>
+<actuator><motor joint="slide"/></actuator>
+<keyframe><key name="home" qpos="0.01"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize(("stiffness", "told"), [(2e4, False), (4e5, True)])
+def test_steps_too_long_for_a_spring_are_told(tmp_path: Path, stiffness: float, told: bool) -> None:
+    """Of 200 and 894 rad/s, in steps of 1 ms: by order 4 the energy falls by (w h)^6 / 72 a step.
+
+    Of 100 steps that is 9e-5 and 0.7 of it.
+    """
+    pytest.importorskip("mujoco")
+    (tmp_path / "spring.xml").write_text(_SPRING.format(stiffness=stiffness))
+    command = ("simulate", "spring.xml", "--duration", "0.1", "--json")
+    run = rps_pin(*command, folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)
+    each = stiffness / 0.5 * 1e-6
+    lost = 1 - (1 - each**3 / 72 + each**4 / 576) ** 100
+    assert summary["energy_balance"] == pytest.approx(lost, rel=0.05)
+    notes = [note for note in summary["notes"] if "too long for this motion" in note]
+    assert bool(notes) is told
+    summary = json.loads(rps_pin(*command, "--method", "adaptive", folder=tmp_path).stdout)
+    assert summary["energy_balance"] < 1e-8
+
+
 def test_adaptive_steps_shorten_where_a_trial_step_leaves_all_bounds(tmp_path: Path) -> None:
     """At a rate of 1e6 per second the first trial, of 1 ms, is no motion at all."""
     pytest.importorskip("mujoco")

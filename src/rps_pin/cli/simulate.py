@@ -15,9 +15,12 @@ from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.layer_options import LayersOption, write_page
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.dynamics.not_held import NotHeld, not_held
+from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.errors import InputError
 
 _MOST_NOTES = 3
+#: Error of the energy, of its largest part, above which the step is told to be too long.
+_BALANCED = 1e-3
 #: Rows of the printed table, by the names of the summary.
 _ROWS = {
     "duration": "{duration:.6g} s ({rows} rows)",
@@ -122,18 +125,17 @@ def simulate_command(
     motion.to_csv(files[0])
     files += save_figure(plot_simulation(motion, mechanism), folder, "simulation")
     shapes, missing = options.shapes_of(file, mechanism, package_path)
-    notes = [*mechanism.notes, *missing]
+    balance = _error_of_energy(motion)
+    notes = [*mechanism.notes, *missing, *_too_long(balance, step, method)]
     files.append(write_page(folder, mechanism, motion, title, layers, shapes))
-    energy, work = motion.energy, np.abs(motion.work).max()
-    scale = max(float(motion.kinetic.max()), float(np.ptp(motion.potential)), float(work), 1e-300)
     summary: dict[str, Any] = {
         "duration": float(motion.time[-1]),
         "rows": len(motion.time),
         "largest_gap": float(motion.gap.max()),
         "kinetic_peak": float(motion.kinetic.max()),
-        "energy_change": float(energy[-1] - energy[0]),
+        "energy_change": float(motion.energy[-1] - motion.energy[0]),
         "work": float(motion.work[-1]),
-        "energy_balance": float(np.abs(motion.energy_balance).max() / scale),
+        "energy_balance": balance,
         "not_held": [part._asdict() for part in unheld],
         "limits_passed": [str(passed) for passed in motion.limits_passed],
         "notes": notes,
@@ -152,6 +154,23 @@ def simulate_command(
     for note in notes:
         console.print(f"note: {note}", markup=False)
     common.print_files(console, files)
+
+
+def _error_of_energy(motion: Simulation) -> float:
+    """Return the largest error of the energy balance, over the largest part of the energy."""
+    work = float(np.abs(motion.work).max())
+    largest = max(float(motion.kinetic.max()), float(np.ptp(motion.potential)), work, 1e-300)
+    return float(np.abs(motion.energy_balance).max() / largest)
+
+
+def _too_long(balance: float, step: float, method: Method) -> list[str]:
+    """Return a note if the energy shows that the steps are too long."""
+    if balance <= _BALANCED or method is Method.ADAPTIVE:
+        return []
+    return [
+        f"the energy is wrong by {balance:.2g}: steps of {step:g} s are too long for this motion "
+        "(stiff springs?); take a shorter --step, or --method adaptive"
+    ]
 
 
 def _phrase(unheld: tuple[NotHeld, ...]) -> str:

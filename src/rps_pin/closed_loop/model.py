@@ -698,7 +698,7 @@ class ClosedLoopModel:
         Raises
         ------
         InputError, MechanismError
-            If a value has the wrong shape, or a joint is unknown.
+            If a value has the wrong shape, a joint is unknown, or the way is too long to follow.
         ClosureError
             If no closed configuration with these values is found, or it is outside joint limits.
         SingularityError

@@ -221,7 +221,8 @@ class ClosedManifold:
         if not worst <= size:
             raise ClosureError(
                 f"the loops stay open by {worst:.3g} m after {_NEWTON_STEPS} Newton steps "
-                "(too long a step in time?)",
+                "(too long a step in time, as for stiff springs? Take a shorter one, or "
+                "method='adaptive')",
                 worst,
             )
         v = v - self._columns * self._least(rows, rows @ (v / self._columns))

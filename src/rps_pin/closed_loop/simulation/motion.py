@@ -107,7 +107,8 @@ def refuse_infinite(q: Array, v: Array) -> None:
     """Raise `SingularityError` if a state is not finite."""
     if not math.isfinite(q.dot(q) + v.dot(v)):
         raise SingularityError(
-            "the motion grows beyond all numbers (unstable control, or too long a step)",
+            "the motion grows beyond all numbers (unstable control, or too long a step in time, as "
+            "for stiff springs: take a shorter one, or method='adaptive')",
             np.inf,
             np.inf,
         )
