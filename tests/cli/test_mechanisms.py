@@ -374,3 +374,25 @@ def test_assembly_modes_are_printed_and_each_can_be_a_home() -> None:
     run = rps_pin("assembly-modes", "four_bar", "--at", "crank=1.2")
     assert run.returncode == 1
     assert "crank_joint" in run.stderr
+
+
+BALL = """<mujoco model="ball"><option gravity="0 0 0"/><worldbody>
+<body><joint name="ball" type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.03 0.04"/>
+</body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("actuated", ["[ball]", "[ball.y]"])
+def test_velocities_of_a_driven_ball_are_named_one_by_one(actuated: str, tmp_path: Path) -> None:
+    """About a principal axis: 0.06 N m on 0.03 kg m^2, from 0.5 rad/s, for 0.2 s."""
+    (tmp_path / "ball.xml").write_text(BALL)
+    (tmp_path / "ball.yaml").write_text(f"mjcf: ball.xml\nactuated: {actuated}\n")
+    words = ["simulate", "ball.yaml", "--duration", "0.2", "--output", "out"]
+    run = rps_pin(*words, folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    run = rps_pin(*words, "--tau", "ball.y=0.06", "--speed", "ball.y=0.5", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    table = np.genfromtxt(tmp_path / "out" / "simulation.csv", delimiter=",", names=True)
+    assert table["v_ball_1"][-1] == pytest.approx(0.5 + 0.2 * 2.0, rel=1e-9)
+    run = rps_pin(*words, "--tau", "ball.w=1", folder=tmp_path)
+    assert run.returncode == 1
+    assert "no actuated joint 'ball.w'; there are: ball" in run.stderr

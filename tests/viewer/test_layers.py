@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 import umsgpack
 
-from rps_pin import ClosedLoopModel, JointCoupling, RPSRobot, helix
+from rps_pin import ClosedLoopModel, JointCoupling, LoopClosure, RPSRobot, helix
 from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import ClosureError, InputError
 from rps_pin.rps import joint_reactions
@@ -326,6 +326,34 @@ def test_any_mechanism_shows_with_all_that_fits_and_nothing_but_its_model(name):
         for side, frame in (("a", a), ("b", b)):
             mark = found[f"closures/{closure.name}_{side}"][:3, 3]
             np.testing.assert_allclose(mark, data.oMf[frame].translation, atol=1e-12)
+
+
+def test_offsets_of_closures_are_drawn_where_they_stand():
+    """By hand: the frame's placement times the offset; at a pose in the world, that pose."""
+    tree = ClosedLoopModel.load(URDF / "four_bar.yaml").without_closures(["knee"])
+    at = pin.SE3(pin.exp3(np.array([0.3, -0.2, 0.5])), np.array([0.1, 0.02, -0.03]))
+    pose = np.array([0.4, 0.0, 0.2])
+    closures = [
+        LoopClosure("coupler", "rocker", "planar", placement_a=at, placement_b=at, name="grip"),
+        LoopClosure(
+            "crank",
+            "universe",
+            "distance",
+            name="tie",
+            distance=0.5,
+            placement_b=pin.SE3(np.eye(3), pose),
+        ),
+    ]
+    held = ClosedLoopModel(tree.model, closures, [])
+    q = tree.home + np.array([0.2, -0.3, 0.1])
+    _, recorder = shown(held, q, layers=["closures"])
+    found, data = placed(recorder), held.model.createData()
+    pin.framesForwardKinematics(held.model, data, q)
+    for side, name in (("a", "coupler"), ("b", "rocker")):
+        mark = found[f"closures/grip_{side}"][:3, 3]
+        frame = data.oMf[held.model.getFrameId(name)]
+        np.testing.assert_allclose(mark, frame.act(at.translation), atol=1e-12)
+    np.testing.assert_allclose(found["closures/tie_b"][:3, 3], pose, atol=1e-12)
 
 
 def test_an_open_closure_shows_its_gap():

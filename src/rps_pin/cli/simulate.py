@@ -14,6 +14,7 @@ from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.layer_options import LayersOption, write_page
 from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.closed_loop.column_names import joint_coordinates
 from rps_pin.closed_loop.dynamics.not_held import NotHeld, not_held
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.errors import InputError
@@ -180,12 +181,17 @@ def _phrase(unheld: tuple[NotHeld, ...]) -> str:
 
 
 def _of_actuated(mechanism: ClosedLoopModel, pairs: options.JointValues, option: str) -> Array:
-    """Return values given by joint name in the order of the actuated joints, zero if not given."""
-    values = options.by_joint(pairs or [], option)
-    names = list(mechanism.actuated)
-    if mechanism.actuated_indices.size != len(names):
-        raise InputError(f"{option}: the actuated joints have several coordinates each")
+    """Return values given by name in the order of tau, zero if not given.
+
+    Of joints with several velocities, by the names of these: ``ball.x``.
+    """
+    values, model = options.by_joint(pairs or [], option), mechanism.model
+    names: list[str] = []
+    for joint in mechanism.actuated:
+        whole = model.existJointName(joint)
+        names += (joint_coordinates(model, joint) if whole else ()) or (joint,)
     for name in values:
         if name not in names:
-            raise InputError(f"{option}: no actuated joint {name!r}; there are: {', '.join(names)}")
+            there = f"there are: {', '.join(names)}" if names else "nothing is driven"
+            raise InputError(f"{option}: no actuated joint {name!r}; {there}")
     return np.array([values.get(name, 0.0) for name in names])
