@@ -495,17 +495,23 @@ def force_of_bodies(c: Case, v: Array, a: Array, *, wrenches: bool = True) -> Ar
 def resisting_force(model: pin.Model, effects: JointEffects, q: Array, v: Array) -> Array:
     """Damping, friction and springs, joint by joint."""
     force = effects.damping * v + effects.friction * np.tanh(v / effects.friction_speed)
+    return np.asarray(force + effects.stiffness * stretches(model, effects, q))
+
+
+def stretches(model: pin.Model, effects: JointEffects, q: Array) -> Array:
+    """How far the springs are from their rest, shape (nv,): rotation vectors of balls."""
+    found = np.zeros(model.nv)
     for joint in list(model.joints)[1:]:
         at = slice(joint.idx_v, joint.idx_v + joint.nv)
-        own, rest = q[joint.idx_q : joint.idx_q + joint.nq], effects.rest[at].copy()
+        own, rest = q[joint.idx_q : joint.idx_q + joint.nq], effects.rest[at]
         if joint.nq == joint.nv:
-            force[at] += effects.stiffness[at] * (own - rest)
+            found[at] = own - rest
         elif effects.stiffness[at].any():  # a ball or a free-flyer
             turn = Rotation.from_quat(own[-4:])
             stretch = (Rotation.from_rotvec(rest[-3:]).inv() * turn).as_rotvec()
             shift = turn.inv().apply(own[:-4] - rest[:-3]) if joint.nv == 6 else np.empty(0)
-            force[at] += effects.stiffness[at] * np.concatenate([shift, stretch])
-    return np.asarray(force)
+            found[at] = np.concatenate([shift, stretch])
+    return found
 
 
 def external_force(c: Case) -> Array:
@@ -534,10 +540,8 @@ def mechanical_energy(mechanism: ClosedLoopModel, q: Array, v: Array) -> float:
         inertia = model.inertias[index]
         energy -= inertia.mass * model.gravity.linear @ data.oMi[index].act(inertia.lever)
     if mechanism.effects is not None:
-        for joint in list(model.joints)[1:]:
-            at = joint.idx_v
-            stretch = q[joint.idx_q] - mechanism.effects.rest[at]
-            energy += mechanism.effects.stiffness[at] * stretch**2 / 2
+        stretch = stretches(model, mechanism.effects, q)
+        energy += mechanism.effects.stiffness @ stretch**2 / 2
     return float(energy)
 
 

@@ -169,7 +169,8 @@ def test_closing_steps_and_lengths_determine_the_dependent_coordinates(name: str
     m, f, q, *_ = state(name)
     x = ca.SX.sym("q", q.size)
     equations = ca.vertcat(f.closing_step(q=x)["step"][f.dependent.tolist()], f.unit_lengths(x))
-    unknown = np.setdiff1d(np.arange(q.size), m.system.coordinates[f.independent])
+    coordinates = np.concatenate([j.idx_q + np.arange(j.nv) for j in list(m.model.joints)[1:]])
+    unknown = np.setdiff1d(np.arange(q.size), coordinates[f.independent])
     slopes = ca.Function("slopes", [x], [ca.jacobian(equations, x)[:, unknown.tolist()]])(q).full()
     assert slopes.shape[0] == slopes.shape[1]
     assert np.linalg.cond(slopes) < 1e3
