@@ -19,7 +19,9 @@ from rps_pin.closed_loop.io.urdf.packages import file_of
 from rps_pin.closed_loop.io.urdf.tree import urdf_file
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.config import read_yaml
+from rps_pin.contents import known_format
 from rps_pin.errors import InputError, few
+from rps_pin.files import opened
 
 PackagePath = Sequence[str | os.PathLike[str]]
 
@@ -84,7 +86,10 @@ def urdf_shapes(
         except (ValueError, RuntimeError, IndexError):
             drawable = False
         if not drawable:
-            raise InputError(f"{name!r}: {found} cannot be read as a mesh")
+            with opened(found, "mesh") as file:
+                what = known_format(file.read(1000))
+            why = f": it is {what}" if what else ""
+            raise InputError(f"{name!r}: {found} cannot be read as a mesh{why}")
         return found
 
     missing: list[str] = []

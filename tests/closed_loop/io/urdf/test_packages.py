@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rps_pin import ClosedLoopModel, InputError
+from rps_pin.closed_loop.io.urdf import model_from_urdf
 from rps_pin.closed_loop.io.urdf.packages import file_of
 from rps_pin.closed_loop.visuals import visual_model
 from tests.closed_loop.io.urdf.texts import joint, link, robot
@@ -153,6 +154,15 @@ def test_where_nothing_can_be_drawn_there_are_no_shapes(tmp_path_factory, visual
     found, told = shapes(tmp_path_factory.mktemp("bare"), visual)
     assert found is None
     assert bool(told) == bool(visual)
+
+
+def test_a_mesh_that_was_not_fetched_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d\n")
+    visual = '<visual><geometry><mesh filename="a.stl"/></geometry></visual>'
+    urdf = tmp_path / "r.urdf"
+    urdf.write_text(robot(f'<link name="base">{visual}</link>'))
+    with pytest.warns(UserWarning, match="as a mesh: it is a pointer of Git LFS"):
+        assert visual_model(urdf, model_from_urdf(urdf)) is None
 
 
 @each(
