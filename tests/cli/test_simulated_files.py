@@ -54,7 +54,7 @@ def stiff_rod(damping: float, option: str = "", hard: str = "") -> str:
 def simulated(folder: Path, *options: str) -> tuple[dict[str, Array], dict[str, float]]:
     """Columns of the table, and the summary."""
     out = folder / f"out{len(list(folder.iterdir()))}"
-    command = ("simulate", str(folder / "stiff_rod.xml"), "--duration", "0.2", "--json")
+    command = ("simulate", str(folder / "stiff_rod.xml"), "--duration", "0.1", "--json")
     run = rps_pin(*command, "-o", str(out), *options, folder=folder)
     assert run.returncode == 0, run.stderr
     table = np.genfromtxt(out / "simulation.csv", delimiter=",", names=True)
@@ -71,7 +71,7 @@ def test_stiff_damping_in_steps_of_a_millisecond(tmp_path: Path, damping: float)
     (tmp_path / "stiff_rod.xml").write_text(stiff_rod(damping))
     found, summary = simulated(tmp_path)
     exact, _ = simulated(tmp_path, "--method", "adaptive")
-    assert found["time"][-1] == pytest.approx(0.2, abs=1e-12)
+    assert found["time"][-1] == pytest.approx(0.1, abs=1e-12)
     for name in ("q_crank", "q_slide"):
         assert worst(np.abs(found[name] - exact[name])) < 1e-6
     ends = found["q_slide"] + 0.4 - 0.1 * np.cos(found["q_crank"])
@@ -88,7 +88,7 @@ def test_stiff_damping_in_steps_of_a_millisecond(tmp_path: Path, damping: float)
     )
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_step(model, data, 20_000)
+    mujoco.mj_step(model, data, 10_000)
     assert found["q_crank"][-1] == pytest.approx(data.qpos[0], abs=1e-3)
     assert found["q_slide"][-1] == pytest.approx(data.qpos[5], abs=1e-4)
     assert found["v_crank"][-1] == pytest.approx(data.qvel[0], rel=1e-3, abs=1e-3)
