@@ -503,7 +503,7 @@ def stretches(model: pin.Model, effects: JointEffects, q: Array) -> Array:
     found = np.zeros(model.nv)
     for joint in list(model.joints)[1:]:
         at = slice(joint.idx_v, joint.idx_v + joint.nv)
-        own, rest = q[joint.idx_q : joint.idx_q + joint.nq], effects.rest[at]
+        own, rest = q[joint.idx_q :][: joint.nq].copy(), effects.rest[at].copy()  # SciPy writes
         if joint.nq == joint.nv:
             found[at] = own - rest
         elif effects.stiffness[at].any():  # a ball or a free-flyer
