@@ -699,3 +699,12 @@ def test_condition_limits_that_make_no_sense_are_refused(bad: float) -> None:
 
 def test_one_actuated_joint_may_be_given_by_its_bare_name() -> None:
     assert build(actuated="crank_joint").actuated == ("crank_joint",)
+
+
+def test_mimic_joints_of_a_pinocchio_model_are_refused() -> None:
+    model = pin.Model()
+    lead = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "lead")
+    mimic = pin.JointModelMimic(model.joints[lead].extract(), 2.0, 0.0)
+    model.addJoint(lead, mimic, pin.SE3.Identity(), "follower")
+    with pytest.raises(MechanismError, match=r"joint 'follower' mimics .*give a JointCoupling"):
+        ClosedLoopModel(model, [], [])

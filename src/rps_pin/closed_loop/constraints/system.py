@@ -79,6 +79,12 @@ class ConstraintSystem:
         max_condition: float = MAX_CONDITION,
         rule: RankRule | None = EXACT,
     ) -> None:
+        for joint in model.mimicking_joints:
+            raise MechanismError(
+                f"joint {model.names[joint]!r} mimics another one in the Pinocchio model, which "
+                "Pinocchio's constraints do not take: build the model without mimic joints, and "
+                "give a JointCoupling"
+            )
         self.model = model
         self.actuated_names = (actuated,) if isinstance(actuated, str) else tuple(actuated)
         refuse_twice("actuated joint", self.actuated_names)
