@@ -186,14 +186,19 @@ class MechanismDescription:
             "",
             *_table(("joint", "kind", "", "limits (rad, m)"), joints),
             "",
-            *_table(("closure", "kind", "between", "rows"), closures),
-            "",
-            f"velocities {self.nv}, closure rows {self.rows}, rank {self.rank}, "
-            f"redundant rows {self.redundant_rows}",
-            "singular values of the closures' Jacobian: "
-            + " ".join(f"{value:.3g}" for value in self.singular_values),
-            f"condition number of the passive joints' part: {self.condition:.4g}",
         ]
+        if closures:
+            lines += [*_table(("closure", "kind", "between", "rows"), closures), ""]
+        lines += [
+            f"velocities {self.nv}, closure rows {self.rows}, rank {self.rank}, "
+            f"redundant rows {self.redundant_rows}"
+        ]
+        if self.rows:
+            values = " ".join(f"{value:.3g}" for value in self.singular_values)
+            lines += [
+                f"singular values of the closures' Jacobian: {values}",
+                f"condition number of the passive joints' part: {self.condition:.4g}",
+            ]
         lines += [f"idle: {_in_words(freedom)}" for freedom in self.idle]
         lines += [f"without actuator: {_in_words(freedom)}" for freedom in self.lacking]
         if self.home_is_singular:
