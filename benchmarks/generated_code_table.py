@@ -47,7 +47,7 @@ OURS, TODAY = "generated", "Pinocchio engine"
 INSIDE, CALLS = "inside C", 4
 """Columns: `ClosedLoopModel.compile()`, and the same call of `ClosedLoopModel`."""
 STEPS, STEP = 1000, 1e-3
-SAMPLES = 100_000
+SAMPLES, CHAIN_SAMPLES = 100_000, 1000
 PLANAR = (0, 2)
 """Rows of world axes that plain Pinocchio keeps of a closure in the plane x, z."""
 
@@ -89,7 +89,7 @@ def measured(only: list[str] | None = None) -> Figures:
         figures.add("build (s)", one.name, seconds)
         add_single_calls(figures, one, fast, axes)
         if "four-bar" in one.name:
-            add_batch(figures, one, in_lanes, 8000)
+            add_batch(figures, one, in_lanes, CHAIN_SAMPLES)
             continue
         add_derivatives(figures, one, fast)
         add_steps(figures, one, fast)

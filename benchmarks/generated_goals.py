@@ -10,7 +10,7 @@ import numpy as np
 FIRST_LOOPS = 8
 """Costs of fewer loops are mostly those of a call."""
 BATCH = "batch of 10^5, one thread (us a sample)"
-CHAIN_BATCH = "batch of 8000, one thread (us a sample)"
+CHAIN_BATCH = "batch of 1000, one thread (us a sample)"
 DIRECT = "direct kinematics, batch of 10^5, one thread (us a pose)"
 
 

@@ -37,6 +37,8 @@ _TOO_ROUGH = 1e-2
 #: the rounding unit times the condition numbers of that matrix and of J_d, up to a limit.
 _BY_INERTIA = frozenset(("forward_dynamics", "forward_dynamics_derivatives", "step", "steps"))
 _ACCEPTED_AT_MOST = 1e-7
+#: And of derivatives: so many times the rounding unit times the square of the condition of J_d.
+_OF_SLOPES = 10.0
 #: A weight below this is no measure of wrenches, N.
 _WEIGHTLESS = 1e-6
 #: Results that are all below this may be zero: differences are relative to this then. SI units, of
@@ -303,7 +305,11 @@ class Proof:
         of_rounding = _OF_ROUNDING * sample.rounding**power
         if name.endswith("_by_parameters"):
             return max(_OF_DIFFERENCES, of_rounding)
-        return sample.accepted if name in _BY_INERTIA else max(ACCEPTED, of_rounding)
+        limit = sample.accepted if name in _BY_INERTIA else max(ACCEPTED, of_rounding)
+        if name.endswith("_derivatives"):  # dT = -J_d^-1 dJ T
+            of_slopes = _OF_SLOPES * np.finfo(np.float64).eps * sample.condition**2
+            limit = max(limit, min(of_slopes, _ACCEPTED_AT_MOST))
+        return float(limit)
 
     def _difference(
         self,
