@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import html
-import io
 import threading
 from collections.abc import Sequence
 from typing import Any, Self
 
-from rps_pin.errors import RPSPinError
+from rps_pin.panel.guarded_server import guarded_server, stop
 from rps_pin.panel.panel import Panel, Slider
+from rps_pin.plain_text import plain
 from rps_pin.viewer import Layer, View
 from rps_pin.viewer.writers.viser_writer import ViserWriter
 
-HOST = "127.0.0.1"
 _STYLE = "font-size: 85%; line-height: 1.3; margin: 0 0.8em 0.8em"
 
 
@@ -36,7 +34,8 @@ class BrowserPanel:
     Attributes
     ----------
     url : str
-        Address to open in a browser on this machine.
+        Address to open in a browser on this machine. A token in it lets the page in; requests
+        without it, from pages of other sites, or by another name of this machine, are refused.
     view : View
         The robot with its layers.
 
@@ -45,7 +44,7 @@ class BrowserPanel:
     RPSPinError
         If viser is not installed; says how to install it.
     InputError
-        If a layer is unknown or does not fit the mechanism.
+        If the port cannot be used, or a layer is unknown or does not fit the mechanism.
     """
 
     def __init__(
@@ -57,20 +56,15 @@ class BrowserPanel:
         layers: Sequence[str | Layer] = (),
         hidden: Sequence[str | Layer] = (),
     ) -> None:
-        try:
-            import viser  # noqa: PLC0415
-        except ImportError:
-            raise RPSPinError("the panel needs viser: pip install 'rps-pin[panel]'") from None
         self._panel, self._lock, self._following = panel, threading.RLock(), False
-        with contextlib.redirect_stdout(io.StringIO()):  # viser prints the address
-            self._server: Any = viser.ViserServer(host=HOST, port=port or 8080, verbose=False)
+        self._server: Any
+        self._server, self.url = guarded_server(port)
         try:
-            # A page can ask viser for a tunnel to the internet: not from here.
-            self._server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
             self._server.gui.configure_theme(show_logo=False, show_share_button=False)
             self._server.gui.main_panel.dock_right()
-            self.url = f"http://{HOST}:{self._server.get_port()}"
-            self._server.gui.add_markdown(f"## {title}")
+            self._heading = self._server.gui.add_html(
+                f'<h2 style="{_STYLE}">{_escaped(title)}</h2>'
+            )
             self._sliders = {
                 group: [
                     (slider, self._handle(group, slider, value))
@@ -94,8 +88,7 @@ class BrowserPanel:
 
     def close(self) -> None:
         """End the server."""
-        with contextlib.redirect_stdout(io.StringIO()):  # viser prints that it stops
-            self._server.stop()
+        stop(self._server)
 
     def __enter__(self) -> Self:
         return self
@@ -120,7 +113,7 @@ class BrowserPanel:
     def _handle(self, group: str, slider: Slider, value: float) -> Any:
         now = slider.scale * value
         handle = self._server.gui.add_slider(
-            slider.name,
+            plain(slider.name),
             min=min(slider.low, now),
             max=max(slider.high, now),
             step=slider.step,
@@ -154,11 +147,15 @@ class BrowserPanel:
 
 def _as_html(panel: Panel) -> str:
     """Return broken limits or refusals as a line, and the readings as a table."""
-    words = "<br>".join(map(html.escape, panel.trouble))
+    words = "<br>".join(map(_escaped, panel.trouble))
     colour = "#b00000" if words else "#006000"
     rows = "".join(
-        f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>"
+        f"<tr><td>{_escaped(name)}</td><td>{_escaped(value)}</td></tr>"
         for name, value in panel.readings()
     )
     line = f'<p style="color:{colour}; margin: 0.5em 0">{words or "within all limits"}</p>'
     return f"{line}<table>{rows}</table>"
+
+
+def _escaped(text: str) -> str:
+    return html.escape(plain(text))

@@ -7,7 +7,6 @@ listens on 127.0.0.1 and ends with its ``with`` block.
 from __future__ import annotations
 
 import asyncio
-import os
 import socket
 import threading
 from collections.abc import Mapping
@@ -16,12 +15,11 @@ from typing import Self
 import tornado.httpserver
 import umsgpack
 
-from rps_pin.errors import InputError, RPSPinError
+from rps_pin.errors import RPSPinError
+from rps_pin.viewer.server.local_only import HOST, checked_port, listener
 from rps_pin.viewer.server.web import Hub, application
 from rps_pin.viewer.writers.window import Command, Window
 
-HOST = "127.0.0.1"
-"""The address that is listened on."""
 _START_SECONDS = 10.0
 _FAREWELL_SECONDS = 0.5
 """Time for the open tabs to close their connections before these are cut."""
@@ -52,9 +50,8 @@ class LocalViewer:
     """
 
     def __init__(self, port: int | None = None, *, title: str = "Robot", note: str = "") -> None:
-        if port is not None and not 1 <= port <= 65535:
-            raise InputError(f"port = {port}: it must be between 1 and 65535")
-        self._asked, self._title, self._note = port, title, note
+        self._asked = None if port is None else checked_port(port)
+        self._title, self._note = title, note
         self._hub = Hub()
         self._thread: threading.Thread | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -78,18 +75,12 @@ class LocalViewer:
     def __enter__(self) -> Self:
         if self._thread is not None:
             raise RPSPinError("the viewer is running already, or has run: make a new one")
-        try:
-            listener = socket.create_server((HOST, self._asked or 0))
-        except OSError as error:
-            raise InputError(
-                f"port {self._asked} of {HOST} cannot be used ({os.strerror(error.errno or 0)}): "
-                "choose another, or none for a free one"
-            ) from error
-        listener.setblocking(False)
-        self._port = int(listener.getsockname()[1])
+        waiting = listener(self._asked)
+        waiting.setblocking(False)
+        self._port = int(waiting.getsockname()[1])
         ready = threading.Event()
         self._thread = threading.Thread(
-            target=lambda: asyncio.run(self._serve(listener, ready)),
+            target=lambda: asyncio.run(self._serve(waiting, ready)),
             name="rps_pin viewer",
             daemon=True,
         )

@@ -10,6 +10,7 @@ import tornado.websocket
 from tornado.iostream import IOStream
 
 from rps_pin.viewer.files.page import inline_script, own_file, page, viewer_library
+from rps_pin.viewer.server.local_only import REFUSAL, is_foreign, local_hosts
 from rps_pin.viewer.server.store import SceneStore
 
 _SOCKET_PATH = "/socket"
@@ -63,19 +64,13 @@ class Hub:
 
 
 class _LocalHandler(tornado.web.RequestHandler):
-    """Refuses requests that do not come from a page of this server.
-
-    Another site can make its own name lead to 127.0.0.1 (DNS rebinding), but it cannot change
-    what the browser sends as Host and Origin.
-    """
+    """Refuses requests that do not come from a page of this server; see `local_only`."""
 
     def prepare(self) -> None:
-        origin = self.request.headers.get("Origin")
-        hosts: frozenset[str] = self.settings["hosts"]
-        foreign = origin is not None and origin not in {f"http://{host}" for host in hosts}
-        if foreign or self.request.headers.get("Host") not in hosts:
+        hosts, origins = map(self.request.headers.get_list, ("Host", "Origin"))
+        if is_foreign(hosts, origins, self.settings["hosts"]):
             self.set_status(403)
-            self.finish("This viewer answers to this machine only.")
+            self.finish(REFUSAL)
 
 
 class _Text(_LocalHandler):
@@ -151,9 +146,7 @@ def application(hub: Hub, *, port: int, title: str, note: str) -> tornado.web.Ap
     title, note
         Plain text for the page's caption.
     """
-    names = ("127.0.0.1", "localhost")
-    # A browser leaves the port out of Host where it is HTTP's own.
-    hosts = frozenset(f"{name}:{port}" for name in names) | frozenset(names if port == 80 else ())
+    hosts = local_hosts(port)
     sockets = " ".join(f"ws://{host}" for host in sorted(hosts))
     policy = (
         "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'unsafe-inline'; "
