@@ -9,6 +9,7 @@ import pytest
 
 from rps_pin.errors import InputError
 from rps_pin.files import opened, whole_file
+from tests.each import each
 
 
 def test_finished_file_stands_at_its_path_and_nothing_else_remains(tmp_path: Path) -> None:
@@ -88,3 +89,22 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     words = "a table is given by its path, not by 3"
     with pytest.raises(InputError, match=words), opened(3, "table"):
         pass
+
+
+@each("kind", ["a FIFO", "a device", "a folder"])
+def test_what_is_no_regular_file_is_not_read_nor_waited_for(kind: str, tmp_path: Path) -> None:
+    path = {"a FIFO": tmp_path / "fifo", "a device": Path("/dev/zero")}.get(kind, tmp_path)
+    if kind == "a FIFO":
+        os.mkfifo(path)
+    told = kind if kind != "a folder" else "Is a directory"
+    why = f"cannot read the list {path}: .*{told}"
+    with pytest.raises(InputError, match=why), opened(path, "list"):
+        pytest.fail("it was opened")
+
+
+def test_a_loop_of_links_is_told(tmp_path: Path) -> None:
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    why = "cannot read the list .*loop: Too many levels"
+    with pytest.raises(InputError, match=why), opened(loop, "list"):
+        pytest.fail("it was opened")

@@ -1,20 +1,22 @@
 """YAML files: the one reader, and the types of values that its schemas share.
 
-Files are data. Nothing in a file is run (tags that name Python objects are refused), keys given
-twice are refused, and so are nested aliases that would expand to something huge, before they are
-expanded. A schema is a pydantic model in the package that the file belongs to; messages name the
-file, the line and the key, and list the keys that are possible.
+Files are data. Nothing in a file is run (tags other than YAML's own are refused), keys given twice
+are refused, and so are nested aliases that would expand to something huge, before they are
+expanded. Numbers are those of YAML 1.2: not ``1_000``, which Python takes. A schema is a pydantic
+model in the package that the file belongs to; messages name the file, the line and the key, and
+list the keys that are possible.
 """
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any, NoReturn, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
@@ -22,16 +24,33 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from rps_pin.contents import known_format, xml_root_tag
 from rps_pin.errors import InputError, MechanismError, did_you_mean, shown
 from rps_pin.files import opened
+from rps_pin.validation import LARGEST
 
 #: Larger files are refused: descriptions are written by hand, and reading takes 20 s a megabyte.
 LARGEST_FILE = 200_000
 #: Most values of a file, its aliases expanded.
 LARGEST_CONTENT = 100_000
 
+#: YAML's numbers; longer ones than `LONGEST_NUMBER` are refused.
+_NUMBER = re.compile(
+    r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+"
+    r"|[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"
+)
+LONGEST_NUMBER = 400
+_KINDS = ("int", "float", "str", "bool", "null", "seq", "map", "merge")
+_YAML = "tag:yaml.org,2002:"
+
+
+def _not_beyond(number: float) -> float:
+    if abs(number) > LARGEST:
+        raise ValueError(f"no number may be beyond {LARGEST:g}")
+    return number
+
+
 Text = Annotated[str, Field(min_length=1)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False), AfterValidator(_not_beyond)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(_not_beyond)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(_not_beyond)]
 Three = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 
 
@@ -229,17 +248,20 @@ def _parsed(text: str, origin: str) -> YamlFile:
         root, values = reader.compose(text), None
         if root is not None:
             _refuse_huge(root, origin)
+            _check_nodes(root, origin)
             values = reader.constructor.construct_document(root)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f", line {mark.line + 1}" if mark else ""
         problem = " ".join(f"{error.context or ''} {error.problem or ''}".split())
         raise InputError(f"{origin}{where}: not valid YAML: {problem}") from None
-    except (YAMLError, ValueError) as error:
-        first = " ".join(str(error).split())
-        raise InputError(f"{origin} is not valid YAML: {first}") from None
+    except InputError:
+        raise
     except RecursionError:
         raise InputError(f"{origin} is nested too deeply") from None
+    except (YAMLError, ValueError, TypeError, LookupError, ArithmeticError) as error:
+        first = " ".join(str(error).split())
+        raise InputError(f"{origin} is not valid YAML: {first}") from None
     if not isinstance(values, Mapping):
         held = "nothing" if values is None else f"a {type(values).__name__}"
         raise InputError(f"{origin} must hold 'key: value' lines; it holds {held}")
@@ -267,6 +289,48 @@ def _refuse_huge(root: Node, origin: str) -> None:
         raise InputError(
             f"{origin} would expand to more than {LARGEST_CONTENT} values, the most that is read"
         )
+
+
+def _check_nodes(root: Node, origin: str) -> None:
+    """Refuse tags that are not of YAML's core, what does not fit its tag, and half characters."""
+    waiting, seen = [root], set[int]()
+    while waiting:
+        node = waiting.pop()
+        if id(node) in seen:
+            continue
+        seen.add(id(node))
+        waiting += _children(node)
+        why = _scalar_fault(node) if isinstance(node, ScalarNode) else ""
+        kind = str(node.tag).removeprefix(_YAML)
+        if kind not in _KINDS or not str(node.tag).startswith(_YAML):
+            why = f"the tag {str(node.tag).replace(_YAML, '!!')} is not read"
+        elif kind != _kind_of(node, kind):
+            why = f"this is no {kind}"
+        if why:
+            line = node.start_mark.line + 1
+            raise InputError(f"{origin}, line {line}: not valid YAML: {why}")
+
+
+def _kind_of(node: Node, tagged: str) -> str:
+    """Return the kind of a node: ``map``, ``seq``, or that of its tag for other scalars."""
+    if isinstance(node, MappingNode):
+        return "map"
+    if isinstance(node, SequenceNode):
+        return "seq"
+    return "str" if tagged in ("map", "seq") else tagged
+
+
+def _scalar_fault(node: ScalarNode) -> str:
+    kind, value = str(node.tag).removeprefix(_YAML), node.value
+    if kind == "bool" and value.lower() not in ("true", "false"):
+        return f"{shown(value)} is neither true nor false"
+    if kind in ("int", "float") and len(value) > LONGEST_NUMBER:
+        return f"a number of {len(value)} digits is too long"
+    if kind in ("int", "float") and not _NUMBER.fullmatch(value):
+        return f"{shown(value)} is not a number of YAML"
+    if any("\ud800" <= letter <= "\udfff" for letter in value):
+        return f"{shown(value)} has half a character (a surrogate)"
+    return ""
 
 
 def _refuse_key(key: Node, origin: str) -> NoReturn:

@@ -1,8 +1,12 @@
-"""Files: read with errors that name them, written whole or not at all."""
+"""Files: read with errors that name them, written whole or not at all.
+
+Regular files alone are read: a FIFO would be waited for without end, and a device may have none.
+"""
 
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,12 +30,18 @@ def opened(path: str | os.PathLike[str], what: str) -> Iterator[BinaryIO]:
     Raises
     ------
     InputError
-        If it cannot be read, or the block finds that it is not UTF-8.
+        If it cannot be read, is no regular file, or the block finds that it is not UTF-8.
     """
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"a {what} is given by its path, not by {shown(path)}")
     try:
-        with Path(path).open("rb") as file:
+        with open(path, "rb", opener=_opener) as file:
+            kind = os.fstat(file.fileno()).st_mode
+            if not stat.S_ISREG(kind):
+                raise InputError(
+                    f"cannot read the {what} {os.fspath(path)}: it is {_kind(kind)}, not a regular "
+                    "file"
+                )
             yield file
     except InputError:
         raise
@@ -40,6 +50,16 @@ def opened(path: str | os.PathLike[str], what: str) -> Iterator[BinaryIO]:
         if isinstance(error, UnicodeDecodeError):
             reason = "not a UTF-8 text"
         raise InputError(f"cannot read the {what} {os.fspath(path)}: {reason}") from None
+
+
+def _opener(path: str, flags: int) -> int:
+    """Open without waiting for the other end of a FIFO."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _kind(mode: int) -> str:
+    kinds = {stat.S_IFIFO: "a FIFO", stat.S_IFSOCK: "a socket", stat.S_IFDIR: "a folder"}
+    return kinds.get(stat.S_IFMT(mode), "a device")
 
 
 @contextmanager

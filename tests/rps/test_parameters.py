@@ -357,6 +357,18 @@ def test_unknown_fields_are_refused_with_those_there_are() -> None:
     assert all(field in error.rule for field in RPSParameters.model_fields)
 
 
+@each("key", ["self", "values", "cls"])
+def test_any_word_may_be_an_unknown_field(key: str) -> None:
+    with pytest.raises(ParameterError, match=f"{key} = 1: unknown field"):
+        legal(**{key: 1})
+
+
+@each("value", [1e51, 1e200, 10**200])
+def test_numbers_beyond_all_measure_are_refused(value: float) -> None:
+    with pytest.raises(ParameterError, match=r"base_radius = 1.*no number may be beyond 1e.50"):
+        legal(base_radius=value)
+
+
 # Rigid bodies -------------------------------------------------------------------------------------
 
 

@@ -134,7 +134,7 @@ class RPSParameters(pydantic.BaseModel):
     friction_speed: Positive = FRICTION_SPEED
     """speed at which dry friction reaches 76 % of its value, m/s and rad/s"""
 
-    def __init__(self, **values: Any) -> None:
+    def __init__(self, /, **values: Any) -> None:
         try:
             super().__init__(**values)
         except pydantic.ValidationError as error:
