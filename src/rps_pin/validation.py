@@ -21,6 +21,10 @@ from rps_pin.errors import InputError, shown
 #: finite.
 SMALLEST, LARGEST = 1e-50, 1e50
 
+#: Of this machine's byte order. NumPy has one object of it, so that ``is`` tells it fastest; where
+#: an array has another one (after pickling, say), `numbers` tells that it is the same.
+FLOAT64 = np.dtype(np.float64)
+
 
 # Single numbers -----------------------------------------------------------------------------------
 
@@ -112,8 +116,8 @@ def real_array(
 def real_vector(value: ArrayLike, size: int, name: str) -> Array:
     """Return finite real numbers of shape (size,); fast, for control loops."""
     if (
-        isinstance(value, np.ndarray)
-        and value.dtype == np.float64
+        type(value) is np.ndarray  # no subclass: it may mean something else by its numbers
+        and value.dtype is FLOAT64
         and value.shape == (size,)
         and (not size or math.isfinite(dasum(value)))
     ):
@@ -126,14 +130,17 @@ def real_vector(value: ArrayLike, size: int, name: str) -> Array:
 
 
 def numbers(value: ArrayLike, name: str, wanted: str) -> Array:
-    """Return a value as float64; refuse ragged, complex, truth and text values.
+    """Return a value as a plain array of float64, in this machine's byte order.
 
-    `wanted` is what it must be, for the error: ``"3 numbers"``.
+    Refuses ragged, complex, truth, text, time and other values, and arrays of `numpy.ma` with
+    masked entries. `wanted` is what it must be, for the error: ``"3 numbers"``.
     """
+    if np.ma.is_masked(value):
+        raise InputError(f"{name} has masked entries; it must be {wanted}")
     try:
         given = np.asarray(value)
-    except ValueError:  # ragged
-        given = np.asarray("ragged")
+    except Exception:  # ragged; or whatever the value's own conversion raises
+        given = np.asarray("none")
     if given.dtype.kind not in "iuf":
         raise InputError(f"{name} = {shown(value)}: it must be {wanted}")
     return given.astype(np.float64, copy=False)

@@ -16,7 +16,7 @@ from rps_pin.arrays import Array
 from rps_pin.codegen.build.library import MANY, Library
 from rps_pin.codegen.python_calls import BuiltinFunction, addresses
 from rps_pin.errors import InputError
-from rps_pin.validation import numbers, whole_number
+from rps_pin.validation import FLOAT64, numbers, whole_number
 
 #: A batch from which on code for several samples at once is worth its building.
 LARGE_BATCH = 64
@@ -191,7 +191,7 @@ class CompiledFunction:
         batches = []
         for value, one in zip(inputs, self.inputs, strict=True):
             array = value
-            if not isinstance(array, np.ndarray) or array.dtype != np.float64:
+            if type(array) is not np.ndarray or array.dtype is not FLOAT64:
                 array = numbers(value, one.name, f"numbers of shape {one.wanted}")
             leading = array.ndim - len(one.shape)
             if leading < 0 or array.shape[leading:] != one.shape:

@@ -420,7 +420,7 @@ class RPSRobot:
         InputError, SingularityError
             As `ClosedLoopModel.inverse_dynamics`; and if q is a pose.
         """
-        if np.shape(q) == (3,):
+        if _is_pose(q):
             raise InputError(
                 "q has shape (3,), as a pose has; it must be (13,): state(pose, rate, "
                 "acceleration) gives q, v and a; or take actuator_forces"
@@ -481,3 +481,8 @@ class RPSRobot:
     def visual_model(self) -> pin.GeometryModel:
         """Return the shapes of the robot's links, for `rps_pin.viewer`."""
         return pin.buildGeomFromUrdfString(self.mechanism.model, self.urdf, pin.GeometryType.VISUAL)
+
+
+def _is_pose(q: object) -> bool:
+    """Return whether a configuration has a pose's shape."""
+    return q.shape == (3,) if isinstance(q, np.ndarray) else isinstance(q, list) and len(q) == 3

@@ -36,7 +36,7 @@ from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.errors import InfeasibleError, InputError, LimitExcess
 from rps_pin.numerics.linear_algebra import Decomposition
 from rps_pin.numerics.quadratic_program import LeastDistance, NearestPoint, least_violation
-from rps_pin.validation import real_vector
+from rps_pin.validation import numbers, real_vector
 
 TorqueLimits = Literal["model"] | float | ArrayLike | tuple[ArrayLike, ArrayLike] | None
 
@@ -164,7 +164,7 @@ class ForceDistribution:
         """
         force = self.mechanism.generalised_force(q, v, a, wrenches=wrenches)
         jacobian = self.mechanism.jacobian(q)
-        self.mechanism.system.refuse_open(np.asarray(q, dtype=np.float64))
+        self.mechanism.system.refuse_open(real_vector(q, self.mechanism.model.nq, "q"))
         aim = np.zeros(self.weights.size)
         if preferred is not None:
             aim = real_vector(preferred, aim.size, "preferred")
@@ -319,7 +319,7 @@ class ForceDistribution:
 
 def _spread(value: ArrayLike, size: int, name: str) -> Array:
     """Return one number, or as many as needed, as an array (size,) that is not NaN."""
-    array = np.asarray(value, dtype=np.float64)
+    array = numbers(value, name, f"a number, or {size} numbers")
     if array.ndim and array.shape != (size,):
         raise InputError(f"{name} has shape {array.shape}; it must be a number or ({size},)")
     if np.isnan(array).any():

@@ -34,8 +34,9 @@ from rps_pin.closed_loop.freedoms import of_actuators
 from rps_pin.closed_loop.regular import refuse_irregular
 from rps_pin.errors import InputError
 from rps_pin.numerics import linear_algebra
+from rps_pin.validation import FLOAT64
 
-_INFINITY = math.inf
+_INFINITY, _ARRAY = math.inf, np.ndarray
 
 
 class InverseDynamics:
@@ -139,10 +140,17 @@ def inverse_dynamics(
     An open q is refused if it has to be `closed`; otherwise the equations are solved all the same.
     """
     model, data, equations = system.model, system.data, system.equations
+    # What Pinocchio would read wrongly (other byte orders) or otherwise than meant (masks).
+    if not (
+        q.__class__ is v.__class__ is a.__class__ is _ARRAY
+        and q.dtype is v.dtype is a.dtype is FLOAT64
+        and q.ndim == v.ndim == a.ndim == 1
+    ):
+        q, v, a = system.state(q, v, a)
     try:
         force = rnea(model, data, q, v, a)
         computeJointJacobians(model, data, q)
-    except (TypeError, ValueError):  # a list, an array of integers, or a wrong shape
+    except (TypeError, ValueError):  # a wrong size
         given, checked = (q, v, a), system.state(q, v, a)
         if all(array is one for array, one in zip(checked, given, strict=True)):
             raise  # a complaint of Pinocchio's own

@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import joint_id
-from rps_pin.errors import InputError, MechanismError
+from rps_pin.errors import InputError, MechanismError, shown
 from rps_pin.numerics.elementary import Number, tanh
-from rps_pin.validation import positive_number, read_only, real_vector
+from rps_pin.validation import numbers, positive_number, read_only, real_vector
 
 #: rad/s or m/s.
 FRICTION_SPEED = 1e-2
@@ -130,9 +130,10 @@ def by_joint(model: pin.Model, values: Mapping[str, ArrayLike], what: str) -> Ar
     for name, value in values.items():
         joint = model.joints[joint_id(model, name, what)]
         try:
-            array[joint.idx_v : joint.idx_v + joint.nv] = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError):
+            given = numbers(value, what, "numbers")
+            array[joint.idx_v : joint.idx_v + joint.nv] = given
+        except ValueError:
             raise MechanismError(
-                f"{what} of joint {name!r} = {value!r}: it must be one number, or {joint.nv}"
+                f"{what} of joint {name!r} = {shown(value)}: it must be one number, or {joint.nv}"
             ) from None
     return array

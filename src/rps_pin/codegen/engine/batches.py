@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.errors import RPSPinError
+from rps_pin.errors import InputError, RPSPinError
+from rps_pin.validation import numbers
 
 Errors = Literal["raise", "mask"]
 #: Answers of one sample, from its arguments.
@@ -74,8 +75,14 @@ def by_samples(
     errors: Errors = "raise",
 ) -> Sequence[Any]:
     """Return an engine's answers of all samples, (..., *shape); arguments (..., n) each."""
-    arrays = [np.asarray(array, dtype=np.float64) for array in given]
-    batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    arrays = [numbers(array, "an argument", "numbers of shape (..., n)") for array in given]
+    try:
+        batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    except ValueError:
+        told = ", ".join(str(array.shape) for array in arrays)
+        raise InputError(
+            f"the leading dimensions of the arguments do not go together: {told}"
+        ) from None
     if not batch:
         return _one(shapes, arrays, answer, errors)
     found = [np.empty(batch + shape) for shape in shapes]

@@ -826,7 +826,7 @@ class CompiledMechanism:
         """
         longest: Any = duration
         if duration.__class__ is not float:
-            longest = np.max(np.asarray(duration, dtype=np.float64), initial=0.0)
+            longest = np.max(numbers(duration, "duration", "positive numbers of s"), initial=0.0)
         stiff = bool(longest * self._damping_rate > 0.5 * STIFF)
         if duration.__class__ is float and not (wrenches or options or stiff):
             single = self._single.step(q, v, tau, _length(duration))

@@ -46,10 +46,10 @@ from rps_pin.control.loop.force_limits import LEAST_PACE, ForceLimits, recovered
 from rps_pin.control.loop.gains import Gains
 from rps_pin.control.loop.setpoints import Setpoint, Setpoints
 from rps_pin.control.loop.status import STATUSES, Status
-from rps_pin.errors import InputError, SingularityError
+from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.validation import choice, real_array, whole_number
+from rps_pin.validation import choice, numbers, real, whole_number
 
 Space = Literal["actuator", "task"]
 
@@ -146,10 +146,10 @@ class Controller(ABC):
         p = robot.parameters
         if not isinstance(gains, Gains):
             raise InputError(f"gains must be Gains, not {type(gains).__name__}")
-        if not 0.0 < stop_singular < near_singular:
+        if not 0.0 < real(stop_singular) < real(near_singular):
             raise InputError(
-                f"stop_singular = {stop_singular}: it must be positive and less than "
-                f"near_singular = {near_singular}"
+                f"stop_singular = {shown(stop_singular)}: it must be positive and less than "
+                f"near_singular = {shown(near_singular)}"
             )
         self.space = choice(space or self._default_space, "space", get_args(Space))
         self._in_task_space = self.space == "task"
@@ -480,9 +480,12 @@ class Controller(ABC):
 
 def _force_limit(robot: RPSRobot, given: ArrayLike | None) -> Triple:
     """Return the force limit of each actuator, N."""
-    limit = np.asarray(robot.parameters.actuator_force_limit if given is None else given)
-    finite = real_array(np.where(limit == math.inf, 1.0, limit), "force_limit")
-    if limit.shape not in ((), (3,)) or not (finite > 0).all():
+    limit = numbers(
+        robot.parameters.actuator_force_limit if given is None else given,
+        "force_limit",
+        "positive, one number or three",
+    )
+    if limit.shape not in ((), (3,)) or not (limit > 0).all():
         raise InputError(f"force_limit = {limit.tolist()}: it must be positive, one or three")
-    one, two, three = np.broadcast_to(limit.astype(np.float64), 3).tolist()
+    one, two, three = np.broadcast_to(limit, 3).tolist()
     return one, two, three
