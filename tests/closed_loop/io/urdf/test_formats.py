@@ -239,11 +239,31 @@ def test_what_gazebo_alone_acts_on_is_told() -> None:
 def test_tensors_that_no_body_has_are_told_or_refused() -> None:
     inertia = '<inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/>'
     assert inertia in ARM
-    five_fold = ARM.replace('izz="0.001"', 'izz="0.01"')
-    (note,) = parts_from_urdf(five_fold).notes
+    three_fold = ARM.replace('izz="0.001"', 'izz="0.006"')
+    (note,) = parts_from_urdf(three_fold).notes
     assert note.endswith("inertias that no body has, used as they are: 'arm' (line 1)")
-    with pytest.raises(MechanismError, match=r"moments of inertia are .*; none can be negative"):
-        parts_from_urdf(ARM.replace('ixy="0"', 'ixy="0.005"'))
+    for wrong in (
+        ARM.replace('izz="0.001"', 'izz="0.01"'),  # five times the sum of the others
+        ARM.replace('ixy="0"', 'ixy="0.005"'),
+        ARM.replace('ixy="0"', 'ixy="0.00105"'),  # -5e-5, 2 % of the largest
+        ARM.replace(inertia, '<inertia ixx="3" ixy="4" ixz="0" iyy="5" iyz="0" izz="9"/>'),
+    ):
+        with pytest.raises(MechanismError, match=r"line 1: link 'arm': its principal moments of"):
+            parts_from_urdf(wrong)
+
+
+@each(
+    "tensor",
+    [
+        '<inertia ixx="0" iyy="0" izz="0.02" ixy="0" ixz="0" iyz="0"/>',  # of a plane mechanism
+        '<inertia ixx="1e-7" iyy="1e-7" izz="1e-6" ixy="0" ixz="0" iyz="0"/>',  # a placeholder
+        '<inertia ixx="1e-8" iyy="1e-8" izz="1e-8" ixy="1e-6" ixz="0" iyz="0"/>',
+    ],
+)
+def test_tensors_that_real_files_have_are_told(tensor: str) -> None:
+    inertia = '<inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/>'
+    (note,) = parts_from_urdf(ARM.replace(inertia, tensor)).notes
+    assert note.endswith("inertias that no body has, used as they are: 'arm' (line 1)")
 
 
 @each("number", ["1_0", "٣", "1\u00a0", "0x1", "1e999", "1d3", "nan", ""])

@@ -20,6 +20,7 @@ from rps_pin.closed_loop.io.mjcf.source import MjcfSource
 from rps_pin.closed_loop.io.mjcf.tendons import Tendons
 from rps_pin.closed_loop.io.mjcf.tree import MjcfTree
 from rps_pin.closed_loop.io.parts import MechanismParts
+from rps_pin.closed_loop.io.unit_doubts import unit_doubts
 from rps_pin.errors import MechanismError
 
 #: Velocities that a file may have. Pinocchio's data of so many takes 4 GB, and grows as the cube.
@@ -83,6 +84,7 @@ def parts_from_mjcf(
         home,
         **effects,
         name=source.name,
+        notes=unit_doubts(tree.model),
         place_of=partial(_place_of, source, [closure.name for closure in equalities]),
     )
 

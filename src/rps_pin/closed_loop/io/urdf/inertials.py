@@ -13,9 +13,16 @@ from rps_pin.closed_loop.io.urdf.vocabulary import child, get
 _MIRRORED = {"iyx": "ixy", "izx": "ixz", "izy": "iyz"}
 #: Moments of inertia below this, negative, are rounding, kg m^2.
 _ROUNDING = 1e-12
-#: A tensor that no body has is told from this share of its largest moment on, and one with so
-#: negative a moment is refused. (In one file of nine, of real robots too, a tensor is wrong.)
-_TOLD, _INDEFINITE = 1e-2, 0.5
+#: A tensor that no body has is told from this share of its largest moment on. (In one file of
+#: twenty-five, of real robots too, a tensor is wrong.)
+_TOLD = 1e-2
+#: It is refused if its largest moment is more than so many times the sum of the others, which no
+#: body exceeds once, or a moment is negative by more than this share of the largest.
+_GROSS, _INDEFINITE = 4.0, 0.01
+#: Moments below this share of the largest are none.
+_ALONE = 1e-9
+#: Placeholders have smaller moments, kg m^2, and may be wrong by any factor: they are told.
+_PLACEHOLDER = 1e-5
 
 
 def read_inertials(file: UrdfFile) -> None:
@@ -81,15 +88,22 @@ def _tensor(file: UrdfFile, inertial: Any, name: str) -> tuple[float, ...]:
 
 
 def _check_moments(file: UrdfFile, element: Any, name: str, values: dict[str, float]) -> None:
-    """Tell or refuse a tensor that no body has."""
+    """Tell or refuse a tensor that no body has.
+
+    One of a single moment, the only one that counts in a plane mechanism, is told.
+    """
     xx, xy, xz, yy, yz, zz = values.values()
     moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    if moments[0] < -_INDEFINITE * moments[2] - _ROUNDING:
+    excess = moments[2] - moments[0] - moments[1]
+    alone = max(abs(moments[:2])) < _ALONE * moments[2]
+    gross = moments[2] > _GROSS * (moments[0] + moments[1]) and not alone
+    if moments[0] < -_INDEFINITE * moments[2] or gross:
         listed = ", ".join(f"{moment:.4g}" for moment in moments)
-        file.refuse(
-            element,
-            f"link {name!r}: its principal moments of inertia are {listed} kg m^2; none can be "
-            "negative",
-        )
-    if moments[2] - moments[0] - moments[1] > _TOLD * moments[2] + _ROUNDING:
+        rule = "none can be negative, or exceed the sum of the others"
+        if moments[2] >= _PLACEHOLDER or moments[0] <= -_PLACEHOLDER:
+            file.refuse(
+                element,
+                f"link {name!r}: its principal moments of inertia are {listed} kg m^2; {rule}",
+            )
+    if excess > _TOLD * moments[2] + _ROUNDING or moments[0] < -_ROUNDING:
         file.remark(element.getparent(), name, "inertias that no body has, used as they are")
