@@ -6,9 +6,11 @@ that: without `start`, a test's Ctrl-C would be lost on it there.
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -45,3 +47,21 @@ def run(
             process.kill()
             raise
     return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
+
+
+def lives(process: int) -> bool:
+    """Return whether a process runs: one that ended, and whose parent did not ask, does not."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{process}/stat")
+    return not status.exists() or status.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+def wait_for_end(processes: Sequence[int], timeout: float = 60.0) -> None:
+    """Wait until processes have ended that this one did not start."""
+    end = time.monotonic() + timeout
+    while living := [one for one in processes if lives(one)]:
+        assert time.monotonic() < end, f"still alive: {living}"
+        time.sleep(0.05)

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import os
+import signal
+import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
+from rps_pin import files
 from rps_pin.errors import InputError
 from rps_pin.files import opened, whole_file
 from tests.each import each
+from tests.processes import start
 
 
 def test_finished_file_stands_at_its_path_and_nothing_else_remains(tmp_path: Path) -> None:
@@ -108,3 +114,91 @@ def test_a_loop_of_links_is_told(tmp_path: Path) -> None:
     why = "cannot read the list .*loop: Too many levels"
     with pytest.raises(InputError, match=why), opened(loop, "list"):
         pytest.fail("it was opened")
+
+
+# Ended from outside -------------------------------------------------------------------------------
+
+WRITER = """
+import threading
+from rps_pin.files import whole_file
+
+with whole_file("a.txt") as scratch:
+    scratch.write_text("half")
+    print("under way", flush=True)
+    threading.Event().wait()
+"""
+
+
+def ended(number: signal.Signals, folder: Path) -> tuple[int, str]:
+    """Return exit status and errors of a process that a signal ended while it wrote a file."""
+    with start([sys.executable, "-c", WRITER], cwd=folder) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "under way\n"
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=60)
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_no_file(tmp_path: Path, number: signal.Signals) -> None:
+    assert ended(number, tmp_path) == (128 + number, "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path) -> None:
+    assert ended(signal.SIGKILL, tmp_path) == (-signal.SIGKILL, "")
+    assert len(list(tmp_path.iterdir())) == 1
+    with whole_file(tmp_path / "b.txt"):
+        pass
+    assert [one.name for one in tmp_path.iterdir()] == ["b.txt"]
+
+
+def test_what_others_write_or_keep_is_left_alone(tmp_path: Path) -> None:
+    old, young = time.time() - 1e6, time.time()
+    elsewhere = ".a.rps_pin-{}-1-01234567.txt".format("f" * 8)
+    one_of_theirs = f".a.rps_pin-{files._place()}-{os.getpid()}-01234567.txt"
+    kept = (".a.txt", ".a-kx3_9v2q.txt", one_of_theirs, one_of_theirs[1:])
+    for name in kept:
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (old, old))
+    (tmp_path / ".a.rps_pin-00000000-1-01234567").mkdir()
+    (tmp_path / elsewhere).touch()
+    os.utime(tmp_path / elsewhere, (young, young))
+    with whole_file(tmp_path / "b.txt"):
+        pass
+    assert len(list(tmp_path.iterdir())) == 7
+    os.utime(tmp_path / elsewhere, (old, old))  # its process cannot be asked for: a day is enough
+    with whole_file(tmp_path / "b.txt"):
+        pass
+    assert not (tmp_path / elsewhere).exists()
+    assert len(list(tmp_path.iterdir())) == 6
+
+
+def test_a_name_as_long_as_the_system_allows_can_be_written(tmp_path: Path) -> None:
+    target = tmp_path / ("a" * 251 + ".txt")
+    with whole_file(target) as scratch:
+        scratch.write_text("text")
+    assert target.read_text() == "text"
+
+
+def test_handlers_of_signals_stay_as_they_were(tmp_path: Path) -> None:
+    def mine(*_: object) -> None:
+        pass
+
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        for before in (signal.SIG_DFL, signal.SIG_IGN, mine):
+            own = signal.signal(number, before)
+            try:
+                with whole_file(tmp_path / "a.txt"):
+                    assert (signal.getsignal(number) == before) is (before != signal.SIG_DFL)
+                assert signal.getsignal(number) == before
+            finally:
+                signal.signal(number, own)
+
+
+def test_a_file_is_written_in_a_thread(tmp_path: Path) -> None:
+    """Signals are the main thread's."""
+    thread = threading.Thread(target=files.write_text, args=(tmp_path / "a.txt", "text"))
+    thread.start()
+    thread.join()
+    assert (tmp_path / "a.txt").read_text() == "text"

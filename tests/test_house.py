@@ -83,7 +83,17 @@ def test_the_changelog_keeps_its_form() -> None:
 #: A package may import those of its own layer and of those before it. `paper` only the command line
 #: imports; `reproduction` is its old name.
 LAYERS = [
-    {"errors", "validation", "arrays", "contents", "files", "config", "moved", "plain_text"},
+    {
+        "errors",
+        "validation",
+        "arrays",
+        "contents",
+        "files",
+        "interruption",
+        "config",
+        "moved",
+        "plain_text",
+    },
     {"numerics"},
     {"closed_loop"},
     {"codegen"},

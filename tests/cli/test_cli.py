@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import signal
+import sys
 import time
 import urllib.request
 from pathlib import Path
@@ -211,6 +212,7 @@ def test_a_robot_without_a_middle_is_told_to_give_a_height() -> None:
     ],
 )
 def test_view_serves_this_machine_until_ctrl_c(arguments: list[str], in_page: str) -> None:
+    number = signal.SIGINT if arguments else signal.SIGTERM
     process = start([*RPS_PIN, "view", *arguments])
     try:
         assert process.stdout is not None
@@ -220,13 +222,45 @@ def test_view_serves_this_machine_until_ctrl_c(arguments: list[str], in_page: st
         with urllib.request.urlopen(address, timeout=60) as page:
             assert in_page in page.read().decode().lower()
         time.sleep(0.3)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         output, errors = process.communicate(timeout=60)
     finally:
         process.kill()
     assert process.returncode == 0
     assert "ended" in output
     assert errors == ""
+
+
+SLOW_WRITER = """
+import sys, threading
+from pathlib import Path
+
+def slowly(*given):
+    write(*given)
+    print("under way", flush=True)
+    threading.Event().wait()
+
+write, Path.write_text = Path.write_text, slowly
+sys.argv[0] = "rps-pin"
+from rps_pin.cli import main; main()
+"""
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_a_command_that_a_signal_ends_leaves_no_half_result(
+    tmp_path: Path, number: signal.Signals, status: int
+) -> None:
+    """The command is slowed down where it writes: a file is under way when the signal comes."""
+    command = [sys.executable, "-c", SLOW_WRITER, "urdf", "-o", "robot.urdf"]
+    process = start(command, cwd=tmp_path)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "under way\n"
+    assert len(list(tmp_path.iterdir())) == 1
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == status
+    assert "Traceback" not in errors
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_ik_prints_lengths_and_refuses_what_is_out_of_reach() -> None:

@@ -17,6 +17,7 @@ from rps_pin import __version__
 from rps_pin.cli.doctor import doctor
 from rps_pin.cli.lazy_group import SETTINGS, LazyGroup
 from rps_pin.errors import AccuracyWarning, RPSPinError
+from rps_pin.interruption import signals_as_ctrl_c
 
 app = typer.Typer(name="rps-pin", cls=LazyGroup, no_args_is_help=True, **SETTINGS)
 
@@ -95,7 +96,8 @@ def run() -> None:
     """Run the command line."""
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
     try:
-        app(prog_name="rps-pin")
+        with signals_as_ctrl_c():
+            app(prog_name="rps-pin")
         return
     except BrokenPipeError:  # the reader of the output ended: no message
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -32,7 +32,7 @@ from rps_pin.rps.workspace import (
     workspace,
     workspace_to_file,
 )
-from tests.processes import start
+from tests.processes import lives, start, wait_for_end
 
 
 @pytest.fixture(scope="module")
@@ -225,6 +225,53 @@ def test_ctrl_c_in_a_real_process_leaves_no_file(tmp_path: Path) -> None:
     assert process.returncode != 0
     assert "KeyboardInterrupt" in errors
     assert list(tmp_path.iterdir()) == []
+
+
+WITH_WORKERS = """
+    from rps_pin import RPSParameters
+    from rps_pin.rps.workspace import leg_grid, scale, workspace_to_file
+
+    class Pool(scale.ProcessPoolExecutor):
+        def __init__(self, *given, **named):
+            super().__init__(*given, **named)
+            pools.append(self)
+
+    def progress(blocks):
+        for i in blocks:
+            if i == 3:
+                print(*pools[0]._processes, flush=True)
+            yield i
+
+    pools, scale.ProcessPoolExecutor = [], Pool
+    micro = RPSParameters.from_preset("micro")
+    workspace_to_file(micro, "space.h5", leg_grid(micro, 400), workers=2, progress=progress)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_process_that_is_ended_takes_its_workers_with_it(
+    space: Workspace, tmp_path: Path, number: signal.Signals
+) -> None:
+    with start([sys.executable, "-c", textwrap.dedent(WITH_WORKERS)], cwd=tmp_path) as process:
+        try:
+            assert process.stdout is not None
+            workers = [int(word) for word in process.stdout.readline().split()]
+            assert len(workers) == 2
+            assert all(lives(one) for one in workers)
+            process.send_signal(number)
+            _, errors = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    wait_for_end(workers)
+    if number == signal.SIGKILL:  # nobody could clear up: the next one who writes there does
+        (left,) = tmp_path.iterdir()
+        assert left.name.startswith(".space.rps_pin-")
+        save_workspace(space, tmp_path / "other.h5")
+        assert [entry.name for entry in tmp_path.iterdir()] == ["other.h5"]
+    else:
+        assert process.returncode == 128 + number, errors
+        assert errors == ""
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_a_failing_write_is_clear_and_loses_nothing(

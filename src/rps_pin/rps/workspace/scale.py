@@ -5,10 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-import signal
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -17,6 +17,7 @@ import numpy as np
 from loky import ProcessPoolExecutor, cpu_count
 from numpy.typing import ArrayLike
 
+from rps_pin.interruption import end_with_parent
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import BLOCK, GridJob, Progress
 from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, Fields
@@ -68,8 +69,10 @@ def workspace_to_file(
 ) -> WorkspaceCounts:
     """Compute a workspace block by block on several cores and write it to an HDF5 file.
 
-    Memory does not depend on the grid's size: a few blocks for each worker. Any interruption,
-    Ctrl-C included, leaves no file, and what stood at `path` before untouched.
+    Memory does not depend on the grid's size: a few blocks for each worker. Any interruption
+    (Ctrl-C, SIGTERM and SIGHUP included) leaves no file, and what stood at `path` before untouched.
+    If the process is killed its workers end too, and the next file that is written to the folder
+    clears away what it left (see `rps_pin.files.whole_file`).
 
     Parameters
     ----------
@@ -112,9 +115,10 @@ def workspace_to_file(
         tally = np.zeros(1 << len(Reason), dtype=np.int64)
         blocks = job.grid.blocks(BLOCK)
         cast = partial(_cast_block, job, names, dtype)
-        for block, values in _computed(job, blocks, cast, count, progress):
-            file.write(block, values)
-            tally += np.bincount(values.reason.ravel(), minlength=len(tally))
+        with closing(_computed(job, blocks, cast, count, progress)) as computed:
+            for block, values in computed:
+                file.write(block, values)
+                tally += np.bincount(values.reason.ravel(), minlength=len(tally))
     codes = np.arange(len(tally))
     counts = {reason: int(tally[(codes & int(reason)) != 0].sum()) for reason in Reason}
     inside = int(tally[0])
@@ -127,13 +131,15 @@ def _computed(
     cast: Callable[[Block], Fields],
     workers: int,
     progress: Progress,
-) -> Iterable[tuple[Block, Fields]]:
+) -> Generator[tuple[Block, Fields], None, None]:
     """Compute blocks, in processes if there are several workers, and give them back in order."""
     if workers == 1:
         for i in progress(range(len(blocks))):
             yield blocks[i], job.compute(blocks[i])
         return
-    pool = ProcessPoolExecutor(workers, initializer=_ignore_interrupts, env=_ONE_THREAD)
+    pool = ProcessPoolExecutor(
+        workers, initializer=end_with_parent, initargs=(os.getpid(),), env=_ONE_THREAD
+    )
     pending: deque[Future[Fields]] = deque()
     try:
         ahead = iter(blocks)
@@ -155,8 +161,3 @@ def _cast_block(job: GridJob, names: Sequence[str], dtype: DType, block: Block) 
         for name, value in fields._asdict().items()
     }
     return Fields(**kept | {"reason": fields.reason})
-
-
-def _ignore_interrupts() -> None:
-    """Leave Ctrl-C to the process that waits for the workers: it ends them."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -78,7 +78,7 @@ def new_workspace_file(
 ) -> Iterator[WorkspaceFile]:
     """Give a file to write a workspace's blocks to; it appears at `path` when the block ends well.
 
-    Any exception, Ctrl-C included, leaves no file, and what stood at `path` before untouched.
+    Any interruption, as of `whole_file`, leaves no file, and what stood at `path` before untouched.
 
     Raises
     ------
