@@ -25,7 +25,7 @@ from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mechanism_schema import Description
 from rps_pin.closed_loop.io.write.numbers import number
 from tests.closed_loop.mechanisms import ALL
-from tests.closed_loop.random_mechanisms import case, random_tree
+from tests.closed_loop.random_mechanisms import case, random_inertia, random_tree
 from tests.worst import worst
 
 Array = NDArray[np.float64]
@@ -141,7 +141,7 @@ def test_random_mechanisms_come_back(seed: int, tmp_path: Path) -> None:
 def alone(joint: object, name: str = "joint") -> pin.Model:
     model = pin.Model()
     model.addJoint(0, joint, pin.SE3.Random(), name)
-    model.appendBodyToJoint(1, pin.Inertia.Random(), pin.SE3.Identity())
+    model.appendBodyToJoint(1, random_inertia(np.random.default_rng(2)), pin.SE3.Identity())
     return model
 
 
@@ -174,7 +174,9 @@ def test_one_coordinate_that_is_driven_comes_back(tmp_path: Path) -> None:
     )
     for index, kind in enumerate(kinds, 1):
         model.addJoint(index, kind, pin.SE3.Random(), "buc"[index - 1])
-        model.appendBodyToJoint(index + 1, pin.Inertia.Random(), pin.SE3.Identity())
+        model.appendBodyToJoint(
+            index + 1, random_inertia(np.random.default_rng(2)), pin.SE3.Identity()
+        )
     mechanism = ClosedLoopModel(model, [], ["joint.2", "b.z", "u.0", "c.y"])
     back = ClosedLoopModel.load(mechanism.to_urdf(tmp_path / "m.urdf"))
     assert back.actuated == ("joint.y", "b.z", "u.0", "c:2")
@@ -250,13 +252,23 @@ def test_another_suffix_is_refused(tmp_path: Path) -> None:
         mechanism.to_urdf(tmp_path / "m.yaml")
 
 
+def test_an_inertia_that_would_not_be_read_is_not_written(tmp_path: Path) -> None:
+    model = alone(pin.JointModelRX())
+    model.inertias[1] = pin.Inertia(1.0, np.zeros(3), np.diag([1.0, 1.0, 10.0]))
+    with pytest.raises(MechanismError, match="link 'joint_link' cannot be written: its principal"):
+        ClosedLoopModel(model, [], ["joint"]).to_urdf(tmp_path / "m.urdf")
+    assert not list(tmp_path.iterdir())
+
+
 def test_names_that_yaml_or_xml_could_misread_come_back(tmp_path: Path) -> None:
     names = ["yes", "1e5", 'a "b": {c}', "<d> & 'e'", "null"]
     model = pin.Model()
     model.name = "no"
     for index, name in enumerate(names):
         model.addJoint(index, pin.JointModelRX(), pin.SE3.Random(), name)
-        model.appendBodyToJoint(index + 1, pin.Inertia.Random(), pin.SE3.Identity())
+        model.appendBodyToJoint(
+            index + 1, random_inertia(np.random.default_rng(2)), pin.SE3.Identity()
+        )
     mechanism = ClosedLoopModel(model, [], names, name="no")
     back = ClosedLoopModel.load(mechanism.to_urdf(tmp_path / "m.urdf"))
     assert list(back.model.names)[1:] == names

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop.io.urdf.elements import INERTIAS, Inertial, UrdfFile
 from rps_pin.closed_loop.io.urdf.vocabulary import child, get
 
@@ -88,22 +89,34 @@ def _tensor(file: UrdfFile, inertial: Any, name: str) -> tuple[float, ...]:
 
 
 def _check_moments(file: UrdfFile, element: Any, name: str, values: dict[str, float]) -> None:
-    """Tell or refuse a tensor that no body has.
-
-    One of a single moment, the only one that counts in a plane mechanism, is told.
-    """
+    """Tell or refuse a tensor that no body has."""
     xx, xy, xz, yy, yz, zz = values.values()
     moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    if why := gross_fault(moments):
+        file.refuse(element, f"link {name!r}: {why}")
     excess = moments[2] - moments[0] - moments[1]
-    alone = max(abs(moments[:2])) < _ALONE * moments[2]
-    gross = moments[2] > _GROSS * (moments[0] + moments[1]) and not alone
-    if moments[0] < -_INDEFINITE * moments[2] or gross:
-        listed = ", ".join(f"{moment:.4g}" for moment in moments)
-        rule = "none can be negative, or exceed the sum of the others"
-        if moments[2] >= _PLACEHOLDER or moments[0] <= -_PLACEHOLDER:
-            file.refuse(
-                element,
-                f"link {name!r}: its principal moments of inertia are {listed} kg m^2; {rule}",
-            )
     if excess > _TOLD * moments[2] + _ROUNDING or moments[0] < -_ROUNDING:
         file.remark(element.getparent(), name, "inertias that no body has, used as they are")
+
+
+def gross_fault(moments: Array) -> str:
+    """Return why principal moments are far from any body's; or nothing.
+
+    A single moment passes, the only one that counts in a plane mechanism.
+
+    Parameters
+    ----------
+    moments
+        In rising order, shape (3,), kg m^2.
+    """
+    least, middle, largest = moments
+    negative = least < -_INDEFINITE * largest
+    alone = max(abs(least), abs(middle)) < _ALONE * largest
+    wide = largest > _GROSS * (least + middle) and not alone
+    if not (negative or wide) or max(largest, -least) < _PLACEHOLDER:
+        return ""
+    listed = ", ".join(f"{moment:.4g}" for moment in moments)
+    return (
+        f"its principal moments of inertia are {listed} kg m^2; none can be negative, or exceed "
+        "the sum of the others"
+    )

@@ -21,6 +21,7 @@ import numpy as np
 import pinocchio as pin
 from lxml import etree
 
+from rps_pin.closed_loop.io.urdf.inertials import gross_fault
 from rps_pin.closed_loop.io.write.links import Hung, Links
 from rps_pin.closed_loop.io.write.numbers import number, numbers
 from rps_pin.closed_loop.io.write.shapes import add_visuals
@@ -110,6 +111,8 @@ class _Urdf:
             etree.SubElement(inertial, "origin", xyz=numbers(body.lever), rpy="0 0 0")
             etree.SubElement(inertial, "mass", value=number(body.mass))
             tensor = body.inertia
+            if why := gross_fault(np.linalg.eigvalsh(tensor)):
+                raise MechanismError(f"link {self._links.moved[joint]!r} cannot be written: {why}")
             etree.SubElement(
                 inertial,
                 "inertia",
