@@ -18,6 +18,7 @@ EXAMPLES = [
     errors.UnreachableError("text", [LimitViolation(2, "length", 0.261, 0.2, 0.25, "m")]),
     errors.ClosureError("text", 0.5),
     errors.SingularityError("text", 1e9, 1e8),
+    errors.ThreadError("text"),
     errors.CompileError("text", "gcc version 12.2.0", "x.c:1: error: text"),
     errors.InfeasibleError("text", [LimitExcess("crank", 3.5, 2.0, "N m")]),
 ]

@@ -93,6 +93,7 @@ LAYERS = [
         "config",
         "moved",
         "plain_text",
+        "one_thread",
     },
     {"numerics"},
     {"closed_loop"},

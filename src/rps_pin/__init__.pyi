@@ -29,6 +29,7 @@ from .errors import (
     ParameterError,
     RPSPinError,
     SingularityError,
+    ThreadError,
     UnreachableError,
 )
 from .rps import RPSParameters, RPSRobot
@@ -54,6 +55,7 @@ __all__ = [
     "RPSPinError",
     "RPSRobot",
     "SingularityError",
+    "ThreadError",
     "UnreachableError",
     "__version__",
     "closed_loop",

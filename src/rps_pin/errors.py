@@ -209,6 +209,10 @@ class InfeasibleError(RPSPinError, ArithmeticError):
         super().__init__(message)
 
 
+class ThreadError(RPSPinError, RuntimeError):
+    """A second thread called an object while a call of another thread was running."""
+
+
 class CompileError(RPSPinError, RuntimeError):
     """Code could not be compiled: there is no compiler, or it fails, is killed or takes too long.
 

@@ -54,6 +54,7 @@ from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.closed_loop.summary import in_lines, in_one_line
 from rps_pin.errors import ClosureError, CompileError, MechanismError
+from rps_pin.one_thread import one_thread, refuse_second_thread
 from rps_pin.validation import choice, non_negative_number, real_vector
 
 _REFERENCES = {
@@ -62,11 +63,13 @@ _REFERENCES = {
 }
 
 
+@one_thread("system.guard", besides=("inverse_dynamics",), properties=("home",))
 class ClosedLoopModel:
     """Any mechanism: an open tree whose loops are closed by Pinocchio constraint models.
 
     Build once, call often: the scratch memory is allocated here. For that reason one object serves
-    one thread; `model` itself is never written to and may be shared.
+    one thread at a time: a call while another thread's runs is refused with a `ThreadError`.
+    `model` itself is never written to and may be shared.
 
     Dynamics takes closed configurations, as `close`, `project`, `complete` and `simulate` return
     them: one with a gap above 1e-4 characteristic lengths is refused with a `ClosureError`.
@@ -971,7 +974,13 @@ class ClosedLoopModel:
         SingularityError
             If the configuration is singular (condition number above `max_condition`).
         """
-        return inverse_dynamics(self.system, q, v, a, wrenches)
+        guard = self.system.guard
+        if not guard.acquire(False):
+            refuse_second_thread(self)
+        try:
+            return inverse_dynamics(self.system, q, v, a, wrenches)
+        finally:
+            guard.release()
 
     def generalised_force(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, wrenches: Wrenches | None = None
@@ -1039,7 +1048,7 @@ class ClosedLoopModel:
             warnings.warn(
                 "method='proximal' is deprecated and computed as 'reduced'; leave method out",
                 DeprecationWarning,
-                stacklevel=2,
+                stacklevel=3,
             )
         q_, v_ = self._configuration(q), self._velocity(v)
         return forward_dynamics(self.system, q_, v_, self._forces(tau), wrenches)

@@ -32,6 +32,7 @@ from rps_pin.closed_loop.dynamics.springs import Springs
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.errors import ClosureError, InputError, MechanismError
 from rps_pin.numerics.linear_algebra import Decomposition, refuse_condition
+from rps_pin.one_thread import Guard
 from rps_pin.validation import real_vector
 
 #: Beyond this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
@@ -66,6 +67,8 @@ class ConstraintSystem:
         None where no joint has one.
     limits : JointLimits
     max_condition : float
+    guard : lock
+        Held by public calls while they use the scratch memory; see `one_thread`.
     """
 
     def __init__(
@@ -116,6 +119,7 @@ class ConstraintSystem:
             self.springs = Springs(model, effects)
         self.limits = JointLimits(model)
         self._frame_ids: dict[str, int] = {}
+        self.guard = Guard()
 
     # Rule of rank ---------------------------------------------------------------------------------
 

@@ -36,6 +36,7 @@ from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.errors import InfeasibleError, InputError, LimitExcess
 from rps_pin.numerics.linear_algebra import Decomposition
 from rps_pin.numerics.quadratic_program import LeastDistance, NearestPoint, least_violation
+from rps_pin.one_thread import one_thread
 from rps_pin.validation import numbers, real_vector
 
 TorqueLimits = Literal["model"] | float | ArrayLike | tuple[ArrayLike, ArrayLike] | None
@@ -63,6 +64,7 @@ class DistributedForces(NamedTuple):
     """Of ProxQP; 0 where it was not needed."""
 
 
+@one_thread("mechanism.system.guard")
 class ForceDistribution:
     """Finds the forces of least effort within limits, at one state after another.
 

@@ -9,9 +9,11 @@ from rps_pin.closed_loop.constraints.system import Mechanism
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.fixed_step import fixed_step
 from rps_pin.closed_loop.simulation.motion import Drive, Motion, WrenchesInTime, closed_start
+from rps_pin.one_thread import one_thread
 from rps_pin.validation import positive_number, real_vector, whole_number
 
 
+@one_thread("_guard")
 class Stepper:
     """Simulation with fixed steps and projection, as `simulate` does it, one call at a time.
 
@@ -50,6 +52,7 @@ class Stepper:
         wrenches: Wrenches | WrenchesInTime | None = None,
     ) -> None:
         system = mechanism.system
+        self._guard = system.guard
         self._drive = Drive(system, None, None, wrenches)
         self.q, self.v = closed_start(system, q, v)
         self._motion = Motion(system, (self.q, self.v), self._drive, 0.0)

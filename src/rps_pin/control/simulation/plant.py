@@ -19,6 +19,7 @@ from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.motion import WrenchesInTime
 from rps_pin.control.simulation.encoders import Encoders
 from rps_pin.errors import InputError
+from rps_pin.one_thread import one_thread
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number, real_vector, whole_number
 
@@ -27,6 +28,7 @@ _LENGTHS = [1, 3, 5]
 _EXACT = Encoders()
 
 
+@one_thread("robot.mechanism.system.guard")
 class Plant:
     """A 3-RPS under control.
 
