@@ -11,11 +11,13 @@ def main() -> None:
         from rps_pin.cli.app import run
 
         run()
-    except ImportError:
+    except ImportError as error:
         from rps_pin.cli.doctor import doctor
 
-        if doctor() == 0:
-            raise  # a mistake of ours, not of the installation
+        if doctor() == 0:  # a mistake of ours, not of the installation
+            from rps_pin.cli.printing import tell_fault
+
+            raise SystemExit(tell_fault(error)) from None
         raise SystemExit(1) from None
 
 

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 from rps_pin import __version__
 from rps_pin.cli.doctor import doctor
 from rps_pin.cli.lazy_group import SETTINGS, LazyGroup
+from rps_pin.cli.printing import say, tell_error, tell_fault
 from rps_pin.errors import AccuracyWarning, RPSPinError
 from rps_pin.interruption import signals_as_ctrl_c
+from rps_pin.plain_text import plain
 
 app = typer.Typer(name="rps-pin", cls=LazyGroup, no_args_is_help=True, **SETTINGS)
 
@@ -81,20 +82,23 @@ def rps_pin(
     """Closed-loop robots on Pinocchio: the 3-RPS, and any other mechanism.
 
     Units are SI: m, rad, s, kg, N. Begin with **rps-pin helix** and **rps-pin view**.
+
+    Exit status: 0; 1 an error; 2 wrong usage; 70 a fault of rps-pin itself: please report it.
     """
 
 
 def _show_warning(others: Callable[..., None], warning: object, kind: object, *rest: Any) -> None:
     """Show a warning about a file's numbers as a note, others as they are."""
     if isinstance(warning, AccuracyWarning):
-        typer.echo(f"note: {warning}", err=True)
+        say(f"note: {warning}", err=True)
     else:
-        others(warning, kind, *rest)
+        others(plain(warning), kind, *rest)
 
 
 def run() -> None:
-    """Run the command line."""
+    """Run the command line; an error is one line and the exit status 1, a fault 70."""
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
+    threading.excepthook = _tell_fault_of_thread
     try:
         with signals_as_ctrl_c():
             app(prog_name="rps-pin")
@@ -107,6 +111,16 @@ def run() -> None:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         message = f"{where}{error.strerror or error}"
-    line = escape(" ".join(message.split()))
-    Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {line}", highlight=False)
+    except MemoryError as error:
+        message = f"not enough memory: {error}".removesuffix(": ")
+    except ImportError:
+        raise  # `rps_pin.cli.main` says what is missing
+    except Exception as error:
+        sys.exit(tell_fault(error))
+    tell_error(message)
     sys.exit(1)
+
+
+def _tell_fault_of_thread(ended: threading.ExceptHookArgs) -> None:
+    if ended.exc_value is not None and ended.exc_type is not SystemExit:
+        tell_fault(ended.exc_value)

@@ -46,7 +46,7 @@ def check_command(
     if as_json:
         common.print_json(_plain(found) | {"robot": machine.parameters.name, "ok": found.ok})
     else:
-        common.text_console(soft_wrap=True).print(str(found), markup=False)
+        common.text_console(soft_wrap=True).print(str(found))
     raise typer.Exit(not found.ok)
 
 

@@ -16,6 +16,7 @@ from rich.progress import Progress, track
 from rich.table import Table
 
 from rps_pin.cli.completion import names_or_files, preset_names
+from rps_pin.cli.printing import PlainConsole, say
 from rps_pin.rps import robot_file
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.unit_doubts import LARGEST, unit_doubts
@@ -57,7 +58,7 @@ def load_robot(name_or_file: str) -> RPSRobot:
     """Return the robot of a preset's name or of a parameter file; print doubts about its units."""
     robot = robot_file.load_robot(name_or_file)
     for doubt in unit_doubts(robot.parameters):
-        typer.echo(f"note: {name_or_file}: {doubt}. Units are SI: m, kg, kg m^2", err=True)
+        say(f"note: {name_or_file}: {doubt}. Units are SI: m, kg, kg m^2", err=True)
     return robot
 
 
@@ -69,7 +70,7 @@ def doubt_pose(name: str, pose: Three) -> None:
         given, radians = (
             " ".join(f"{value:g}" for value in values) for values in (tilts, np.radians(tilts))
         )
-        typer.echo(
+        say(
             f"note: {name}: a tilt of {given} rad is more than half a turn. Tilts are in radians; "
             f"{given} degrees would be {radians}",
             err=True,
@@ -82,7 +83,7 @@ def doubt_lengths(name: str, what: str, values: Sequence[float]) -> None:
         given, metres = (
             " ".join(f"{scale * value:g}" for value in values) for scale in (1.0, 1e-3)
         )
-        typer.echo(
+        say(
             f"note: {name}: {what} of {given} m? Lengths are in metres; {given} mm would be "
             f"{metres}",
             err=True,
@@ -93,7 +94,7 @@ def tell_size(name: str, rows: float, columns: int) -> None:
     """Print a note on a table that will be larger than `LARGE`, before it is computed."""
     size = BYTES * rows * columns
     if LARGE < size < math.inf:  # an infinite duration is refused elsewhere
-        typer.echo(
+        say(
             f"note: {name} will have {rows:.3g} rows of {columns} columns, about "
             f"{1e-6 * size:.3g} MB. Ctrl-C stops it",
             err=True,
@@ -107,7 +108,7 @@ def print_json(answer: dict[str, Any]) -> None:
 
 def text_console(as_json: bool = False, **options: Any) -> Console:
     """Return a console for text without highlighting; it prints nothing where JSON is printed."""
-    return Console(quiet=as_json, highlight=False, **options)
+    return PlainConsole(quiet=as_json, **options)
 
 
 def table_of(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from rps_pin.cli import console as common
 from rps_pin.cli.layer_options import write_page
@@ -81,11 +82,14 @@ def control_command(
     if as_json:
         common.print_json({"scenario": scenario} | summary.as_dict() | {"files": files})
     else:
-        console.print(f"3-RPS [bold]{name}[/], {scenario}, from {window:g} s on")
+        console.print(
+            f"3-RPS [bold]{escape(name)}[/], {escape(str(scenario))}, from {window:g} s on",
+            markup=True,
+        )
         console.print(summary.table())
         for event in run.events[:_MOST_SHOWN]:
             words = f"{event.time:.6g} s, {status_name(event.status)}: {event.text}"
-            console.print(words, markup=False)
+            console.print(words)
         if len(run.events) > _MOST_SHOWN:
             console.print(f"... and {len(run.events) - _MOST_SHOWN} further changes of the status")
         common.print_files(console, files)

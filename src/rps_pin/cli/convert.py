@@ -18,6 +18,7 @@ from rps_pin.cli.mechanism_options import (
     print_notes,
     shapes_of,
 )
+from rps_pin.cli.printing import say
 from rps_pin.errors import InputError
 
 
@@ -95,5 +96,5 @@ def convert_command(
                 mend_inertia=mend_inertia,
                 overwrite=True,
             )
-    typer.echo(f"wrote {' and '.join(map(str, targets))}")
+    say(f"wrote {' and '.join(map(str, targets))}")
     print_notes([*mechanism.notes, *notes, *(str(one.message) for one in told)])

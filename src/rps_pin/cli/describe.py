@@ -13,6 +13,7 @@ from rps_pin.cli.mechanism_options import (
     IgnoreLimitsOption,
     load_mechanism,
 )
+from rps_pin.cli.printing import say
 
 
 def describe_command(
@@ -35,4 +36,4 @@ def describe_command(
     if as_json:
         typer.echo(json.dumps(description.as_dict(), indent=2, allow_nan=False))
     else:
-        typer.echo(str(description))
+        say(str(description))

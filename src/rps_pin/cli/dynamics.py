@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from rps_pin.cli import console as common
 from rps_pin.cli.motion_report import print_motion, write_motion
@@ -123,5 +124,5 @@ def dynamics_command(
         answer |= dict(zip(("starts", "ends"), end_states(path), strict=True))
         common.print_json(answer | summary.as_dict() | {"sizing": sheet.as_dict(), "files": files})
         return
-    console.print(f"3-RPS [bold]{name}[/], {trajectory}")
+    console.print(f"3-RPS [bold]{escape(name)}[/], {escape(str(trajectory))}", markup=True)
     print_motion(console, sheet.table(), summary, path, files)

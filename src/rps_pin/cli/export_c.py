@@ -11,6 +11,7 @@ import typer
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.completion import names_or_files, preset_names
+from rps_pin.cli.printing import say
 from rps_pin.errors import RPSPinError
 
 
@@ -155,10 +156,9 @@ def export_c_command(
     console.print(
         f"{title}: {len(package.functions)} functions in C99, {precision} precision, "
         f"each with {len(package.functions[0].cases)} states in its self-test",
-        markup=False,
     )
     common.print_files(console, files)
-    typer.echo(
+    say(
         f"Test: cmake -S {output} -B {output}/build && cmake --build {output}/build && "
         f"ctest --test-dir {output}/build"
     )

@@ -8,6 +8,7 @@ import numpy as np
 import typer
 
 from rps_pin.cli import console as common
+from rps_pin.cli.printing import say
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
 
 _HEADERS = ("", "z (m)", "tilt_x (rad)", "tilt_y (rad)", "leg angles (degrees)", "mirror")
@@ -45,7 +46,7 @@ def fk_command(
     common.doubt_lengths("--lengths", "leg lengths", lengths)
     low, high = machine.parameters.leg_length_limits
     if not all(low <= length <= high for length in lengths):
-        typer.echo(f"note: the legs' limits are {low:g} to {high:g} m", err=True)
+        say(f"note: the legs' limits are {low:g} to {high:g} m", err=True)
     answer: dict[str, Any] = {"robot": machine.parameters.name, "length": lengths}
     if near is None:
         modes = machine.assembly_modes(lengths)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rich.markup import escape
+
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
 from rps_pin.cli.motion_report import actuator_table, print_motion, write_motion
@@ -60,7 +62,8 @@ def helix_command(
         common.print_json(answer | summary.as_dict() | {"files": files})
         return
     console.print(
-        f"3-RPS [bold]{name}[/], helix of radius {1e3 * path.radius:g} mm, "
-        f"pitch {1e3 * path.pitch:g} mm, from {path.height:g} m"
+        f"3-RPS [bold]{escape(name)}[/], helix of radius {1e3 * path.radius:g} mm, "
+        f"pitch {1e3 * path.pitch:g} mm, from {path.height:g} m",
+        markup=True,
     )
     print_motion(console, actuator_table(summary.actuators), summary, path, files)

@@ -11,6 +11,7 @@ import pinocchio as pin
 import typer
 
 from rps_pin.cli.completion import MECHANISMS, mechanism_names, names_or_files
+from rps_pin.cli.printing import say
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.io.gepetto import FILE
 from rps_pin.errors import InputError
@@ -127,7 +128,7 @@ def shapes_of(
 def print_notes(notes: Iterable[str]) -> None:
     """Print notes to standard error."""
     for note in notes:
-        typer.echo(f"note: {note}", err=True)
+        say(f"note: {note}", err=True)
 
 
 def by_joint(pairs: Sequence[str], option: str) -> dict[str, float]:

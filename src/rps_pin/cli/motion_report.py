@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from rps_pin.cli.console import print_files, table_of
@@ -74,5 +75,5 @@ def print_motion(
     console.print(table)
     console.print(table_of(rows.items()))
     for sentence in summary.exceeded:
-        console.print(f"[bold yellow]beyond a limit:[/] {sentence}")
+        console.print(f"[bold yellow]beyond a limit:[/] {escape(sentence)}", markup=True)
     print_files(console, files)

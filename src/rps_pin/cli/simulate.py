@@ -13,6 +13,7 @@ from rps_pin.arrays import Array
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.layer_options import LayersOption, write_page
+from rps_pin.cli.printing import say
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.column_names import joint_coordinates
 from rps_pin.closed_loop.dynamics.not_held import NotHeld, not_held
@@ -108,7 +109,7 @@ def simulate_command(
         needed = mechanism.generalised_force(q, still, still)
         unheld = not_held(mechanism.system, holding.unproduced, needed)
     if unheld:
-        typer.echo(f"note: --hold: {_phrase(unheld)}", err=True)
+        say(f"note: --hold: {_phrase(unheld)}", err=True)
     console = common.text_console(as_json, soft_wrap=True)
     times: dict[str, Any] = {"duration": duration, "step": step, "method": method.value}
     if step > 0:
@@ -153,7 +154,7 @@ def simulate_command(
     if len(motion.limits_passed) > _MOST_NOTES:
         console.print(f"note: so did {len(motion.limits_passed) - _MOST_NOTES} more joints later")
     for note in notes:
-        console.print(f"note: {note}", markup=False)
+        console.print(f"note: {note}")
     common.print_files(console, files)
 
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from rps_pin.cli.console import RobotOption, load_robot
+from rps_pin.cli.printing import say
 from rps_pin.files import write_text
 
 
@@ -29,4 +30,4 @@ def urdf_command(
         typer.echo(text, nl=False)
         return
     write_text(output, text)
-    typer.echo(f"wrote {output}")
+    say(f"wrote {output}")

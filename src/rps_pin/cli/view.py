@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
@@ -22,6 +21,7 @@ from rps_pin.cli.mechanism_options import (
     print_notes,
     shapes_of,
 )
+from rps_pin.cli.printing import PlainConsole, say
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 
@@ -107,24 +107,24 @@ def view_command(
         motion = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     if html is not None:
         save_html(html, machine, motion, **chosen)
-        typer.echo(f"wrote {html}")
+        say(f"wrote {html}")
     picture: dict[str, Any] = {"size": sides, "background": background}
     picture["layers"] = chosen["layers"]
     if png is not None:
         save_png(png, machine, motion, time=time, **picture)
-        typer.echo(f"wrote {png}")
+        say(f"wrote {png}")
     if video is not None:
-        progress = common.progress_bar(Console(stderr=True), "drawing")
+        progress = common.progress_bar(PlainConsole(stderr=True), "drawing")
         save_video(video, machine, motion, progress=progress, **picture)
-        typer.echo(f"wrote {video}")
+        say(f"wrote {video}")
     if html or png or video:
         return
     try:
         with show(machine, motion, port=port, **chosen) as view:
-            typer.echo(f"Open {view.url} in a browser on this machine. Ctrl-C ends.")
+            say(f"Open {view.url} in a browser on this machine. Ctrl-C ends.")
             view.play()
     except KeyboardInterrupt:
-        typer.echo("\nended")
+        say("\nended")
 
 
 def _interact(
@@ -149,7 +149,7 @@ def _interact(
         panel, title = MechanismPanel(mechanism, visual=shapes), mechanism.name
     chosen = chosen_layers(layers or "none", panel.mechanism)
     with BrowserPanel(panel, port=port, title=title, **chosen) as page:
-        typer.echo(f"Open {page.url} in a browser on this machine. Ctrl-C ends.")
+        say(f"Open {page.url} in a browser on this machine. Ctrl-C ends.")
         with contextlib.suppress(KeyboardInterrupt):
             threading.Event().wait()
-    typer.echo("\nended")
+    say("\nended")

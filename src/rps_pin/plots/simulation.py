@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import Simulation
+from rps_pin.plain_text import for_figure
 from rps_pin.plots.style import COLOURS, STYLE
 
 #: Further ones where the colours come round again.
@@ -40,7 +41,7 @@ def plot_simulation(
         gaps.semilogy(simulation.time, visible, ".", markersize=2, color=COLOURS[0])
         gaps.set(xlabel="time (s)", ylabel="largest loop gap (m)")
         gaps.margins(x=0)
-        positions.set_title(mechanism.name, loc="left")
+        positions.set_title(for_figure(mechanism.name), loc="left")
     return figure
 
 
@@ -59,7 +60,7 @@ def _lines(axes: Axes, time: np.ndarray, curves: dict[str, np.ndarray]) -> None:
     for index, (name, values) in enumerate(curves.items()):
         colour = COLOURS[index % len(COLOURS)]
         style = _STYLES[(index // len(COLOURS) + index) % len(_STYLES)]
-        axes.plot(time, values, color=colour, linestyle=style, label=name)
+        axes.plot(time, values, color=colour, linestyle=style, label=for_figure(name))
     axes.margins(x=0)
     if curves:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize="small")

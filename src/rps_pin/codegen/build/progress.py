@@ -9,6 +9,8 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from rps_pin.plain_text import plain
+
 _AFTER = 1.0
 
 
@@ -16,7 +18,7 @@ class Bar:
     """A bar with the time that has passed; call it with how many of how many steps are done."""
 
     def __init__(self, words: str) -> None:
-        self._words = words
+        self._words = plain(words)
         self._begin = time.monotonic()
         self._shown: Progress | None = None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,6 +10,7 @@ from rps_pin.control.simulation.loop_run import LoopRun
 from rps_pin.control.simulation.loop_summary import LoopSummary, status_name
 from rps_pin.control.simulation.scenario import Scenario
 from rps_pin.errors import InputError
+from rps_pin.plain_text import plain
 
 #: Most changes of the status in the report.
 _MOST_SHOWN = 50
@@ -30,8 +32,8 @@ def report(
     """
     entry = scenario.entry
     lines = [
-        *(f"# {title}", ""),
-        f"Robot {scenario.model.parameters.name}; {run.time.size} ticks of "
+        *(f"# {html.escape(plain(title))}", ""),
+        f"Robot {html.escape(plain(scenario.model.parameters.name))}; {run.time.size} ticks of "
         f"{1e3 * entry.period:g} ms, the first {entry.settle:g} s at rest.",
         "",
     ]

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
@@ -157,9 +158,11 @@ class SizingSheet:
         for margins in zip(*(each.margins for each in self.actuators), strict=True):
             if math.isfinite(margins[0].margin):
                 label = f"{margins[0].quantity}: margin to {margins[0].limit:.4g} {margins[0].unit}"
-                broken = "[bold red]{:.4g} BROKEN[/]"
                 cells = [
-                    ("{:.4g}" if each.kept else broken).format(each.margin) for each in margins
+                    f"{each.margin:.4g}"
+                    if each.kept
+                    else Text(f"{each.margin:.4g} BROKEN", style="bold red")
+                    for each in margins
                 ]
                 table.add_row(label, *cells)
         return table

@@ -11,6 +11,8 @@ from string import Template
 
 import meshcat
 
+from rps_pin.plain_text import plain
+
 
 def page(*, title: str, note: str, policy: str, scripts: str) -> str:
     """Return a page that fills the browser's window with Meshcat's pane ``meshcat-pane``.
@@ -27,7 +29,7 @@ def page(*, title: str, note: str, policy: str, scripts: str) -> str:
         The ``<script>`` elements, as HTML.
     """
     text = {"title": title, "note": note, "policy": policy}
-    escaped = {name: html.escape(one) for name, one in text.items()}
+    escaped = {name: html.escape(plain(one)) for name, one in text.items()}
     return Template(own_file("page.html")).substitute(escaped, scripts=scripts)
 
 
