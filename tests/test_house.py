@@ -94,6 +94,7 @@ LAYERS = [
         "moved",
         "plain_text",
         "one_thread",
+        "output_places",
     },
     {"numerics"},
     {"closed_loop"},

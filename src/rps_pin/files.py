@@ -20,6 +20,7 @@ from typing import BinaryIO
 
 from rps_pin.errors import InputError, shown
 from rps_pin.interruption import signals_as_ctrl_c
+from rps_pin.output_places import FILES_READ, through_links_and_streams
 
 #: Names of temporary files: see `_scratch_name`.
 _SCRATCH = re.compile(
@@ -48,7 +49,10 @@ def opened(path: str | os.PathLike[str], what: str) -> Iterator[BinaryIO]:
         raise InputError(f"a {what} is given by its path, not by {shown(path)}")
     try:
         with open(path, "rb", opener=_opener) as file:
-            kind = os.fstat(file.fileno()).st_mode
+            found = os.fstat(file.fileno())
+            if (read := FILES_READ.get()) is not None:
+                read.add((found.st_dev, found.st_ino))
+            kind = found.st_mode
             if not stat.S_ISREG(kind):
                 raise InputError(
                     f"cannot read the {what} {os.fspath(path)}: it is {_kind(kind)}, not a regular "
@@ -74,12 +78,14 @@ def _kind(mode: int) -> str:
     return kinds.get(stat.S_IFMT(mode), "a device")
 
 
+@through_links_and_streams
 @contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path next to `path`; rename it to `path` if the block ends without error.
 
     An exception, Ctrl-C, SIGTERM or SIGHUP removes the temporary file and leaves `path` unchanged.
     What a process that was killed left in the folder is removed by the next call there.
+    A device or FIFO is written to, and of a link the file that it leads to is replaced.
 
     Parameters
     ----------

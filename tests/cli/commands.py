@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 import sys
+import threading
 from pathlib import Path
 from subprocess import CompletedProcess
 from unittest import mock
@@ -21,6 +22,7 @@ def rps_pin(
     status: int | str | None = 0
     with contextlib.ExitStack() as stack:
         stack.enter_context(mock.patch.object(sys, "argv", ["rps-pin", *arguments]))
+        stack.enter_context(mock.patch.object(threading, "excepthook", threading.excepthook))
         stack.enter_context(mock.patch.dict(os.environ, environment))
         stack.enter_context(contextlib.chdir(folder or Path.cwd()))
         stack.enter_context(contextlib.redirect_stdout(output))

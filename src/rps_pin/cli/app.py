@@ -18,6 +18,7 @@ from rps_pin.cli.lazy_group import SETTINGS, LazyGroup
 from rps_pin.cli.printing import say, tell_error, tell_fault
 from rps_pin.errors import AccuracyWarning, RPSPinError
 from rps_pin.interruption import signals_as_ctrl_c
+from rps_pin.output_places import FILES_READ
 from rps_pin.plain_text import plain
 
 app = typer.Typer(name="rps-pin", cls=LazyGroup, no_args_is_help=True, **SETTINGS)
@@ -62,7 +63,8 @@ def doctor_command(
 ) -> None:
     """List what is installed and what is missing.
 
-    Exit status: 0 all required packages work; 1 something is missing or broken.
+    Exit status: 0 all required packages work; 1 something is missing or broken. Of any command, 70
+    is a fault of rps-pin itself: please report it with this list.
     """
     raise typer.Exit(doctor(as_json))
 
@@ -82,8 +84,6 @@ def rps_pin(
     """Closed-loop robots on Pinocchio: the 3-RPS, and any other mechanism.
 
     Units are SI: m, rad, s, kg, N. Begin with **rps-pin helix** and **rps-pin view**.
-
-    Exit status: 0; 1 an error; 2 wrong usage; 70 a fault of rps-pin itself: please report it.
     """
 
 
@@ -98,6 +98,7 @@ def _show_warning(others: Callable[..., None], warning: object, kind: object, *r
 def run() -> None:
     """Run the command line; an error is one line and the exit status 1, a fault 70."""
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
+    FILES_READ.set(set())
     threading.excepthook = _tell_fault_of_thread
     try:
         with signals_as_ctrl_c():

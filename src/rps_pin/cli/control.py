@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from rps_pin.cli import console as common
 from rps_pin.cli.layer_options import write_page
+from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
 from rps_pin.errors import RPSPinError
 from rps_pin.files import write_text
 
@@ -34,6 +35,7 @@ def control_command(
         Path, typer.Argument(metavar="SCENARIO", help="A YAML file; see docs/control.md.")
     ],
     output: common.NamedFolderOption = None,
+    overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
     """Run a control loop against a simulated 3-RPS that differs from the controller's model.
@@ -57,12 +59,15 @@ def control_command(
 
     loaded = load_scenario(scenario)
     name = loaded.model.parameters.name
+    folder = output or Path(f"{scenario.stem}-control")
+    files = [folder / file for file in ("report.md", "loop.csv", "summary.json")]
+    results = [*files, *figures_in(folder, "tracking", "forces"), folder / "viewer.html"]
+    check_outputs(results, overwrite, inputs=[scenario], renewed=True)
     console = common.text_console(as_json)
     common.tell_size("loop.csv", loaded.duration / loaded.entry.period, COLUMNS)
     run, broken = _run(loaded, console)
     window = loaded.entry.settle if run.time[-1] > loaded.entry.settle else 0.0
     summary = LoopSummary.of(run, begin=window)
-    folder = output or Path(f"{scenario.stem}-control")
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
         from rps_pin.plots import save_figure
@@ -70,7 +75,6 @@ def control_command(
         from rps_pin.viewer import Motion
 
         title = f"3-RPS {name}, {scenario.name}"
-        files = [folder / file for file in ("report.md", "loop.csv", "summary.json")]
         write_loop_csv(files[1], run)
         write_text(files[2], json.dumps(summary.as_dict(), indent=2) + "\n")
         write_text(files[0], report(title, loaded, run, summary, _CAPTIONS))

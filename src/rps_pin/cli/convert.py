@@ -18,8 +18,8 @@ from rps_pin.cli.mechanism_options import (
     print_notes,
     shapes_of,
 )
+from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.printing import say
-from rps_pin.errors import InputError
 
 
 class Format(StrEnum):
@@ -55,9 +55,7 @@ def convert_command(
             help="MuJoCo: lower a moment of inertia that exceeds the sum of the other two.",
         ),
     ] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace files that exist.")
-    ] = False,
+    overwrite: OverwriteOption = False,
     package_path: PackagePathOption = None,
     ignore_limits: IgnoreLimitsOption = False,
     accuracy: AccuracyOption = None,
@@ -77,11 +75,9 @@ def convert_command(
     """
     mechanism, found = load_mechanism(file, ignore_limits, accuracy)
     stem = file.resolve().name if file.is_dir() else found.stem
-    output.mkdir(parents=True, exist_ok=True)
     targets = [output / f"{stem}{suffix}" for suffix in _SUFFIXES[to]]
-    there = [str(path) for path in targets if path.exists()]
-    if there and not overwrite:
-        raise InputError(f"{' and '.join(there)} would be replaced; --overwrite does so")
+    check_outputs(targets, overwrite, inputs=[file])
+    output.mkdir(parents=True, exist_ok=True)
     notes: list[str] = []
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")

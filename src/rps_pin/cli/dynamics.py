@@ -11,7 +11,8 @@ import typer
 from rich.markup import escape
 
 from rps_pin.cli import console as common
-from rps_pin.cli.motion_report import print_motion, write_motion
+from rps_pin.cli.motion_report import motion_files, print_motion, write_motion
+from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
 from rps_pin.errors import InputError
 from rps_pin.files import write_text
 from rps_pin.rps.dynamics.force_causes import force_causes
@@ -63,6 +64,7 @@ def dynamics_command(
     ] = None,
     rate: common.RateOption = 1000.0,
     output: common.NamedFolderOption = None,
+    overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
     """Compute the actuator forces of a 3-RPS along a trajectory, and size its actuators.
@@ -91,6 +93,10 @@ def dynamics_command(
         machine = machine.with_payload(Payload(payload, payload_centre))
     name = machine.parameters.name
     path = load_trajectory(trajectory, machine)
+    folder = output or Path(f"{trajectory.stem}-dynamics")
+    figures = figures_in(folder, "forces_by_cause", "force_over_speed")
+    results = [*motion_files(folder, "dynamics"), *figures, folder / "sizing.json"]
+    check_outputs(results, overwrite, inputs=[trajectory], renewed=True)
     console = common.text_console(as_json)
     limits = ActuatorLimits.of(machine.parameters, power=math.inf if power is None else power)
     if fastest:
@@ -105,7 +111,6 @@ def dynamics_command(
     run = run_motion(machine, path, rate, wrench=wrench, progress=progress)
     sheet = size_actuators(run.time, run.force, run.speed, run.length, limits)
     summary = summarise(run, machine)
-    folder = output or Path(f"{trajectory.stem}-dynamics")
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
         from rps_pin.plots import save_figure

@@ -11,6 +11,7 @@ import typer
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.completion import names_or_files, preset_names
+from rps_pin.cli.outputs import check_outputs
 from rps_pin.cli.printing import say
 from rps_pin.errors import RPSPinError
 
@@ -139,6 +140,8 @@ def export_c_command(
             frames=frames or (),
         )
     texts = c_files(package)
+    # Files that were exported before are replaced, others with --overwrite: `write_c_files`.
+    check_outputs([output / one for one in texts], overwrite=True, inputs=[file] if file else [])
     files = write_c_files(texts, output, overwrite=overwrite)
     summary = {
         "mechanism": title,

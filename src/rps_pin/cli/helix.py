@@ -8,7 +8,8 @@ from rich.markup import escape
 
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
-from rps_pin.cli.motion_report import actuator_table, print_motion, write_motion
+from rps_pin.cli.motion_report import actuator_table, motion_files, print_motion, write_motion
+from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.rps.dynamics.motion_csv import COLUMNS
 from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 
@@ -22,6 +23,7 @@ def helix_command(
     duration: helix.DurationOption = helix.DEFAULT_DURATION,
     rate: common.RateOption = 1000.0,
     output: common.FolderOption = Path("helix"),
+    overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
     """Compute the actuator forces of a 3-RPS along the paper's helix.
@@ -49,6 +51,7 @@ def helix_command(
     machine = common.load_robot(robot)
     path = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     console = common.text_console(as_json)
+    check_outputs(motion_files(output, "helix"), overwrite, renewed=True)
     common.tell_size("helix.csv", path.duration * rate, COLUMNS)
     run = run_motion(machine, path, rate, progress=common.progress_bar(console, "inverse dynamics"))
     summary = summarise(run, machine)

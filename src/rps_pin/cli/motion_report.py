@@ -10,10 +10,18 @@ from rich.table import Table
 
 from rps_pin.cli.console import print_files, table_of
 from rps_pin.cli.layer_options import write_page
+from rps_pin.cli.outputs import figures_in
 from rps_pin.rps.dynamics.motion_csv import write_csv
 from rps_pin.rps.dynamics.motion_run import ActuatorSummary, MotionRun, MotionSummary
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.path import Trajectory, end_states
+
+_FIGURES = ("figure_7_path", "figure_8_lengths", "figure_9_forces")
+
+
+def motion_files(folder: Path, name: str) -> list[Path]:
+    """Return the files that `write_motion` writes."""
+    return [folder / f"{name}.csv", *figures_in(folder, *_FIGURES), folder / "viewer.html"]
 
 
 def write_motion(
@@ -26,12 +34,9 @@ def write_motion(
     table = folder / f"{name}.csv"
     write_csv(table, run)
     files = [table]
-    for figure, plot in (
-        ("figure_7_path", plot_path),
-        ("figure_8_lengths", plot_lengths),
-        ("figure_9_forces", plot_forces),
-    ):
-        files += save_figure(plot(run), folder, figure)
+    drawn = plot_path(run), plot_lengths(run), plot_forces(run)
+    for name_of_figure, axes in zip(_FIGURES, drawn, strict=True):
+        files += save_figure(axes, folder, name_of_figure)
     return [*files, write_page(folder, robot, run, title)]
 
 

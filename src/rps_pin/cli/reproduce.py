@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from rps_pin.cli import console as common
+from rps_pin.cli.outputs import OverwriteOption, check_outputs
 
 
 def reproduce_command(
@@ -16,13 +17,14 @@ def reproduce_command(
     quick: Annotated[
         bool, typer.Option("--quick", help="Coarser grids and fewer interpretations: seconds.")
     ] = False,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Reproduce the paper: each equation, figure and table compared with what is computed here.
 
     Output: the page (**reproduction.md**) and, in the folder **reproduction** next to it, its
     pictures and all interpretations of the paper's Table 1 that were tried (**readings.csv**).
-    Existing files are replaced. It takes about a minute; Ctrl-C leaves no incomplete file. The
-    project's own page, docs/reproduction.md, is made by `rps-pin reproduce -o docs`.
+    A whole earlier reproduction is replaced. It takes about a minute; Ctrl-C leaves no incomplete
+    file. The project's own page, docs/reproduction.md, is made by `rps-pin reproduce -o docs`.
 
     Exit status: 0 done; 1 an error; 2 wrong usage.
 
@@ -32,6 +34,8 @@ def reproduce_command(
     from rps_pin.paper.page import summary_lines
     from rps_pin.paper.write import write
 
+    both = [output / "reproduction.md", output / "reproduction" / "interpretations.csv"]
+    check_outputs(both, overwrite, renewed=True)
     console = common.text_console()
 
     def track(items: Iterable[Any], task: str) -> Iterable[Any]:

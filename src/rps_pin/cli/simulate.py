@@ -13,6 +13,7 @@ from rps_pin.arrays import Array
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.layer_options import LayersOption, write_page
+from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
 from rps_pin.cli.printing import say
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.column_names import joint_coordinates
@@ -75,6 +76,7 @@ def simulate_command(
     accuracy: options.AccuracyOption = None,
     package_path: options.PackagePathOption = None,
     output: common.NamedFolderOption = None,
+    overwrite: OverwriteOption = False,
     layers: LayersOption = None,
     as_json: common.JsonOption = False,
 ) -> None:
@@ -95,11 +97,14 @@ def simulate_command(
     from rps_pin.closed_loop.simulation.simulate import simulate
 
     mechanism, file = options.load_mechanism(file, ignore_limits, accuracy)
+    folder = output or Path(f"{file.stem}-simulation")
+    files = [folder / "simulation.csv"]
+    results = [*files, *figures_in(folder, "simulation"), folder / "viewer.html"]
+    check_outputs(results, overwrite, inputs=[file], renewed=True)
     q = mechanism.close(mechanism.home)
     if start:
         q = mechanism.complete(options.by_joint(start, "--start"), q, jump=jump)
-    still = np.zeros(mechanism.model.nv)
-    speeds = _of_actuated(mechanism, speed, "--speed")
+    still, speeds = np.zeros(mechanism.model.nv), _of_actuated(mechanism, speed, "--speed")
     v = mechanism.velocity(q, speeds) if speeds.any() else still
     forces = _of_actuated(mechanism, tau, "--tau")
     unheld: tuple[NotHeld, ...] = ()
@@ -117,13 +122,11 @@ def simulate_command(
         common.tell_size("simulation.csv", duration / step, columns)
     with common.share_bar(console, "simulating") as progress:
         motion = simulate(mechanism, q, v, tau=forces, progress=progress, **times)
-    folder = output or Path(f"{file.stem}-simulation")
     folder.mkdir(parents=True, exist_ok=True)
     from rps_pin.plots import save_figure
     from rps_pin.plots.simulation import plot_simulation
 
     title = f"{mechanism.name}, simulated"
-    files = [folder / "simulation.csv"]
     motion.to_csv(files[0])
     files += save_figure(plot_simulation(motion, mechanism), folder, "simulation")
     shapes, missing = options.shapes_of(file, mechanism, package_path)

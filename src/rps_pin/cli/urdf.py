@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from rps_pin.cli.console import RobotOption, load_robot
+from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.printing import say
 from rps_pin.files import write_text
 
@@ -17,6 +18,7 @@ def urdf_command(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="File to write; default: standard output.")
     ] = None,
+    overwrite: OverwriteOption = False,
 ) -> None:
     """Write the URDF of a 3-RPS: of a preset, or of a parameter file.
 
@@ -29,5 +31,6 @@ def urdf_command(
     if output is None:
         typer.echo(text, nl=False)
         return
+    check_outputs([output], overwrite)
     write_text(output, text)
     say(f"wrote {output}")

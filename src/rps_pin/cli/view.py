@@ -21,6 +21,7 @@ from rps_pin.cli.mechanism_options import (
     print_notes,
     shapes_of,
 )
+from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.printing import PlainConsole, say
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
@@ -46,6 +47,7 @@ def view_command(
         Path | None,
         typer.Option(help="Write this film: .mp4, .gif or .webp; start no server."),
     ] = None,
+    overwrite: OverwriteOption = False,
     time: Annotated[float, typer.Option(help="Time of the picture, s.")] = 0.0,
     size: SizeOption = "1000x620",
     background: Annotated[
@@ -100,6 +102,7 @@ def view_command(
     from rps_pin.viewer import save_html, save_png, save_video, show
 
     machine = common.load_robot(robot)
+    check_outputs([file for file in (html, png, video) if file is not None], overwrite)
     chosen = chosen_layers(layers, machine.mechanism)
     sides = chosen_size(size)
     motion: Any = pose

@@ -11,6 +11,7 @@ import typer
 from rich.table import Table
 
 from rps_pin.cli import console as common
+from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
 from rps_pin.errors import InputError
 from rps_pin.paper import PaperComparison, paper_comparison
 from rps_pin.rps import workspace as space
@@ -18,6 +19,13 @@ from rps_pin.rps.robot import RPSRobot
 
 #: Lengths per leg of the surfaces in the figures.
 _DRAWN_POINTS = 18
+_FIGURES = (
+    "figure_2_assembly_modes",
+    "figure_3_theoretical",
+    "figure_4_effective",
+    "figure_5_space",
+    "figure_6_views",
+)
 
 
 def workspace_command(
@@ -26,9 +34,7 @@ def workspace_command(
         int, typer.Option(help="Lengths per leg; 51 are the paper's 1 mm steps over 50 mm.")
     ] = 51,
     output: common.FolderOption = Path("workspace"),
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace existing results.")
-    ] = False,
+    overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
     """Compute the workspace of a 3-RPS by discretised leg lengths, as the paper does.
@@ -45,8 +51,9 @@ def workspace_command(
     """
     machine = common.load_robot(robot)
     parameters = machine.parameters
-    if not overwrite and (output / "workspace.h5").exists():
-        raise InputError(f"{output / 'workspace.h5'} exists; --overwrite replaces it")
+    drawn = _FIGURES + ("base_radius",) * (parameters.name == "micro")
+    files = [output / "workspace.h5", output / "boundary.stl"]
+    check_outputs([*files, *figures_in(output, *drawn)], overwrite)
     output.mkdir(parents=True, exist_ok=True)
     console = common.text_console(as_json)
     grid = space.leg_grid(parameters, points)
@@ -59,23 +66,21 @@ def workspace_command(
         from rps_pin.plots import save_figure
         from rps_pin.plots import workspace as plots
 
-        files = [output / "workspace.h5", output / "boundary.stl"]
         space.save_workspace(found, files[0], overwrite=True)
         space.save_mesh(space.boundary(found), files[1], overwrite=True)
         # Matplotlib draws surfaces triangle by triangle: a coarser grid shows the same shape.
         coarse = space.leg_grid(parameters, min(_DRAWN_POINTS, found.grid.shape[0]))
         surface = space.workspace(machine, coarse)
         modes = machine.assembly_modes([sum(parameters.leg_length_limits) / 2] * 3)
-        figures = {
-            "figure_2_assembly_modes": plots.plot_assembly_modes(parameters, modes),
-            "figure_3_theoretical": plots.plot_theoretical(parameters),
-            "figure_4_effective": plots.plot_effective(surface),
-            "figure_5_space": plots.plot_space(surface),
-            "figure_6_views": plots.plot_views(found),
-        }
-        if rows:
-            figures["base_radius"] = plots.plot_comparison(rows)
-        for name, figure in figures.items():
+        figures = [
+            plots.plot_assembly_modes(parameters, modes),
+            plots.plot_theoretical(parameters),
+            plots.plot_effective(surface),
+            plots.plot_space(surface),
+            plots.plot_views(found),
+            *([plots.plot_comparison(rows)] if rows else []),
+        ]
+        for name, figure in zip(drawn, figures, strict=True):
             files += save_figure(figure, output, name)
     if as_json:
         common.print_json(summary | {"files": files})
