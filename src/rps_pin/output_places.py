@@ -30,7 +30,7 @@ def is_stream(path: Path) -> bool:
     """
     try:
         mode = path.stat().st_mode
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return False
     if stat.S_ISREG(mode):
         if str(path.absolute()).startswith(_SYSTEM_FOLDERS) and path.is_symlink():

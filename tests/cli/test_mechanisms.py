@@ -312,7 +312,7 @@ def test_convert_replaces_files_only_if_asked(tmp_path: Path) -> None:
     (tmp_path / "delta.yaml").write_text("mine")
     run = rps_pin("convert", "delta", "--to", "urdf", folder=tmp_path)
     assert run.returncode == 1
-    assert "delta.yaml would be replaced; --overwrite does so" in run.stderr
+    assert "delta.yaml exists; --overwrite replaces it" in run.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["delta.yaml"]
     run = rps_pin("convert", "delta", "--to", "urdf", "--overwrite", folder=tmp_path)
     assert run.returncode == 0, run.stderr

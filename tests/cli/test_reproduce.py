@@ -65,7 +65,7 @@ def test_an_interrupted_writing_leaves_no_half_file(
     monkeypatch.setattr(write, "write_figures", lambda *_: [])
     monkeypatch.setattr(write, "interpretations_csv", lambda _: "whole\n")
     monkeypatch.setattr(write, "render", interrupted)
-    run = CliRunner().invoke(app, ["--quick", "-o", str(tmp_path)])
+    run = CliRunner().invoke(app, ["--quick", "--overwrite", "-o", str(tmp_path)])
     assert run.exit_code != 0
     assert (tmp_path / "reproduction.md").read_text() == "what stood there"
     left = {path.name for path in (tmp_path / "reproduction").iterdir()}
