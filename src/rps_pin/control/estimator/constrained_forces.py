@@ -76,7 +76,8 @@ class ConstrainedForces:
             model, data, equations.constraints, equations.constraint_data
         )
         for i, damping, friction in self._friction:
-            force[i] += friction_force(v.item(i), damping, friction, self._friction_speed)
+            passive = friction_force(v.item(i), damping, friction, self._friction_speed)
+            force[i] = force.item(i) + passive  # floats: NumPy's numbers would warn of overflow
         self._factors.compute(self._matrix)
         found: list[float] = self._factors.solve(force).tolist()
         return found if math.isfinite(sum(found)) else None

@@ -105,6 +105,7 @@ class ForceLimits:
         )
         return one, two, three
 
+    @np.errstate(all="ignore")  # the largest floats overflow: they neither raise nor warn
     def nearest(
         self, wanted: Triple, mass: Array, jacobian: LegJacobian, rate: Triple
     ) -> LimitedForces:

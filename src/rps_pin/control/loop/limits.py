@@ -52,6 +52,7 @@ class RobotLimits:
         """Return whether an actuator is beyond its force limit."""
         return not none_beyond(force, self.greatest_force)
 
+    @np.errstate(all="ignore")  # a caller's setting must not make a message raise
     def messages(self, geometry: LegGeometry) -> list[str]:
         """Return a sentence for each violated limit of length, angle or ball joint."""
         p = self._parameters
