@@ -87,6 +87,7 @@ LAYERS = [
         "errors",
         "validation",
         "arrays",
+        "bounds",
         "contents",
         "files",
         "interruption",

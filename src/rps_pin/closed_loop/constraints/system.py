@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
+from rps_pin.bounds import check_velocities
 from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 from rps_pin.closed_loop.column_names import joint_coordinates, named_velocities
 from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, frame_id
@@ -88,6 +89,7 @@ class ConstraintSystem:
                 "Pinocchio's constraints do not take: build the model without mimic joints, and "
                 "give a JointCoupling"
             )
+        check_velocities(model.nv, "the model")
         self.model = model
         self.actuated_names = (actuated,) if isinstance(actuated, str) else tuple(actuated)
         refuse_twice("actuated joint", self.actuated_names)

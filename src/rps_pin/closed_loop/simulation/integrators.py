@@ -15,7 +15,9 @@ import pinocchio as pin
 from scipy.integrate import DOP853
 
 from rps_pin.arrays import Array
+from rps_pin.bounds import ROWS, STEPS, check_size
 from rps_pin.errors import SingularityError
+from rps_pin.validation import positive_number, whole_number
 
 #: Function of (t, q, v) that returns the acceleration a, shape (nv,).
 Acceleration = Callable[[float, Array, Array], Array]
@@ -178,6 +180,17 @@ class AdaptiveStepper:
 
         self.work = lambda time: float(values(time)[-1] / _SCALE)
         return float(solver.t), at
+
+
+def check_times(duration: float, step: float, record_every: int) -> None:
+    """Refuse times that are not positive, and more steps or rows than memory and patience hold."""
+    positive_number(duration, "duration", "s")
+    positive_number(step, "step", "s")
+    whole_number(record_every, "record_every")
+    steps = duration / step
+    check_size(steps, STEPS, f"duration / step = {steps:.3g} steps")
+    rows = steps / record_every
+    check_size(rows, ROWS, f"{rows:.3g} rows to record (record_every keeps fewer)")
 
 
 def times(duration: float, step: float) -> Iterator[tuple[int, float]]:

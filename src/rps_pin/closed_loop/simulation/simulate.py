@@ -33,7 +33,7 @@ from rps_pin.closed_loop.simulation.motion import (
 )
 from rps_pin.closed_loop.simulation.result import Recorder, Simulation
 from rps_pin.errors import RPSPinError
-from rps_pin.validation import choice, positive_number, whole_number
+from rps_pin.validation import choice, positive_number
 
 #: How often `progress` is called, about.
 _PROGRESS_CALLS = 200
@@ -122,11 +122,9 @@ def simulate(
     """
     choice(method, "method", ("rk4", "adaptive"))
     choice(closing, "closing", ("projection", "baumgarte"))
-    positive_number(duration, "duration", "s")
-    positive_number(step, "step", "s")
+    integrators.check_times(duration, step, record_every)
     positive_number(tolerance, "tolerance")
     positive_number(baumgarte_gain, "baumgarte_gain", "1/s")
-    whole_number(record_every, "record_every")
     system = mechanism.system
     drive = Drive(system, controller, tau, wrenches)
     start = closed_start(system, q, v)
@@ -139,9 +137,9 @@ def simulate(
     time, shown, work = 0.0, 0.0, 0.0
     try:
         state, gap = start, motion.gap(start[0])
-        grid = list(integrators.times(duration, step))
-        followers = [*(t for _, t in grid[1:]), None]
-        for (k, time), following in zip(grid, followers, strict=True):
+        followers = (t for k, t in integrators.times(duration, step) if k)
+        for k, time in integrators.times(duration, step):
+            following = next(followers, None)
             drive.command(time, *state)
             recorder.watch(time, state[0])
             with np.errstate(over="ignore", invalid="ignore"):  # refused in words

@@ -19,7 +19,7 @@ from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation import simulate as pinocchio_engine
 from rps_pin.closed_loop.simulation.damped import is_stiff
-from rps_pin.closed_loop.simulation.integrators import times
+from rps_pin.closed_loop.simulation.integrators import check_times, times
 from rps_pin.closed_loop.simulation.motion import (
     Controller,
     Drive,
@@ -31,7 +31,6 @@ from rps_pin.closed_loop.simulation.motion import (
 from rps_pin.closed_loop.simulation.result import Recorder, Simulation
 from rps_pin.codegen.expressions.routines import BLOCK
 from rps_pin.errors import RPSPinError
-from rps_pin.validation import positive_number, whole_number
 
 
 class Compiled(Protocol):
@@ -116,9 +115,7 @@ def simulate(
     if tuning or (method, closing) != ("rk4", "projection") or callable(wrenches):
         others: dict[str, Any] = {"method": method, "closing": closing, **tuning}
         return pinocchio_engine.simulate(compiled.reference(parameters), q, v, **given, **others)
-    positive_number(duration, "duration", "s")
-    positive_number(step, "step", "s")
-    whole_number(record_every, "record_every")
+    check_times(duration, step, record_every)
     return _Run(compiled, q, v, given, parameters).simulation()
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rps_pin.arrays import Array
+from rps_pin.bounds import TICKS, check_size
 from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.paced_trajectory import PacedTrajectory
 from rps_pin.control.simulation.faults import Fault, Faults
@@ -154,7 +155,9 @@ def run_loop(
         )
     choice(speeds, "speeds", get_args(Speeds))
     total = settle + trajectory.duration if duration is None else duration
-    ticks = max(1, round(positive_number(total, "duration", "s") / plant.period))
+    wanted = positive_number(total, "duration", "s") / plant.period
+    check_size(wanted, TICKS, f"duration / period = {wanted:.3g} ticks")
+    ticks = max(1, round(wanted))
     targets = PacedTrajectory(trajectory, plant.period, settle=settle)
     record = _Record(controller, plant, targets.target(), ticks)
     injected, done = Faults(faults), 0

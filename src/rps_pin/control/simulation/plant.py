@@ -14,11 +14,12 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.bounds import DELAY, SUBSTEPS, check_size
 from rps_pin.closed_loop import Stepper
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.motion import WrenchesInTime
 from rps_pin.control.simulation.encoders import Encoders
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, shown
 from rps_pin.one_thread import one_thread
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number, real_vector, whole_number
@@ -76,6 +77,8 @@ class Plant:
         x = real_vector(pose, 3, "pose")
         self._substeps = whole_number(substeps, "substeps")
         delay = whole_number(delay, "delay", 0)
+        check_size(self._substeps, SUBSTEPS, f"substeps = {shown(self._substeps)}")
+        check_size(delay, DELAY, f"delay = {shown(delay)} ticks")
         if not isinstance(encoders, Encoders):
             raise InputError(f"encoders is a {type(encoders).__name__}; it must be Encoders")
         self.robot, self.encoders = robot, encoders

@@ -291,7 +291,7 @@ def test_a_file_without_joints_is_no_mechanism() -> None:
 def test_scenes_of_many_loose_bodies_are_refused_before_they_take_all_memory() -> None:
     loose = "<body><freejoint/><geom size='0.1'/></body>"
     text = mujoco_file(f"<replicate count='67' offset='1 0 0'>{loose}</replicate>")
-    with pytest.raises(MechanismError, match="has 402 velocities, and at most 400 are read"):
+    with pytest.raises(MechanismError, match=r"has 402 velocities; .* at most 400 are taken"):
         parts_from_mjcf(text)
 
 

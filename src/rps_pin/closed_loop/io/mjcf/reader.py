@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rps_pin.bounds import check_velocities
 from rps_pin.closed_loop.column_names import joint_coordinates
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.io.mjcf.actuators import Actuator, read_actuators
@@ -21,10 +22,6 @@ from rps_pin.closed_loop.io.mjcf.tendons import Tendons
 from rps_pin.closed_loop.io.mjcf.tree import MjcfTree
 from rps_pin.closed_loop.io.parts import MechanismParts
 from rps_pin.closed_loop.io.unit_doubts import unit_doubts
-from rps_pin.errors import MechanismError
-
-#: Velocities that a file may have. Pinocchio's data of so many takes 4 GB, and grows as the cube.
-MOST_VELOCITIES = 400
 
 
 def parts_from_mjcf(
@@ -55,16 +52,12 @@ def parts_from_mjcf(
         If the file cannot be read.
     MechanismError
         If MuJoCo refuses it, or it has forces or closures that are not read here; with the line.
-        If it has more than 400 velocities.
+        If it has more velocities than `bounds.MOST_VELOCITIES`.
     RPSPinError
         If MuJoCo is not installed (``rps-pin[mjcf]``).
     """
     source = MjcfSource(path_or_xml)
-    if source.model.nv > MOST_VELOCITIES:
-        raise MechanismError(
-            f"{source.origin} has {source.model.nv} velocities, and at most {MOST_VELOCITIES} are "
-            "read: the memory for them grows as the cube of their number"
-        )
+    check_velocities(source.model.nv, source.origin)
     refuse_wrong_numbers(source)
     refuse_other_forces(source)
     asked = (actuated,) if isinstance(actuated, str) else tuple(actuated or ())

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
+from rps_pin.bounds import LINKS, LINKS_IN_A_ROW, MOST_VELOCITIES, beyond
 from rps_pin.closed_loop.io.urdf.elements import VELOCITIES, UrdfFile, UrdfJoint
 from rps_pin.errors import few
-
-#: Pinocchio's parser calls itself once a link, and its scratch memory grows as the cube of the
-#: velocities (300 take 1.8 GB).
-DEEPEST, MOST_VELOCITIES = 1000, 400
 
 
 def check_tree(file: UrdfFile) -> None:
@@ -19,6 +16,8 @@ def check_tree(file: UrdfFile) -> None:
         If a link has two parents (with both joints), links are in a cycle, more than one has no
         parent, or there are more links in a row, or velocities, than are read; with the line.
     """
+    if why := beyond(len(file.links), LINKS):
+        file.refuse(file.robot, f"it has {len(file.links)} links, and {why}")
     joint_of: dict[str, UrdfJoint] = {}
     for joint in file.joints.values():
         if joint.child in joint_of:
@@ -38,11 +37,8 @@ def check_tree(file: UrdfFile) -> None:
         file.refuse(element, f"no joint has these as its child: {few(roots)}; a URDF has one root")
     _check_depth(file, joint_of)
     velocities = sum(VELOCITIES[joint.kind] for joint in file.joints.values())
-    if velocities > MOST_VELOCITIES:
-        file.refuse(
-            file.robot,
-            f"its joints have {velocities} velocities, and at most {MOST_VELOCITIES} are read",
-        )
+    if why := beyond(velocities, MOST_VELOCITIES):
+        file.refuse(file.robot, f"its joints have {velocities} velocities, and {why}")
 
 
 def _check_depth(file: UrdfFile, joint_of: dict[str, UrdfJoint]) -> None:
@@ -56,10 +52,9 @@ def _check_depth(file: UrdfFile, joint_of: dict[str, UrdfJoint]) -> None:
         depth = depths.get(row[-1], 0)
         for above, link in enumerate(reversed(row)):
             depths[link] = depth + above
-        if depths[name] > DEEPEST:
-            file.refuse(
-                file.links[name], f"link {name!r} is the last of more than {DEEPEST} in a row"
-            )
+        if why := beyond(depths[name], LINKS_IN_A_ROW):
+            link = file.links[name]
+            file.refuse(link, f"link {name!r} is the last of {depths[name]} in a row, and {why}")
 
 
 def _refuse_cycle(file: UrdfFile, joint_of: dict[str, UrdfJoint], link: str) -> None:

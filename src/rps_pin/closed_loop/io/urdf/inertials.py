@@ -20,8 +20,8 @@ _TOLD = 1e-2
 #: It is refused if its largest moment is more than so many times the sum of the others, which no
 #: body exceeds once, or a moment is negative by more than this share of the largest.
 _GROSS, _INDEFINITE = 4.0, 0.01
-#: Moments below this share of the largest are none.
-_ALONE = 1e-9
+#: Moments below this share of the largest count as none.
+_ALONE = 1e-3
 #: Placeholders have smaller moments, kg m^2, and may be wrong by any factor: they are told.
 _PLACEHOLDER = 1e-5
 
@@ -102,7 +102,8 @@ def _check_moments(file: UrdfFile, element: Any, name: str, values: dict[str, fl
 def gross_fault(moments: Array) -> str:
     """Return why principal moments are far from any body's; or nothing.
 
-    A single moment passes, the only one that counts in a plane mechanism.
+    A single moment, the others being below a thousandth of it, passes: it is the only one that
+    counts in a plane mechanism.
 
     Parameters
     ----------
