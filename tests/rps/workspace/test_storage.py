@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -372,3 +373,88 @@ def test_memory_does_not_grow_with_the_grid(micro: RPSParameters, tmp_path: Path
     assert len(ahead) == 20
     assert max(ahead) <= 6  # three blocks a worker
     assert (tmp_path / "space.h5").stat().st_size < 22 * 8000 + 20_000
+
+
+def _replaced(file: h5py.File, name: str, **options: Any) -> None:
+    del file[name]
+    file.create_dataset(name, **options)
+
+
+SPOILT: dict[str, Any] = {
+    "length of another shape": lambda f: _replaced(f, "length", data=np.ones((5, 6, 8, 3))),
+    "length of one number": lambda f: _replaced(f, "length", data=1.0),
+    "pose without vectors": lambda f: _replaced(f, "pose", data=np.ones((5, 6, 7))),
+    "reason of a smaller grid": lambda f: _replaced(f, "reason", data=np.ones((5, 6, 6), "u2")),
+    "longer axis": lambda f: _replaced(f, "axis_2", data=np.linspace(0.1, 0.2, 9)),
+    "axis of two dimensions": lambda f: _replaced(f, "axis_1", data=np.ones((5, 5))),
+    "axis of many numbers": lambda f: _replaced(f, "axis_3", shape=(10**12,), dtype="f8"),
+    "axis of strings": lambda f: _replaced(f, "axis_1", data=[b"a", b"b"]),
+    "NaN": lambda f: f["conditioning"].__setitem__((1, 2, 3), np.nan),
+    "NaN in a pose": lambda f: f["pose"].__setitem__((1, 2, 3, 0), np.nan),
+    "infinite": lambda f: f["determinant"].__setitem__((1, 2, 3), np.inf),
+    "NaN in an axis": lambda f: f["axis_1"].__setitem__(2, np.nan),
+    "reason of floats": lambda f: _replaced(f, "reason", data=np.ones((5, 6, 7))),
+    "unknown reason": lambda f: f["reason"].__setitem__((0, 0, 0), 0x8000),
+    "complex field": lambda f: _replaced(f, "determinant", data=np.ones((5, 6, 7)) * 1j),
+    "a group": lambda f: (f.pop("angle"), f.create_group("angle")),
+    "external link": lambda f: (
+        f.pop("angle"),
+        f.__setitem__("angle", h5py.ExternalLink("b", "/")),
+    ),
+    "soft link": lambda f: (f.pop("angle"), f.__setitem__("angle", h5py.SoftLink("/length"))),
+    "start of NaN": lambda f: f.attrs.__setitem__("start", [np.nan, 0, 0]),
+    "start of two": lambda f: f.attrs.__setitem__("start", [0.2, 0]),
+    "start of text": lambda f: f.attrs.__setitem__("start", "here"),
+    "conditioning NaN": lambda f: f.attrs.__setitem__("min_conditioning", np.nan),
+    "conditioning of text": lambda f: f.attrs.__setitem__("min_conditioning", "small"),
+    "parameters a list": lambda f: f.attrs.__setitem__("parameters", "[1, 2]"),
+    "parameters a number": lambda f: f.attrs.__setitem__("parameters", 3),
+    "format a list": lambda f: f.attrs.__setitem__("format", [1, 2]),
+}
+
+
+@pytest.mark.parametrize("how", SPOILT)
+def test_spoilt_files_are_refused(space: Workspace, tmp_path: Path, how: str) -> None:
+    path = tmp_path / "space.h5"
+    save_workspace(space, path)
+    with h5py.File(path, "r+") as file:
+        SPOILT[how](file)
+    for block in (None, (slice(0, 4), slice(0, 6))):
+        with pytest.raises(InputError, match=r"space\.h5"):
+            load_workspace(path, block)
+
+
+def test_data_in_other_files_are_not_read(space: Workspace, tmp_path: Path) -> None:
+    secret, path = tmp_path / "secret", tmp_path / "space.h5"
+    secret.write_bytes(bytes(5 * 6 * 7 * 8))
+    save_workspace(space, path)
+    with h5py.File(path, "r+") as file:
+        del file["conditioning"], file["determinant"]
+        shape, external = (5, 6, 7), [(str(secret), 0, 5 * 6 * 7 * 8)]
+        file.create_dataset("conditioning", shape, "f8", external=external)
+    with pytest.raises(InputError, match="conditioning must be a dataset of the file itself"):
+        load_workspace(path)
+    with h5py.File(path, "r+") as file:
+        del file["conditioning"]
+        layout = h5py.VirtualLayout((5, 6, 7), "f8")
+        layout[...] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", (5, 6, 7))
+        file.create_virtual_dataset("conditioning", layout)
+    with pytest.raises(InputError, match="conditioning must be a dataset of the file itself"):
+        load_workspace(path)
+
+
+def test_files_of_the_other_byte_order_are_read(space: Workspace, tmp_path: Path) -> None:
+    path = tmp_path / "space.h5"
+    save_workspace(space, path)
+    with h5py.File(path, "r+") as file:
+        for name in ("axis_1", "pose", "reason", "conditioning"):
+            data = file[name][...]
+            _replaced(file, name, data=data.astype(data.dtype.newbyteorder(">")))
+    assert same(load_workspace(path), space)
+
+
+def test_what_is_no_regular_file_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.h5")
+    for path in (tmp_path, tmp_path / "pipe.h5"):
+        with pytest.raises(InputError, match="not a regular file"):
+            load_workspace(path)

@@ -25,6 +25,7 @@ from typing import Literal
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
@@ -34,7 +35,7 @@ from rps_pin.rps.workspace.evaluate import Fields, evaluate
 from rps_pin.rps.workspace.grids import AXES, WHOLE, Block, Grid, checked_grid
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
-from rps_pin.validation import choice
+from rps_pin.validation import choice, non_negative_number, real_array, real_vector
 
 FORMAT = "rps_pin workspace 1"
 DType = Literal["float32", "float64"]
@@ -51,6 +52,8 @@ _FIELDS = {
     "transmission": ("1", "load carried per unit of actuator force"),
 }
 ALL_FIELDS = tuple(_FIELDS)
+#: Values of one axis at most, in a file that is read.
+LONGEST_AXIS = 1_000_000
 _VECTORS = ("pose", "position", "length", "angle")
 
 
@@ -167,29 +170,40 @@ def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> 
     Raises
     ------
     InputError
-        If there is no such file, or it does not hold a complete workspace.
+        If there is no such file, or it does not hold a complete workspace: shapes that fit the
+        axes, finite numbers, all of them in the file itself.
     """
     planes, rows = block or WHOLE
     try:
+        if Path(path).exists() and not Path(path).is_file():
+            raise InputError(f"cannot read the workspace {path}: it is not a regular file")
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != FORMAT or not file.attrs.get("complete", False):
                 raise InputError(f"{path} does not hold a complete '{FORMAT}'")
             kind = str(file.attrs["grid"])
-            first, second, third = (file[f"axis_{i}"][...] for i in (1, 2, 3))
+            axes = [_dataset(file, f"axis_{i}", None) for i in (1, 2, 3)]
+            shape = tuple(axis.size for axis in axes)
+            first, second, third = (axis[...] for axis in axes)
             grid = checked_grid(Grid(kind, (first[planes], second[rows], third)))  # type: ignore[arg-type]
             parameters = RPSParameters(**json.loads(file.attrs["parameters"]))
-            start = np.asarray(file.attrs["start"], dtype=np.float64)
-            least = float(file.attrs["min_conditioning"])
-            stored = {name: file[name][planes, rows] for name in ALL_FIELDS if name in file}
-            missing = {"reason", "pose"} - set(stored)
+            start = real_vector(file.attrs["start"], 3, "start")
+            least = non_negative_number(file.attrs["min_conditioning"], "min_conditioning")
+            missing = {"reason", "pose"} - set(file)
             if missing:
                 raise InputError(f"{path} has no dataset {', '.join(sorted(missing))}")
-    except InputError:
-        raise
-    except (OSError, KeyError, ValueError) as error:
+            stored = {
+                name: _dataset(file, name, shape)[planes, rows]
+                for name in ALL_FIELDS
+                if name in file
+            }
+        reason = _checked_reason(stored.pop("reason"))
+        floats = {name: real_array(values, name) for name, values in stored.items()}
+    except InputError as error:
+        if str(path) in str(error):
+            raise
         raise InputError(f"cannot read the workspace {path}: {error}") from None
-    reason = stored.pop("reason")
-    floats = {name: np.asarray(values, dtype=np.float64) for name, values in stored.items()}
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError, MemoryError) as error:
+        raise InputError(f"cannot read the workspace {path}: {error}") from None
     if len(floats) == len(ALL_FIELDS) - 1:
         fields = Fields(reason=reason, **floats)
     else:  # the others follow from the pose
@@ -197,6 +211,40 @@ def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> 
         computed = evaluate(parameters, floats["pose"], 1.0, found=found)
         fields = computed._replace(reason=reason, **floats)
     return Workspace(parameters, grid, start, least, fields)
+
+
+def _dataset(file: h5py.File, name: str, grid: tuple[int, ...] | None) -> h5py.Dataset:
+    """Return a field over a grid, or an axis if there is none; its data are in the file itself.
+
+    A link, and storage elsewhere, would read any file that the file names.
+    """
+    link, item = file.get(name, getlink=True), None
+    if isinstance(link, h5py.HardLink):
+        item = file[name]
+    if not isinstance(item, h5py.Dataset) or item.external or item.is_virtual:
+        raise InputError(f"{name} must be a dataset of the file itself, not a link or elsewhere")
+    if name == "reason":
+        right, wanted = item.dtype.newbyteorder("=") == np.uint16, "uint16"
+    else:
+        right, wanted = item.dtype.kind == "f", "floating-point numbers"
+    if not right:
+        raise InputError(f"{name} is of type {item.dtype}; it must be {wanted}")
+    if grid is None:
+        if item.ndim != 1 or not 1 <= item.size <= LONGEST_AXIS:
+            raise InputError(f"{name} has shape {item.shape}; it must be (n,), n <= {LONGEST_AXIS}")
+        return item
+    shape = (*grid, 3) if name in _VECTORS else grid
+    if item.shape != shape:
+        raise InputError(f"{name} has shape {item.shape}; the axes want {shape}")
+    return item
+
+
+def _checked_reason(reason: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    """Return reasons of known bits, in this machine's byte order."""
+    known = sum(int(one) for one in Reason)
+    if (reason & ~np.uint16(known)).any():
+        raise InputError(f"reason has bits that no reason has; they are {known:#x} together")
+    return reason.astype(np.uint16, copy=False)
 
 
 def checked_fields(fields: Sequence[str]) -> tuple[str, ...]:
