@@ -14,7 +14,7 @@ from rps_pin.closed_loop.assembly.closing import close, is_closed
 from rps_pin.closed_loop.assembly.continuation import Followed, Path, coordinates_of
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError, InputError, SingularityError
-from rps_pin.validation import real_vector
+from rps_pin.validation import numbers, real_vector
 
 #: How far outside a limit rounding error may leave a joint, rad or m.
 AT_LIMIT = 1e-9
@@ -74,8 +74,9 @@ def with_values(system: ConstraintSystem, q: Array, values: Mapping[str, ArrayLi
         if not model.existJointName(name):
             raise InputError(f"{name!r} is a part of a joint: give all of its coordinates in q")
         joint = model.joints[model.getJointId(name)]
-        numbers = real_vector(np.atleast_1d(value), joint.nq, f"the value of joint {name!r}")
-        changed[joint.idx_q : joint.idx_q + joint.nq] = numbers
+        what = f"the value of joint {name!r}"
+        given = np.atleast_1d(numbers(value, what, f"{joint.nq} numbers"))
+        changed[joint.idx_q : joint.idx_q + joint.nq] = real_vector(given, joint.nq, what)
     return system.normalised(changed, "q_guess")
 
 

@@ -10,7 +10,7 @@ kinds in *frame a's* axes at its origin; forces come before moments.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from struct import Struct
 from typing import Any, NamedTuple
@@ -426,6 +426,18 @@ def _refuse_other_orders(model: pin.Model) -> None:
                 "Pinocchio's mass matrix is wrong in such a tree; add each branch to its end "
                 "before the next"
             )
+
+
+def names_of(given: object, what: str) -> tuple[str, ...]:
+    """Return one name, or several, as a tuple; `what` they are names of is told otherwise."""
+    names = (given,) if isinstance(given, str) else given
+    if not isinstance(names, Iterable):
+        raise MechanismError(f"{what}: {shown(given)} is no list of names")
+    listed = tuple(names)
+    for name in listed:
+        if not isinstance(name, str):
+            raise MechanismError(f"{what}: {shown(name)} is not a name")
+    return listed
 
 
 def refuse_twice(what: str, names: Sequence[str]) -> None:

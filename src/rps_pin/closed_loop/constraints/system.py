@@ -7,7 +7,7 @@ passive joint forces. `ClosedLoopModel` is the public face of one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Protocol
 
@@ -25,16 +25,16 @@ from rps_pin.closed_loop.constraints.completion import (
     PassiveVelocities,
     choose,
 )
-from rps_pin.closed_loop.constraints.equations import ClosureEquations, refuse_twice
+from rps_pin.closed_loop.constraints.equations import ClosureEquations, names_of, refuse_twice
 from rps_pin.closed_loop.constraints.factorisation import PassiveFactorisation
 from rps_pin.closed_loop.constraints.rank_rule import EXACT, RankRule
 from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.dynamics.springs import Springs
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
-from rps_pin.errors import ClosureError, InputError, MechanismError
+from rps_pin.errors import ClosureError, InputError, MechanismError, shown
 from rps_pin.numerics.linear_algebra import Decomposition, refuse_condition
 from rps_pin.one_thread import Guard
-from rps_pin.validation import real_vector
+from rps_pin.validation import real, real_vector
 
 #: Beyond this condition number half of the digits are lost (1 / sqrt of the rounding unit), and no
 #: machine is built well enough to know its forces.
@@ -91,13 +91,13 @@ class ConstraintSystem:
             )
         check_velocities(model.nv, "the model")
         self.model = model
-        self.actuated_names = (actuated,) if isinstance(actuated, str) else tuple(actuated)
+        self.actuated_names = names_of(actuated, "actuated joint")
         refuse_twice("actuated joint", self.actuated_names)
         self.equations = equations = ClosureEquations(model, closures, characteristic_length)
         if not model.nv:
             raise MechanismError(f"the tree {model.name!r} has no joints: nothing can move")
-        if not max_condition >= 1:
-            raise InputError(f"max_condition = {max_condition}: it must be at least 1")
+        if not real(max_condition) >= 1:
+            raise InputError(f"max_condition = {shown(max_condition)}: it must be at least 1")
         if effects is not None and effects.damping.size != model.nv:
             raise InputError(f"effects are of {effects.damping.size} velocities, not {model.nv}")
         self.data = equations.data
@@ -194,7 +194,7 @@ class ConstraintSystem:
             If there is no such joint or coordinate (says which there are), or one comes twice.
         """
         indices: list[int] = []
-        for name in joints:
+        for name in names_of(joints, f"joint {purpose}"):
             found = named_velocities(self.model, name)
             if found is None:
                 raise MechanismError(f"no joint {name!r} {purpose}; {self._possible(name)}")
@@ -215,17 +215,25 @@ class ConstraintSystem:
         """Return the velocities of joints, each named once; the actuated ones if left out."""
         if joints is None:
             return self.actuated
-        refuse_twice("independent joint", list(joints))
-        return self.velocity_indices(joints, "to move independently")
+        names = names_of(joints, "independent joint")
+        refuse_twice("independent joint", names)
+        return self.velocity_indices(names, "to move independently")
 
     def frame(self, name: str) -> int:
         """Return the index of a frame, or say which frames there are."""
+        if not isinstance(name, str):
+            raise MechanismError(f"no frame {shown(name)}: frames are given by their names")
         if name not in self._frame_ids:
             self._frame_ids[name] = frame_id(self.model, name)
         return self._frame_ids[name]
 
     def by_frame(self, wrenches: Wrenches | None) -> dict[int, Array]:
         """Return wrenches, checked, by frame index."""
+        if not isinstance(wrenches, Mapping | None):
+            raise InputError(
+                f"wrenches = {shown(wrenches)}: they must be given by frame name, "
+                '{"platform": (force, moment)}'
+            )
         return {
             self.frame(name): real_vector(value, 6, f"the wrench at frame {name!r}")
             for name, value in (wrenches or {}).items()

@@ -49,7 +49,7 @@ from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.validation import choice, numbers, real, whole_number
+from rps_pin.validation import choice, numbers, positive_number, real, whole_number
 
 Space = Literal["actuator", "task"]
 
@@ -144,6 +144,7 @@ class Controller(ABC):
         compiled: Compiled = "auto",
     ) -> None:
         p = robot.parameters
+        period = positive_number(period, "period", "s")
         if not isinstance(gains, Gains):
             raise InputError(f"gains must be Gains, not {type(gains).__name__}")
         if not 0.0 < real(stop_singular) < real(near_singular):

@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 from scipy.integrate import trapezoid
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, SingularityError
+from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.rps.kinematics.legs import PoseLegs, legs_of_pose
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_events import PathCheck
 from rps_pin.rps.singularity.path_refusal import require_clear
 from rps_pin.trajectories.path import Trajectory
+from rps_pin.validation import real
 
 Progress = Callable[[Iterable[int]], Iterable[int]]
 
@@ -246,8 +247,8 @@ def crossed_singularity(before: float, after: float, robot: RPSRobot) -> Singula
 
 def sample_times(duration: float, sample_rate: float) -> Array:
     """Return times from 0 at a rate (Hz), and the duration itself as the last one, s."""
-    if not (math.isfinite(sample_rate) and sample_rate > 0):
-        raise InputError(f"sample rate = {sample_rate}: it must be a positive number of Hz")
+    if not 0 < real(sample_rate) < math.inf:
+        raise InputError(f"sample rate = {shown(sample_rate)}: it must be a positive number of Hz")
     if duration * sample_rate > _MOST_SAMPLES:
         raise InputError(
             f"{sample_rate:g} Hz for {duration:g} s would be {duration * sample_rate:.3g} samples; "

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
-from rps_pin.errors import InputError, SingularityError, UnreachableError
+from rps_pin.errors import InputError, SingularityError, UnreachableError, shown
 from rps_pin.rps.dynamics.motion_run import crossed_singularity, sample_times, singular_sample
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, ActuatorSizing, Margin, SizingSheet
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.measures import singularity_measures
 from rps_pin.rps.singularity.path_refusal import require_clear
 from rps_pin.trajectories.path import Trajectory
-from rps_pin.validation import real_array
+from rps_pin.validation import real, real_array
 
 
 def size_trajectory(
@@ -113,8 +113,8 @@ def size_actuators(
         If times do not increase, shapes do not fit, or the threshold is not between 0 and 1.
     """
     times = _checked_time(time)
-    if not 0 < threshold < 1:
-        raise InputError(f"threshold = {threshold}: it must be between 0 and 1")
+    if not 0 < real(threshold) < 1:
+        raise InputError(f"threshold = {shown(threshold)}: it must be between 0 and 1")
     given = (("force", force), ("speed", speed), ("length", length))
     arrays = [_samples(value, name, len(times)) for name, value in given]
     actuators = tuple(
