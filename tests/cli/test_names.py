@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rps_pin import ClosedLoopModel
 from tests.cli.commands import rps_pin
 
 MODELS = Path(__file__).parents[2] / "urdf"
@@ -23,6 +24,8 @@ def test_a_mechanism_s_name(tmp_path: Path, name: str) -> None:
     text = [f"name: {json.dumps(name)}" if one.startswith("name:") else one for one in text]
     (tmp_path / "m.yaml").write_text("\n".join(text), "utf-8")
     (tmp_path / "four_bar.urdf").write_bytes((MODELS / "four_bar.urdf").read_bytes())
+    text = str(ClosedLoopModel.load(tmp_path / "m.yaml").describe())  # from Python, too
+    assert text.startswith(f"{shown(name)}: ")
     for words in (("describe", "m.yaml"), ("simulate", "m.yaml", "--duration", "0.002")):
         ended = rps_pin(*words, folder=tmp_path)
         assert ended.returncode == 0, ended.stderr

@@ -23,6 +23,7 @@ from rps_pin.closed_loop.freedoms import NAMED, Freedom, freedoms, of_actuators
 from rps_pin.closed_loop.regular import actuated_rank, regular_near
 from rps_pin.errors import few
 from rps_pin.numerics.linear_algebra import rank, singular_values
+from rps_pin.plain_text import plain
 
 _JOINT_KINDS = {
     "JointModelR": "revolute",
@@ -209,7 +210,7 @@ class MechanismDescription:
                 f"{self.tolerance:.2g} count as zero"
             )
         lines += [f"note: {note}" for note in self.notes]
-        return "\n".join(lines)
+        return plain("\n".join(lines))
 
     def verdict(self) -> str:
         """Return the actuation in words."""
