@@ -176,6 +176,11 @@ class ClosureEquations:
         self._open_points, self._open_frames = self._open_tests()
         self._only_spherical = len(self._open_points) == len(self.closures)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Give copies scratch memory of their own."""
+        given = self.model, self.closures, self.length
+        return type(self), given, {"open_limit": self.open_limit}
+
     def rows(self, closure: str) -> slice:
         """Return the rows of a closure by its name, or say which there are."""
         start = 0

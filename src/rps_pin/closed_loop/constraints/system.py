@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -122,6 +122,19 @@ class ConstraintSystem:
         self.limits = JointLimits(model)
         self._frame_ids: dict[str, int] = {}
         self.guard = Guard()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out scratch memory, and factorisations, which are made again when needed."""
+        state = self.__dict__.copy()
+        for name in ("data", "guard", "springs", "factorisation"):
+            state.pop(name, None)
+        return state | {"completion": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.data, self.guard, self.springs = self.equations.data, Guard(), None
+        if self.effects is not None and self.effects.stiffness.any():
+            self.springs = Springs(self.model, self.effects)
 
     # Rule of rank ---------------------------------------------------------------------------------
 

@@ -14,6 +14,8 @@ the dynamics are those of `forward_dynamics`: smooth in q and v, also off the ma
 
 from __future__ import annotations
 
+from typing import Any
+
 import eigenpy
 import numpy as np
 import pinocchio as pin
@@ -58,6 +60,14 @@ class ClosedManifold:
         self._combined: Array | None = None
         self._choose(q)
         refuse_lost_rows(system, q, self._system.decomposed(self._equations.jacobian(q)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the factorisation's memory."""
+        return {name: value for name, value in vars(self).items() if name != "_factors"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._factors = eigenpy.PartialPivLU(max(self._rank, 1))
 
     # Gaps -----------------------------------------------------------------------------------------
 

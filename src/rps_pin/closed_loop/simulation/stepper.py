@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -13,7 +15,7 @@ from rps_pin.one_thread import one_thread
 from rps_pin.validation import positive_number, real_vector, whole_number
 
 
-@one_thread("_guard")
+@one_thread("_system.guard")
 class Stepper:
     """Simulation with fixed steps and projection, as `simulate` does it, one call at a time.
 
@@ -51,12 +53,15 @@ class Stepper:
         *,
         wrenches: Wrenches | WrenchesInTime | None = None,
     ) -> None:
-        system = mechanism.system
-        self._guard = system.guard
+        self._system = system = mechanism.system
         self._drive = Drive(system, None, None, wrenches)
         self.q, self.v = closed_start(system, q, v)
         self._motion = Motion(system, (self.q, self.v), self._drive, 0.0)
         self.time, self.gap = 0.0, self._motion.gap(self.q)
+
+    def __copy__(self) -> Stepper:
+        """Return one with scratch memory of its own."""
+        return deepcopy(self)
 
     def advance(self, tau: ArrayLike, duration: float, steps: int = 1) -> None:
         """Move on under constant actuator forces.

@@ -8,6 +8,7 @@ actuators' limits; a length passes the encoders.
 from __future__ import annotations
 
 from collections import deque
+from copy import deepcopy
 
 import numpy as np
 import pinocchio as pin
@@ -29,7 +30,7 @@ _LENGTHS = [1, 3, 5]
 _EXACT = Encoders()
 
 
-@one_thread("robot.mechanism.system.guard")
+@one_thread("_stepper._system.guard")
 class Plant:
     """A 3-RPS under control.
 
@@ -90,6 +91,10 @@ class Plant:
         self.applied: Array = np.clip(hold, -self._limit, self._limit)
         self._queue = deque([hold] * delay)
         self._generator = encoders.generator()
+
+    def __copy__(self) -> Plant:
+        """Return one with scratch memory and a state of its own."""
+        return deepcopy(self)
 
     def step(self, forces: ArrayLike) -> None:
         """Take a command and advance by a period.
