@@ -12,7 +12,9 @@ import pytest
 
 from rps_pin import ClosedLoopModel, RPSRobot
 from rps_pin.closed_loop import Stepper
-from rps_pin.control import Plant
+from rps_pin.control import ComputedTorque, Gains, Plant
+from rps_pin.control.estimator.real_time_robot import RealTimeRobot
+from rps_pin.errors import RPSPinError
 
 _POSE = np.array([0.223, 0.02, -0.01])
 COPIES: dict[str, Callable[[Any], Any]] = {
@@ -63,3 +65,13 @@ def test_copies_of_a_plant_go_their_own_way(how: str) -> None:
     np.testing.assert_allclose(three.configuration, one.configuration, rtol=0, atol=1e-13)
     assert np.abs(two.speed - one.speed).max() > 1e-3
     assert np.isfinite(two.robot.inverse_dynamics(*robot.state(_POSE, _POSE, _POSE)).tau).all()
+
+
+@pytest.mark.parametrize("how", COPIES)
+def test_copies_of_what_generated_code_writes_to_are_refused(how: str) -> None:
+    """They shared forces and estimate (copy), or ended in Boost's RuntimeError."""
+    robot = RPSRobot.from_preset("micro")
+    controller = ComputedTorque(robot, _POSE, Gains.placed(15.0), compiled=False)
+    for one in (controller, RealTimeRobot(robot, _POSE, compiled=False)):
+        with pytest.raises(RPSPinError, match="make another one with the same arguments"):
+            COPIES[how](one)

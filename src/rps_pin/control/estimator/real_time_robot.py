@@ -31,6 +31,7 @@ from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.status import STATUSES, Status
+from rps_pin.errors import RPSPinError
 from rps_pin.rps.kinematics.forward_kinematics import CONDITION_LIMIT, start_of
 from rps_pin.rps.kinematics.tracking import LegDirections, Triple, follow
 from rps_pin.rps.robot import RPSRobot
@@ -173,6 +174,13 @@ class RealTimeRobot:
     def compiled(self) -> bool:
         """Whether generated code runs."""
         return self.generated is not None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Refuse copies: they would share the memory that ticks write to."""
+        raise RPSPinError(
+            f"a {type(self).__name__} cannot be copied or pickled, since generated code writes to "
+            "its memory: make another one with the same arguments"
+        )
 
     def reset(self, near: ArrayLike) -> None:
         """Start again from a pose, at rest and without forces. Raises as the constructor does."""
