@@ -139,6 +139,8 @@ def test_what_cannot_be_is_told_before_anything_is_written(
     ("options", "words"),
     [
         (["--payload", "-1"], "payload mass = -1"),
+        (["--payload", "1e200"], "payload mass = 1e+200"),
+        (["--wrench", "1e308", *"00000"], "--wrench = 1e+308"),
         (["--payload-centre", "0", "0", "0.1"], "give its mass"),
         (["--power", "0"], "power limit = 0"),
         (["--rate", "nan"], "Hz"),

@@ -147,6 +147,8 @@ _FLOATING = """<mujoco model="floating"><worldbody>
 _WRONG_VALUES = [
     (["nowhere=1"], "no joint 'nowhere' to give a value; there are: crank_joint, coupler_joint"),
     (["crank_joint=abc"], "'crank_joint=abc': it must be JOINT=NUMBER"),
+    (["crank_joint=1_0"], "'crank_joint=1_0': it must be JOINT=NUMBER"),
+    (["crank_joint=٣"], "'crank_joint=٣': it must be JOINT=NUMBER"),
     (["crank_joint"], "'crank_joint': it must be JOINT=NUMBER"),
     (["crank_joint=nan"], "the value of joint 'crank_joint' is not finite"),
     (["crank_joint=1", "crank_joint=2"], "joint 'crank_joint' is named twice"),

@@ -24,6 +24,7 @@ from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.path import end_states
+from rps_pin.validation import finite_number
 
 Six = tuple[float, float, float, float, float, float]
 
@@ -87,6 +88,8 @@ def dynamics_command(
     machine = common.load_robot(robot)
     if payload is None and any(payload_centre):
         raise InputError("--payload-centre is the place of a payload: give its mass with --payload")
+    for force in wrench or ():
+        finite_number(force, "--wrench", "N or N m")
     if gravity is not None:
         machine = RPSRobot(machine.parameters.replace(gravity=gravity))
     if payload is not None:

@@ -143,6 +143,8 @@ def by_joint(pairs: Sequence[str], option: str) -> dict[str, float]:
     for pair in pairs:
         name, _, number = pair.rpartition("=")
         try:
+            if "_" in number or not number.isascii():  # which Python's float takes
+                raise ValueError
             value = float(number)
         except ValueError:
             name = ""

@@ -79,8 +79,6 @@ def urdf_shapes(
     def mesh(attributes: dict[str, str]) -> str:
         name = attributes.get("filename", "")
         found = str(file_of(name, urdf, package_path).absolute())
-        with opened(found, "mesh"):  # else a FIFO is waited for
-            pass
         try:
             scale = np.array(attributes.get("scale", "1 1 1").split(), dtype=np.float64)
             triangles = loader.load(found, np.broadcast_to(scale, 3).copy())

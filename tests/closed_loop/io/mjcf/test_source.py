@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import subprocess
 import sys
@@ -335,3 +336,18 @@ def test_importing_the_package_does_not_import_mujoco() -> None:
 
 def test_the_name_is_the_models() -> None:
     assert ClosedLoopModel.from_mjcf(mujoco_file(BODY)).name == "m"
+
+
+@each("asset", ['<mesh name="m" file="f"/>', '<texture name="t" type="2d" file="f"/>', None])
+def test_a_fifo_is_refused_not_waited_for(asset: str | None, tmp_path: Path) -> None:
+    fifo = tmp_path / "parts" / "f"
+    fifo.parent.mkdir(exist_ok=True)
+    fifo.unlink(missing_ok=True)
+    os.mkfifo(fifo)
+    inside = '<include file="parts/f"/>' if asset is None else f"<asset>{asset}</asset>"
+    (tmp_path / "m.xml").write_text(
+        f'<mujoco><compiler assetdir="parts"/>{inside}<worldbody><body><joint name="j"/>'
+        '<geom size=".1"/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(MechanismError, match=r"m\.xml, line 1: .*f' is not a regular file"):
+        parts_from_mjcf(tmp_path / "m.xml")

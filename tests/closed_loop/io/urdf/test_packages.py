@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import warnings
 from pathlib import Path
@@ -202,3 +203,12 @@ def test_folders_of_packages_can_be_given(tmp_path: Path) -> None:
     assert "no package 'pkg'" in shapes(tmp_path / "robot", mesh(URI))[1]
     found, told = shapes(tmp_path / "robot", mesh(URI), package_path=[tmp_path / "ws"])
     assert (found.ngeoms, told) == (1, "")
+
+
+def test_a_mesh_that_is_a_fifo_is_not_waited_for(tmp_path: Path) -> None:
+    urdf = tmp_path / "r.urdf"
+    shape = '<visual><geometry><mesh filename="f.stl"/></geometry></visual>'
+    urdf.write_text(f'<robot name="r"><link name="a">{shape}</link></robot>')
+    os.mkfifo(tmp_path / "f.stl")
+    with pytest.warns(UserWarning, match=r"not drawn: 'f.stl': no file"):
+        assert visual_model(urdf, model_from_urdf(urdf)) is None

@@ -8,7 +8,9 @@ files it counts: the text begins with so many empty lines that none of its own h
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Collection, Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.sax.saxutils import quoteattr
@@ -22,6 +24,9 @@ from rps_pin.files import opened
 
 #: How deep files include or attach others, at most.
 DEEPEST = 100
+
+#: Attributes of ``compiler`` that name folders of files.
+_FOLDERS = ("meshdir", "texturedir", "assetdir")
 
 
 class Place(NamedTuple):
@@ -91,6 +96,7 @@ class MjcfFiles:
                 if event == "start":
                     self._attached.append(place)
                     models += [(model, (*chain, model))] if model else []
+        self._refuse_irregular()
         self._first = max((place.line for place in self._attached), default=0)
 
     @property
@@ -142,6 +148,17 @@ class MjcfFiles:
                 return f"{path}: {error}"
         return ""
 
+    def _refuse_irregular(self) -> None:
+        """Refuse files, of meshes too, that MuJoCo would wait for: FIFOs and devices."""
+        places = (*self._places, *self._attached)
+        inside = {place.xml.get(name) or "" for place in places for name in _FOLDERS} | {""}
+        for place in places:
+            names = [value for key, value in place.xml.attrib.items() if key.startswith("file")]
+            folders = {self.folder, Path(place.file).parent}
+            for name, folder, part in product(names, folders, inside):
+                if _is_irregular(str(folder / part / name)):
+                    raise MechanismError(f"{place}: {name!r} is not a regular file")
+
     # Reading --------------------------------------------------------------------------------------
 
     def _walk(
@@ -178,6 +195,15 @@ class MjcfFiles:
             return None
         self._others.append(path)
         return _root(_content(path), str(path))
+
+
+def _is_irregular(path: str) -> bool:
+    """Return whether there is something that is neither a file nor a folder."""
+    try:
+        kind = os.stat(path).st_mode  # noqa: PTH116 (no error where a name is too long)
+    except (OSError, ValueError):
+        return False
+    return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
 
 
 def _other(place: Place, folders: Sequence[Path], chain: Sequence[Path]) -> Path | None:
