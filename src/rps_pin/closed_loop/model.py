@@ -63,7 +63,7 @@ _REFERENCES = {
 }
 
 
-@one_thread("system.guard", besides=("inverse_dynamics",), properties=("home",))
+@one_thread("system.guard", besides=("inverse_dynamics", "forward_dynamics"), properties=("home",))
 class ClosedLoopModel:
     """Any mechanism: an open tree whose loops are closed by Pinocchio constraint models.
 
@@ -1048,10 +1048,16 @@ class ClosedLoopModel:
             warnings.warn(
                 "method='proximal' is deprecated and computed as 'reduced'; leave method out",
                 DeprecationWarning,
-                stacklevel=3,
+                stacklevel=2,
             )
-        q_, v_ = self._configuration(q), self._velocity(v)
-        return forward_dynamics(self.system, q_, v_, self._forces(tau), wrenches)
+        q_, v_, tau_ = self._configuration(q), self._velocity(v), self._forces(tau)
+        guard = self.system.guard
+        if not guard.acquire(False):
+            refuse_second_thread(self)
+        try:
+            return forward_dynamics(self.system, q_, v_, tau_, wrenches)
+        finally:
+            guard.release()
 
     def mass_matrix(self, q: ArrayLike, independent: Sequence[str] | None = None) -> Array:
         """Return the reduced mass matrix T' M T, shape (m, m); T of `motion_basis`.
