@@ -9,7 +9,7 @@
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test docs bench wheel lint format setup setup-dev clean distclean
+.PHONY: help demo test test-lowest docs bench wheel lint format setup setup-dev clean distclean
 
 # A sourced ROS or openrobots environment must not put its own pinocchio before ours.
 unexport PYTHONPATH
@@ -31,6 +31,9 @@ demo: setup ## follow a helix with the 3-RPS robot; results go to demo/
 
 test: setup-dev ## lint, format check, types, documentation and all tests; installs or finds Chromium
 	@sh tools/check lint format types docs tests
+
+test-lowest: ## the tests that use each dependency, with the lowest versions allowed (by uv)
+	@sh tools/check-lowest "$$PWD/build/lowest"
 
 docs: setup-dev ## build the documentation into build/docs, warnings are errors
 	@sh tools/check docs

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from rps_pin.cli.doctor import _BROWSERS, PARTS, _browser, _cache, _compilers
+from rps_pin.cli.doctor import _BROWSERS, PARTS, _browser, _cache, _compilers, _unmet
 from rps_pin.viewer.files.browser import BROWSERS
 from tests import processes
 from tests.cli.commands import rps_pin
@@ -71,6 +71,38 @@ def test_it_speaks_without_others_too(module: str) -> None:
     assert run.returncode == 1
     assert f"MISSING {module} " in run.stdout
     assert f"pip install {module}" in run.stdout
+
+
+def test_versions_that_pyproject_excludes_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = ["h5py>=3.11", "pin<5,>=4.1", 'casadi>=3.6.5; extra == "compile"', "lazy-loader"]
+    asked += ["cupy-cuda12x[ctk]>=14; extra == 'cuda'"]
+    monkeypatch.setattr("importlib.metadata.requires", lambda name: asked)
+    wrong = {
+        "h5py": (["3.10.0", "3.9", "2.99"], ">=3.11"),
+        "pin": (["4.0.9", "5.0", "5", "12.1"], ">=4.1,<5"),
+        "casadi": (["3.6.4", "3.6"], ">=3.6.5"),
+        "cupy-cuda12x": (["13.6.0"], ">=14"),
+    }
+    for name, (versions, wanted) in wrong.items():
+        assert [_unmet(name, version) for version in versions] == [wanted] * len(versions)
+    right = {"h5py": ["3.11", "3.11.0", "3.110", "4.0"], "pin": ["4.1", "4.1.0", "4.99.1"]}
+    right |= {"casadi": ["3.6.5", "3.7.0rc1"], "lazy-loader": ["0.1"], "numpy": ["1.0"]}
+    for name, versions in right.items():
+        assert [_unmet(name, version) for version in versions] == [""] * len(versions), name
+
+
+def test_an_old_package_is_an_error_of_the_installation() -> None:
+    code = """
+import importlib.metadata, sys
+from rps_pin.cli.doctor import doctor
+
+version = importlib.metadata.version
+importlib.metadata.version = lambda name: "1.0" if name == "h5py" else version(name)
+sys.exit(doctor())
+"""
+    run = processes.run([sys.executable, "-c", code])
+    assert run.returncode == 1
+    assert "1.0 does not do: pip install 'h5py>=3.1" in run.stdout
 
 
 def test_a_browser_that_is_a_stub_is_no_browser(

@@ -11,6 +11,7 @@ import importlib.metadata
 import json
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -128,6 +129,9 @@ def _package(part: Part, importing: bool) -> Finding:
     version = trouble = ""
     try:
         version = importlib.metadata.version(part.name)
+        wanted = _unmet(part.name, version)
+        if wanted:
+            trouble = f"{version} does not do: pip install '{part.name}{wanted}'"
         if importing:
             importlib.import_module(part.module)
     except Exception as error:  # whatever a broken package raises
@@ -136,6 +140,31 @@ def _package(part: Part, importing: bool) -> Finding:
             get = "apt-get install libgomp1"
         trouble = f"{f'it does not import ({words})' if version else 'not installed'}: {get}"
     return Finding(part.name, version, part.purpose, part.extra is None, trouble)
+
+
+def _unmet(name: str, version: str) -> str:
+    """Return what rps-pin asks of a package's version, ">=3.11", if that is not met; else ""."""
+    try:
+        asked = importlib.metadata.requires("rps-pin") or []
+    except importlib.metadata.PackageNotFoundError:  # not installed, which is told elsewhere
+        return ""
+    for one in asked:
+        found = re.fullmatch(r"([\w.-]+)(?:\[[^]]*\])?\s*\(?([^;)]*)\)?(;.*)?", one.strip())
+        if found is None or found[1] != name:
+            continue
+        bounds = re.findall(r"(>=|<)\s*([\d.]+)", found[2])
+        have = _numbers(version)
+        if any((have < _numbers(limit)) is (sign == ">=") for sign, limit in bounds):
+            return ",".join(sign + limit for sign, limit in sorted(bounds, reverse=True))
+    return ""
+
+
+def _numbers(version: str) -> list[int]:
+    """Return [3, 11] of "3.11.0rc1": zeros at the end do not count."""
+    numbers = [int(part) for part in re.match(r"[\d.]*", version)[0].split(".") if part]  # type: ignore[index]
+    while numbers and numbers[-1] == 0:
+        numbers.pop()
+    return numbers
 
 
 def _pinocchio_parts() -> Finding:
