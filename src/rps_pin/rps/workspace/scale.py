@@ -72,7 +72,7 @@ def workspace_to_file(
     Memory does not depend on the grid's size: a few blocks for each worker. Any interruption
     (Ctrl-C, SIGTERM and SIGHUP included) leaves no file, and what stood at `path` before untouched.
     If the process is killed its workers end too, and the next file that is written to the folder
-    clears away what it left (see `rps_pin.files.whole_file`).
+    clears away what it left (see ``rps_pin.files.whole_file``).
 
     Parameters
     ----------
