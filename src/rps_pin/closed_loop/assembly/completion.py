@@ -103,7 +103,7 @@ def _within_limits(system: ConstraintSystem, q: Array, given: Mapping[str, Array
     """Return the configuration within the joint limits: angles may be turned by whole turns."""
     limits = system.limits
     x = q[limits.q]
-    out = (x < limits.lower - AT_LIMIT) | (x > limits.upper + AT_LIMIT)
+    out = limits.beyond(q, AT_LIMIT)
     out &= np.array([name not in given for name in limits.names], dtype=bool)
     if not out.any():
         return q

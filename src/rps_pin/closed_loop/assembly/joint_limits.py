@@ -36,13 +36,21 @@ class JointLimits:
         clipped[self.q] = np.clip(q[self.q], self.lower, self.upper)
         return clipped
 
+    def beyond(self, q: Array, slack: float = 0.0) -> Bools:
+        """Return which coordinates are outside their limits by more than a slack, shape (..., n).
+
+        Of configurations of shape (..., nq).
+        """
+        x = q[..., self.q]
+        return np.asarray((x < self.lower - slack) | (x > self.upper + slack))
+
     def outside(self, q: Array) -> dict[str, str]:
         """Return a phrase for each joint outside its limits, by its name."""
         x = q[self.q]
         return {
             self.names[i]: f"{self.names[i]!r} at {x[i]:.6g} ({self.lower[i]:.6g} to "
             f"{self.upper[i]:.6g})"
-            for i in np.flatnonzero((x < self.lower) | (x > self.upper))
+            for i in np.flatnonzero(self.beyond(q))
         }
 
     def blocked(self, q: Array, step: Array) -> Bools:

@@ -252,9 +252,8 @@ class _Search:
     def _is_outside(self, q: Array) -> bool:
         if not self._within_limits:
             return False
-        limits = self._system.limits
-        x = self._same.within_a_turn(q, self._held)[limits.q]
-        return bool(((x < limits.lower - AT_LIMIT) | (x > limits.upper + AT_LIMIT)).any())
+        within = self._same.within_a_turn(q, self._held)
+        return bool(self._system.limits.beyond(within, AT_LIMIT).any())
 
     def _known(self, places: Array, near: float) -> int | None:
         """Return which mode found so far is at these places."""

@@ -41,10 +41,8 @@ class RandomStarts:
         self._lower, self._width = centre - reach, 2 * reach
         if within_limits:
             lower, upper = limits.lower[~held[limits.v]], limits.upper[~held[limits.v]]
-            width = np.maximum(
-                upper / 2 - lower / 2, 0.0
-            )  # half: limits may be the largest numbers
-            self._width = 2 * np.minimum(reach, width)
+            half = np.maximum(upper / 2 - lower / 2, 0.0)  # limits may be the largest numbers
+            self._width = 2 * np.minimum(reach, half)
             self._lower = np.clip(self._lower, lower, np.maximum(upper - self._width, lower))
 
     def drawn(self, rng: np.random.Generator, count: int) -> Array:

@@ -38,8 +38,8 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.couplings import JointCoupling
-from rps_pin.errors import MechanismError, shown
-from rps_pin.validation import real
+from rps_pin.errors import InputError, MechanismError, shown
+from rps_pin.validation import numbers, real
 
 __all__ = [
     "KINDS",
@@ -197,12 +197,12 @@ class LoopClosure:
                 f"closure {self.name!r}: {option} does not belong to kind {self.kind!r}, only to "
                 f"{', '.join(taken)}"
             )
-        numbers = _real_numbers(given)
-        if numbers.shape != (3,):
+        vector = _real_numbers(given)
+        if vector.shape != (3,):
             raise MechanismError(
                 f"closure {self.name!r}: {option} = {given!r} must be three numbers"
             )
-        x, y, z = numbers.tolist()
+        x, y, z = vector.tolist()
         length = math.hypot(x, y, z)
         if not 0 < length < math.inf:
             raise MechanismError(f"closure {self.name!r}: {option} = {given!r} has no direction")
@@ -272,12 +272,11 @@ Closure = LoopClosure | JointCoupling
 
 
 def _real_numbers(given: Any) -> Array:
-    """Return a copy as float64; empty if it is ragged, complex, of truth values or of texts."""
+    """Return a copy as float64; empty if it holds no real numbers (see `validation.numbers`)."""
     try:
-        array = np.array(given)
-    except ValueError:
+        return numbers(given, "", "").copy()
+    except InputError:
         return np.empty(0)
-    return array.astype(np.float64) if array.dtype.kind in "iuf" else np.empty(0)
 
 
 def joint_id(model: pin.Model, name: str, asked_by: str) -> int:

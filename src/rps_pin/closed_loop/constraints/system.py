@@ -64,8 +64,6 @@ class ConstraintSystem:
         By which the rank of the closures' Jacobian is decided; found out when first asked for.
     effects : JointEffects or None
         Passive joint forces.
-    springs : Springs or None
-        None where no joint has one.
     limits : JointLimits
     max_condition : float
     guard : lock
@@ -116,9 +114,8 @@ class ConstraintSystem:
         self.ranks: tuple[int, int] | None = None
         #: For actuators that are more or fewer than the motions, or not independent, once needed.
         self.completion: CompletedFactorisation | None = None
-        self.effects, self.springs = effects, None
-        if effects is not None and effects.stiffness.any():
-            self.springs = Springs(model, effects)
+        self.effects = effects
+        _ = self.springs  # refuses what can have none
         self.limits = JointLimits(model)
         self._frame_ids: dict[str, int] = {}
         self.guard = Guard()
@@ -132,9 +129,14 @@ class ConstraintSystem:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self.data, self.guard, self.springs = self.equations.data, Guard(), None
-        if self.effects is not None and self.effects.stiffness.any():
-            self.springs = Springs(self.model, self.effects)
+        self.data, self.guard = self.equations.data, Guard()
+
+    @cached_property
+    def springs(self) -> Springs | None:
+        """Springs of the joints; None where no joint has one."""
+        if self.effects is None or not self.effects.stiffness.any():
+            return None
+        return Springs(self.model, self.effects)
 
     # Rule of rank ---------------------------------------------------------------------------------
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import os
 import re
-from typing import Any
+from typing import Any, BinaryIO
 
 from lxml import etree
 
@@ -59,16 +59,22 @@ def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
     else:
         origin = text
         with opened(text, form) as file:
-            content = file.read(LARGEST_XML + 1)
-            if len(content) > LARGEST_XML:
-                raise InputError(
-                    f"the {form} {origin} has more than {LARGEST_XML} bytes, the most that is read"
-                )
+            content = read_whole(file, origin, form)
             _refuse_known(content, origin, form)
             text = _decoded(content)
     if len(text) > LARGEST_XML:
         raise InputError(f"{origin} has more than {LARGEST_XML} characters, the most that is read")
     return _without_declaration(text), origin
+
+
+def read_whole(file: BinaryIO, origin: str, form: str) -> bytes:
+    """Return the content of an open file; `InputError` if it is larger than `LARGEST_XML`."""
+    content = file.read(LARGEST_XML + 1)
+    if len(content) > LARGEST_XML:
+        raise InputError(
+            f"the {form} {origin} has more than {LARGEST_XML} bytes, the most that is read"
+        )
+    return content
 
 
 def _without_declaration(text: str) -> str:
@@ -129,21 +135,27 @@ def xml_root(text: str, origin: str, form: str) -> Any:
     MechanismError
         If it is not XML, or declares a document type.
     """
-    content, parser = text.encode("utf-8", "surrogatepass"), _parser()
+    content, strict = text.encode("utf-8", "surrogatepass"), parser()
     try:
-        root = etree.fromstring(content, parser)
+        root = etree.fromstring(content, strict)
     except etree.XMLSyntaxError as error:
-        if any(entry.domain != etree.ErrorDomains.NAMESPACE for entry in parser.error_log):
+        if any(entry.domain != etree.ErrorDomains.NAMESPACE for entry in strict.error_log):
             why = str(error).replace(", use XML_PARSE_HUGE option", "")
             raise MechanismError(f"{origin} is not a valid {form}: {why}") from None
         # A prefix that the file does not declare, as most readers of robots do not ask for.
-        root = etree.fromstring(content, _parser(recover=True))
+        root = etree.fromstring(content, parser(recover=True))
     if root.getroottree().docinfo.doctype:
         raise MechanismError(f"{origin} declares a document type, which no {form} needs: refused")
     return root
 
 
-def _parser(recover: bool = False) -> etree.XMLParser:
+def parser(*, recover: bool = False, huge_tree: bool = False) -> etree.XMLParser:
+    """Return a parser of UTF-8 that expands and fetches nothing."""
     return etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, encoding="utf-8", recover=recover
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        encoding="utf-8",
+        recover=recover,
+        huge_tree=huge_tree,
     )

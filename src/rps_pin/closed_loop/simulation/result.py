@@ -152,21 +152,19 @@ class Recorder:
     def watch(self, time: float, q: Array) -> None:
         """Note the joints that are outside their limits for the first time."""
         limits = self._limits
-        x = q.take(limits.q)
-        outside = (x < limits.lower) | (x > limits.upper)
+        outside = limits.beyond(q)
         if not outside.any():
             return
         for index in np.flatnonzero(outside & self._watched):
             self._watched[index] = False
+            value = float(q[limits.q[index]])
             lower, upper = float(limits.lower[index]), float(limits.upper[index])
-            passed = JointLimitPassed(limits.names[index], time, float(x[index]), lower, upper)
+            passed = JointLimitPassed(limits.names[index], time, value, lower, upper)
             self._passed.append(passed)
 
     def watch_all(self, time: Array, q: Array) -> None:
         """Watch all rows (n,) and (n, nq) of a motion."""
-        x = q[:, self._limits.q]
-        outside = ((x < self._limits.lower) | (x > self._limits.upper)).any(axis=1)
-        for row in np.flatnonzero(outside):
+        for row in np.flatnonzero(self._limits.beyond(q).any(axis=1)):
             self.watch(float(time[row]), q[row])
 
     def whole(self, columns: Mapping[str, Array]) -> Simulation:

@@ -369,8 +369,7 @@ class CompiledMechanism:
         limits = self.mechanism.system.limits
 
         def outside(q: Array) -> Any:
-            x = q[..., limits.q]
-            return ((x < limits.lower) | (x > limits.upper)).any(axis=-1)
+            return limits.beyond(q).any(axis=-1)
 
         refused = outside if within_limits and limits.q.size else None
         return np.asarray(self._run(name, given, answer, refused=refused, **options)[0])

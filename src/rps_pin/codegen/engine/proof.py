@@ -207,16 +207,12 @@ class Proof:
         step = -system.column_scale * factors.least_norm(gaps)
         return np.asarray(pin.integrate(self._m.model, q, step))
 
-    def _dependent_factors(self, q: Array) -> Decomposition:
-        """Return the factors of J_d, in one unit."""
-        system = self._m.system
-        rows = system.scaled(self._m.jacobian(q))[:, self._dependent]
-        return Decomposition(rows, system.rule.tolerance)
-
     def _followers(self, q: Array, right: Array) -> Array:
         """Return the dependent x_d with J_d x_d = right (nc, ...), in the least-squares sense."""
         system = self._m.system
-        solved = self._dependent_factors(q).least_norm((system.row_scale * right.T).T)
+        rows = system.scaled(self._m.jacobian(q))[:, self._dependent]
+        factors = Decomposition(rows, system.rule.tolerance)
+        solved = factors.least_norm((system.row_scale * right.T).T)
         return np.asarray((system.column_scale[self._dependent] * solved.T).T)
 
     def _open_by(self, q: Array) -> float:

@@ -157,9 +157,18 @@ def _closed(system: ConstraintSystem, q: Array) -> Array | None:
 
     Of a rounded file by damped ones, which leave out the nearly redundant rows.
     """
-    equations, tolerance = system.equations, closed_gap(system)
-    start, first = q, np.inf
-    for _ in range(10 if system.rule.rank is None else 0):
+    if system.rule.rank is None:
+        found = _newton(system, q)
+        if found is not None:
+            return found
+    q = close_gaps(system, q, np.zeros(system.model.nv, dtype=bool), False, iterations=30)
+    return q if is_closed(system, q) else None
+
+
+def _newton(system: ConstraintSystem, q: Array) -> Array | None:
+    """Return what Newton's steps of least norm lead to, if they close the loops."""
+    equations, tolerance, first = system.equations, closed_gap(system), np.inf
+    for _ in range(10):
         gaps = equations.gaps(q)
         largest = equations.largest_gap(gaps)
         if largest <= tolerance:
@@ -170,8 +179,7 @@ def _closed(system: ConstraintSystem, q: Array) -> Array | None:
         jacobian = system.scaled(equations.jacobian(q))
         step = _solution(jacobian, None, -system.row_scale * gaps)
         q = pin.integrate(system.model, q, system.column_scale * step)
-    q = close_gaps(system, start, np.zeros(system.model.nv, dtype=bool), False, iterations=30)
-    return q if is_closed(system, q) else None
+    return None
 
 
 def _solution(jacobian: Array, near: Array | None, right: Array | None) -> Array:

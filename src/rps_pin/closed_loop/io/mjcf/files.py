@@ -18,8 +18,8 @@ from xml.sax.saxutils import quoteattr
 from lxml import etree
 
 from rps_pin.closed_loop.io.foreign import refuse_other_formats
-from rps_pin.closed_loop.io.xml_file import LARGEST_XML, without_comments
-from rps_pin.errors import InputError, MechanismError
+from rps_pin.closed_loop.io.xml_file import parser, read_whole, without_comments
+from rps_pin.errors import MechanismError
 from rps_pin.files import opened
 
 #: How deep files include or attach others, at most.
@@ -143,7 +143,7 @@ class MjcfFiles:
         """Return which included or attached file is not XML, where and why; or nothing."""
         for path in self._others:
             try:
-                etree.fromstring(_content(path).encode(), _parser(recover=False))
+                etree.fromstring(_content(path).encode(), parser(huge_tree=True))
             except etree.XMLSyntaxError as error:
                 return f"{path}: {error}"
         return ""
@@ -221,11 +221,7 @@ def _other(place: Place, folders: Sequence[Path], chain: Sequence[Path]) -> Path
 
 def _content(path: Path) -> str:
     with opened(path, "MJCF") as file:
-        content = file.read(LARGEST_XML + 1)
-    if len(content) > LARGEST_XML:
-        raise InputError(
-            f"the MJCF {path} has more than {LARGEST_XML} bytes, the most there may be"
-        )
+        content = read_whole(file, str(path), "MJCF")
     if b"\0" in content[:4]:
         raise MechanismError(f"the MJCF {path} is in UTF-16 or UTF-32; MuJoCo reads UTF-8 alone")
     return content.decode("utf-8", "replace")
@@ -236,20 +232,10 @@ def _root(text: str, origin: str) -> Any:
     if "<!DOCTYPE" in text and "<!DOCTYPE" in without_comments(text):
         raise MechanismError(f"{origin} declares a document type, which no MJCF needs: refused")
     try:
-        return etree.fromstring(text.encode("utf-8", "surrogatepass"), _parser(recover=True))
+        content = text.encode("utf-8", "surrogatepass")
+        return etree.fromstring(content, parser(recover=True, huge_tree=True))
     except etree.XMLSyntaxError:
         return None
-
-
-def _parser(*, recover: bool) -> Any:
-    return etree.XMLParser(
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=True,
-        recover=recover,
-        encoding="utf-8",
-    )
 
 
 def _start_tag(xml: Any, model: Path | None) -> str:
