@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -11,12 +9,13 @@ from rps_pin.closed_loop.constraints.system import Mechanism
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.fixed_step import fixed_step
 from rps_pin.closed_loop.simulation.motion import Drive, Motion, WrenchesInTime, closed_start
+from rps_pin.copies import DeepCopied
 from rps_pin.one_thread import one_thread
 from rps_pin.validation import positive_number, real_vector, whole_number
 
 
 @one_thread("_system.guard")
-class Stepper:
+class Stepper(DeepCopied):
     """Simulation with fixed steps and projection, as `simulate` does it, one call at a time.
 
     Parameters
@@ -58,10 +57,6 @@ class Stepper:
         self.q, self.v = closed_start(system, q, v)
         self._motion = Motion(system, (self.q, self.v), self._drive, 0.0)
         self.time, self.gap = 0.0, self._motion.gap(self.q)
-
-    def __copy__(self) -> Stepper:
-        """Return one with scratch memory of its own."""
-        return deepcopy(self)
 
     def advance(self, tau: ArrayLike, duration: float, steps: int = 1) -> None:
         """Move on under constant actuator forces.

@@ -8,7 +8,7 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
-from rps_pin.errors import CompileError, InputError, did_you_mean
+from rps_pin.errors import CompileError, InputError, RPSPinError, did_you_mean
 
 #: ``void NAME_many(long n, const double *const *in, const long *stride, double *const *out,
 #: int *status)``; pointers are passed as addresses. Python's lock is released while it runs.
@@ -53,6 +53,20 @@ class Library:
         function = MANY(self.address(name))
         function.library = self  # type: ignore[attr-defined]
         return function
+
+    def __copy__(self) -> Library:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Library:
+        """Return this one: code does not change, and has no memory of its own."""
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Refuse to be sent: an address means nothing in another process."""
+        raise RPSPinError(
+            "what has machine code cannot be pickled: make another one with the same arguments, "
+            "or, of a control loop, pickle one with compiled=False"
+        )
 
     def __repr__(self) -> str:
         return f"<Library of {', '.join(self._addresses)}, by {self.compiler}>"

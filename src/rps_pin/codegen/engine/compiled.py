@@ -88,6 +88,19 @@ class CompiledMechanism:
         self._chosen: dict[tuple[str, ...], bool] = {}  # whether these are the independent joints
         self._underactuated = code.partition.actuated_rank < code.partition.independent.size
 
+    def __copy__(self) -> CompiledMechanism:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> CompiledMechanism:
+        """Return this one: it has no state, and serves any number of threads."""
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Refuse to be sent to another process, where the code is not loaded."""
+        raise RPSPinError(
+            f"a {type(self).__name__} cannot be pickled: pickle the mechanism, and compile it again"
+        )
+
     def __repr__(self) -> str:
         return in_one_line(type(self).__name__, self.name, self.mechanism.system)
 

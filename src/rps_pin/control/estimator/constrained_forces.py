@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 import struct
+from typing import Any
 
 import eigenpy
 import numpy as np
@@ -39,6 +40,7 @@ class ConstrainedForces:
     """
 
     def __init__(self, robot: RPSRobot) -> None:
+        self._robot = robot
         system = robot.mechanism.system
         model = self._model = system.model
         self._equations = ClosureEquations(model, system.equations.closures)
@@ -54,6 +56,10 @@ class ConstrainedForces:
             joints = zip(system.effects.damping.tolist(), system.effects.friction, strict=True)
             self._friction = [(i, d, float(f)) for i, (d, f) in enumerate(joints) if d or f]
             self._friction_speed = system.effects.friction_speed
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Give copies scratch memory of their own; there is no state."""
+        return type(self), (self._robot,)
 
     def solve(self, state: RobotState) -> list[float] | None:
         """Return nine reactions, then three forces, N; None where they are not determined.

@@ -11,6 +11,7 @@ and the inertia in actuator space, with d' = K x', is K^-T M_x K^-1.
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -40,6 +41,7 @@ class TaskSpaceInertia:
     """
 
     def __init__(self, robot: RPSRobot) -> None:
+        self._robot = robot
         self._model = robot.mechanism.model
         self._data = self._model.createData()
         self._h = robot.parameters.platform_radius
@@ -47,6 +49,10 @@ class TaskSpaceInertia:
         numbers = np.frombuffer(self._memory)
         self._basis, self._q = numbers[:36].reshape(12, 3, order="F"), numbers[36:]
         self._half = np.triu(np.ones((12, 12)), 1) + np.eye(12) / 2
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Give copies scratch memory of their own; there is no state."""
+        return type(self), (self._robot,)
 
     def of(self, geometry: LegGeometry) -> Array:
         """Return M_x in a pose, shape (3, 3): kg, kg m and kg m^2."""

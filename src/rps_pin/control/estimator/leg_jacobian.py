@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import eigenpy
 import numpy as np
@@ -90,6 +90,10 @@ class LeastSingularValue:
         self._memory = bytearray(_NINE.size)
         self._matrix = np.frombuffer(self._memory).reshape(3, 3, order="F")
         self._svd = eigenpy.HhJacobiSVD(3, 3)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Give copies memory of their own; there is no state."""
+        return type(self), ()
 
     def of(self, jacobian: LegJacobian) -> float:
         """Return the distance to a type II singularity, `SingularityMeasures.type_ii`."""

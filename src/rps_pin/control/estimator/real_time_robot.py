@@ -31,7 +31,7 @@ from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.status import STATUSES, Status
-from rps_pin.errors import RPSPinError
+from rps_pin.copies import DeepCopied
 from rps_pin.rps.kinematics.forward_kinematics import CONDITION_LIMIT, start_of
 from rps_pin.rps.kinematics.tracking import LegDirections, Triple, follow
 from rps_pin.rps.robot import RPSRobot
@@ -42,13 +42,13 @@ _ZERO = (0.0, 0.0, 0.0)
 _NO_FORCES = 1e-8
 
 
-class RealTimeRobot:
+class RealTimeRobot(DeepCopied):
     """State estimate from encoder lengths, and inverse dynamics, one tick at a time.
 
     All arrays are allocated by the constructor. No call in the loop raises for the values of its
     arguments: it returns a `Status`, and where there is no new result the last good one stays. An
     object is for one thread; objects in several threads may share one robot, whose `pin.Model` they
-    do not change.
+    do not change. A copy has the state, and arrays of its own.
 
     Parameters
     ----------
@@ -174,13 +174,6 @@ class RealTimeRobot:
     def compiled(self) -> bool:
         """Whether generated code runs."""
         return self.generated is not None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Refuse copies: they would share the memory that ticks write to."""
-        raise RPSPinError(
-            f"a {type(self).__name__} cannot be copied or pickled, since generated code writes to "
-            "its memory: make another one with the same arguments"
-        )
 
     def reset(self, near: ArrayLike) -> None:
         """Start again from a pose, at rest and without forces. Raises as the constructor does."""

@@ -13,6 +13,7 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, three_floats
 from rps_pin.control.generated.tick import CONTROL_READING, DYNAMICS_READING, form_of
+from rps_pin.copies import DeepCopied
 from rps_pin.errors import CompileError
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ _TARGET = tuple(_IN_CONTROL[name] for name in ("pose", "rate", "acceleration"))
 _MOTION = tuple(_IN_DYNAMICS[name] for name in ("pose", "rate", "acceleration"))
 
 
-class _MachineCode:
+class _MachineCode(DeepCopied):
     """Machine code of a tick, with its arrays; for use in one thread.
 
     Parameters
@@ -56,19 +57,32 @@ class _MachineCode:
     def __init__(self, name: str, library: Library, answers: Sequence[Array]) -> None:
         if not all(one.flags.c_contiguous for one in answers):
             raise CompileError("generated code writes to contiguous arrays only", "")
-        self._form = form_of(name)
-        sizes = [layout.size for layout in self._form[:3]]
-        self._array = np.zeros(sum(sizes))
+        self._name = name
+        self._array = np.zeros(sum(layout.size for layout in form_of(name)[:3]))
         self._answers = tuple(answers)
-        pointers = [one.ctypes.data for one in answers]
+        self._library = library  # it keeps the code
+        self.engine = f"generated code, by {library.compiler}"
+        self._connect()
+
+    def _connect(self) -> None:
+        """Take the places of the arrays in memory."""
+        self._form = form_of(self._name)
+        pointers = [one.ctypes.data for one in self._answers]
         self._out = (ctypes.c_void_p * len(pointers))(*pointers)
         self._x = ctypes.c_void_p(self._array.ctypes.data)
-        doubles, (n, m, _) = self._array.data, sizes
+        doubles, (n, m, _) = self._array.data, [layout.size for layout in self._form[:3]]
         self._numbers, self._memory = doubles[:n], doubles[n : n + m]
         self._reading: Any = doubles[n + m :]
-        self._library = library  # it keeps the code
-        self._tick = _TICK(library.address(f"{name}_tick"))
-        self.engine = f"generated code, by {library.compiler}"
+        self._tick = _TICK(self._library.address(f"{self._name}_tick"))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the places in memory: a copy has arrays of its own, and the same code."""
+        left_out = ("_form", "_out", "_x", "_numbers", "_memory", "_reading", "_tick")
+        return {name: value for name, value in self.__dict__.items() if name not in left_out}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._connect()
 
     def set_numbers(self, groups: Mapping[str, Any]) -> None:
         """Set what a loop does not change."""

@@ -46,7 +46,8 @@ from rps_pin.control.loop.force_limits import LEAST_PACE, ForceLimits, recovered
 from rps_pin.control.loop.gains import Gains
 from rps_pin.control.loop.setpoints import Setpoint, Setpoints
 from rps_pin.control.loop.status import STATUSES, Status
-from rps_pin.errors import InputError, RPSPinError, SingularityError, shown
+from rps_pin.copies import DeepCopied
+from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import choice, numbers, positive_number, real, whole_number
@@ -57,7 +58,7 @@ _NO_RESULT = flags.BAD_INPUT | flags.JUMP | flags.NOT_CONVERGED
 _ZERO = (0.0, 0.0, 0.0)
 
 
-class Controller(ABC):
+class Controller(DeepCopied, ABC):
     """The part of a controller that all laws share; see `ComputedTorque` and `PDControl`.
 
     Parameters
@@ -194,13 +195,6 @@ class Controller(ABC):
     def compiled(self) -> bool:
         """Whether generated code runs."""
         return self._generated is not None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Refuse copies: they would share the memory that ticks write to."""
-        raise RPSPinError(
-            f"a {type(self).__name__} cannot be copied or pickled, since generated code writes to "
-            "its memory: make another one with the same arguments"
-        )
 
     def reset(self, near: ArrayLike) -> None:
         """Start again at rest in a pose. Raises as the constructor does."""

@@ -5,8 +5,9 @@ change the acceleration by B (f - f*). The limited forces solve the quadratic pr
 
     min (f - f*)' B' M_x B (f - f*),    |f_i| <= limit_i,
 
-by ProxQP. Their motion is the nearest to the wanted one in the sense of Gauss's principle of least
-constraint. B' M_x B = K M_x^-1 K' is the inverse of the inertia in actuator space.
+by ProxQP, which starts each time from the same guess: the answer depends on the arguments alone,
+not on calls before. Their motion is the nearest to the wanted one in the sense of Gauss's principle
+of least constraint. B' M_x B = K M_x^-1 K' is the inverse of the inertia in actuator space.
 
 **Pace.** A target that moves on with the clock runs away from a robot whose actuators are too weak
 for it. The part of the acceleration error along the target's rate t gives the rate of change of the
@@ -20,7 +21,7 @@ per second and relative to the pace; see `Controller.pace`.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import eigenpy
 import numpy as np
@@ -36,7 +37,7 @@ LEAST_PACE = 0.05
 #: Time constant of its return to 1, s.
 _RECOVERY = 0.2
 #: Of ProxQP, with variables scaled by the limits.
-_TOLERANCE = 1e-9
+_TOLERANCE = 1e-11
 _MOST_ITERATIONS = 100
 #: Kinetic energy of the target's motion, J, below which it has no direction.
 _AT_REST = 1e-18
@@ -86,13 +87,17 @@ class ForceLimits:
         settings = problem.settings
         settings.eps_abs, settings.eps_rel = _TOLERANCE, 0.0
         settings.max_iter = settings.max_iter_in = _MOST_ITERATIONS
-        settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
-        # Without it ProxQP accepts a warm start that is feasible but not optimal.
+        settings.initial_guess = proxqp.InitialGuess.EQUALITY_CONSTRAINED_INITIAL_GUESS
+        # Without it ProxQP accepts a guess that is feasible but not optimal.
         settings.check_duality_gap = True
         settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = _TOLERANCE, 0.0
         ones = np.ones(3)
         problem.init(np.eye(3), np.zeros(3), None, None, None, None, None, -ones, ones)
         problem.solve()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Give copies scratch memory of their own; there is no state."""
+        return type(self), (self.limit,)
 
     def within(self, force: Triple) -> bool:
         """Return whether forces keep the limits."""

@@ -8,7 +8,6 @@ actuators' limits; a length passes the encoders.
 from __future__ import annotations
 
 from collections import deque
-from copy import deepcopy
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +19,7 @@ from rps_pin.closed_loop import Stepper
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.motion import WrenchesInTime
 from rps_pin.control.simulation.encoders import Encoders
+from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, shown
 from rps_pin.one_thread import one_thread
 from rps_pin.rps.robot import RPSRobot
@@ -31,7 +31,7 @@ _EXACT = Encoders()
 
 
 @one_thread("_stepper._system.guard")
-class Plant:
+class Plant(DeepCopied):
     """A 3-RPS under control.
 
     Parameters
@@ -91,10 +91,6 @@ class Plant:
         self.applied: Array = np.clip(hold, -self._limit, self._limit)
         self._queue = deque([hold] * delay)
         self._generator = encoders.generator()
-
-    def __copy__(self) -> Plant:
-        """Return one with scratch memory and a state of its own."""
-        return deepcopy(self)
 
     def step(self, forces: ArrayLike) -> None:
         """Take a command and advance by a period.
