@@ -95,6 +95,7 @@ LAYERS = [
         "moved",
         "plain_text",
         "one_thread",
+        "copies",
         "output_places",
     },
     {"numerics"},

@@ -32,6 +32,7 @@ from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.copies import DeepCopied
+from rps_pin.one_thread import TickGuard, guarded, one_thread
 from rps_pin.rps.kinematics.forward_kinematics import CONDITION_LIMIT, start_of
 from rps_pin.rps.kinematics.tracking import LegDirections, Triple, follow
 from rps_pin.rps.robot import RPSRobot
@@ -42,13 +43,19 @@ _ZERO = (0.0, 0.0, 0.0)
 _NO_FORCES = 1e-8
 
 
+@one_thread(
+    "guard",
+    besides=("estimate", "forces_for", "inverse_dynamics", "memory", "numbers", "take"),
+    properties=("state", "status_text", "force_status_text", "type_ii"),
+)
 class RealTimeRobot(DeepCopied):
     """State estimate from encoder lengths, and inverse dynamics, one tick at a time.
 
     All arrays are allocated by the constructor. No call in the loop raises for the values of its
     arguments: it returns a `Status`, and where there is no new result the last good one stays. An
-    object is for one thread; objects in several threads may share one robot, whose `pin.Model` they
-    do not change. A copy has the state, and arrays of its own.
+    object is for one thread at a time: a second one that calls meanwhile gets a `ThreadError`.
+    Objects in several threads may share one robot, whose `pin.Model` they do not change. A copy has
+    the state, and arrays of its own.
 
     Parameters
     ----------
@@ -136,6 +143,8 @@ class RealTimeRobot(DeepCopied):
         self._fast: GeneratedTick | None = None
         self._dynamics: GeneratedDynamics | None = None
         self._robot = robot
+        #: Shared with the controller that has this object.
+        self.guard = TickGuard()
         self.reset(near)
         self.engine = self._use_estimate(compiled)
         if self._fast is not None:
@@ -277,21 +286,27 @@ class RealTimeRobot(DeepCopied):
         dt
             Time since the last call, s; default: the period.
         """
-        fast = self._fast
-        if fast is None:
-            return self._estimate(length, speed, dt)
-        if fast.ready:
-            number = fast.estimate(length, speed, dt)
-            if number != NOT_REGULAR:
-                self.status = status = STATUSES[number]
-                return status
-        status = self._estimate(length, speed, dt)
-        if self.age == 0:
-            fast.set_memory(self.memory())
-        return status
+        fast, guard = self._fast, self.guard
+        if fast is not None and fast.ready and not guard.busy:
+            try:
+                guard.busy = True
+                number = fast.estimate(length, speed, dt)
+                if number != NOT_REGULAR:
+                    self.status = status = STATUSES[number]
+                    return status
+            finally:
+                guard.busy = False
+        return self._estimate(length, speed, dt)
 
+    @guarded("guard")
     def _estimate(self, length: Numbers, speed: Numbers | None, dt: float | None) -> Status:
         """Do the same in Python."""
+        status = self._estimated(length, speed, dt)
+        if self._fast is not None and self.age == 0:
+            self._fast.set_memory(self.memory())
+        return status
+
+    def _estimated(self, length: Numbers, speed: Numbers | None, dt: float | None) -> Status:
         self._begin()
         elapsed = self.elapsed + (self._period if dt is None else elapsed_time(dt))
         if not self.elapsed < elapsed < math.inf:
@@ -324,10 +339,20 @@ class RealTimeRobot(DeepCopied):
         pose, rate, acceleration
             Pose (m, rad, rad) and its first and second time derivatives, shape (3,) each.
         """
-        if self._dynamics is not None:
-            number = self._dynamics.forces(pose, rate, acceleration)
-            if number != NOT_REGULAR:
-                return self._forces_computed(number)
+        dynamics, guard = self._dynamics, self.guard
+        if dynamics is not None and not guard.busy:
+            try:
+                guard.busy = True
+                number = dynamics.forces(pose, rate, acceleration)
+                if number != NOT_REGULAR:
+                    return self._forces_computed(number)
+            finally:
+                guard.busy = False
+        return self._inverse_dynamics(pose, rate, acceleration)
+
+    @guarded("guard")
+    def _inverse_dynamics(self, pose: Numbers, rate: Numbers, acceleration: Numbers) -> Status:
+        """Do the same in Python."""
         x, dx, ddx = three_floats(pose), three_floats(rate), three_floats(acceleration)
         self._in_python(x)
         if x is None or dx is None or ddx is None:
@@ -351,11 +376,25 @@ class RealTimeRobot(DeepCopied):
         acceleration
             The pose's second time derivative, shape (3,).
         """
-        fast = self._fast
-        if fast is not None and self._dynamics is not None and (fast.ahead or fast.ready):
-            number = self._dynamics.forces(*fast.motion(), acceleration)
-            if number != NOT_REGULAR:
-                return self._forces_computed(number)
+        fast, dynamics, guard = self._fast, self._dynamics, self.guard
+        if (
+            fast is not None
+            and dynamics is not None
+            and (fast.ahead or fast.ready)
+            and not guard.busy
+        ):
+            try:
+                guard.busy = True
+                number = dynamics.forces(*fast.motion(), acceleration)
+                if number != NOT_REGULAR:
+                    return self._forces_computed(number)
+            finally:
+                guard.busy = False
+        return self._forces_for(acceleration)
+
+    @guarded("guard")
+    def _forces_for(self, acceleration: Numbers) -> Status:
+        """Do the same in Python."""
         geometry, rate, _, _ = self.state
         self._in_python(geometry.pose)
         ddx = three_floats(acceleration)

@@ -2,7 +2,8 @@
 
     reading -> state estimate -> setpoint -> law -> force limits -> forces
 
-No call raises for the values of its arguments, and the forces are always finite and within limits:
+No call raises for the values of its arguments, and the forces are always finite and within limits.
+(A second thread that calls while a call runs gets a `ThreadError`.)
 
 - A reading that is missing, not finite, or a jump is discarded; for a few ticks the state is
   extrapolated at the last rate. After `most_lost` such readings in a row the controller stops.
@@ -48,6 +49,7 @@ from rps_pin.control.loop.setpoints import Setpoint, Setpoints
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, SingularityError, shown
+from rps_pin.one_thread import guarded, one_thread
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import choice, numbers, positive_number, real, whole_number
@@ -58,6 +60,7 @@ _NO_RESULT = flags.BAD_INPUT | flags.JUMP | flags.NOT_CONVERGED
 _ZERO = (0.0, 0.0, 0.0)
 
 
+@one_thread("_guard", besides=("tick",), properties=("status_text",))
 class Controller(DeepCopied, ABC):
     """The part of a controller that all laws share; see `ComputedTorque` and `PDControl`.
 
@@ -167,6 +170,7 @@ class Controller(DeepCopied, ABC):
             largest_jump=jump,
             compiled=False,
         )
+        self._guard = self.estimate.guard
         self.period, self.gains = period, gains
         self._gains = gains.rows
         self._elapsed = period
@@ -248,19 +252,27 @@ class Controller(DeepCopied, ABC):
         Status
             Its text is in `status_text`.
         """
-        generated = self._generated
-        if generated is not None and generated.ready:
-            number = generated.control(length, target, speed, dt)
-            if number != NOT_REGULAR:
-                self.status = self.estimate.status = status = STATUSES[number]
-                return status
-        status = self._tick(length, target, speed, dt)
-        if generated is not None and self.estimate.age == 0 and not self._stop_reason:
+        generated, guard = self._generated, self._guard
+        if generated is not None and generated.ready and not guard.busy:
+            try:
+                guard.busy = True
+                number = generated.control(length, target, speed, dt)
+                if number != NOT_REGULAR:
+                    self.status = self.estimate.status = status = STATUSES[number]
+                    return status
+            finally:
+                guard.busy = False
+        return self._tick(length, target, speed, dt)
+
+    @guarded("_guard")
+    def _tick(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
+        """Do the same in Python."""
+        status = self._ticked(length, target, speed, dt)
+        if self._generated is not None and self.estimate.age == 0 and not self._stop_reason:
             self._hand_over()
         return status
 
-    def _tick(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
-        """Do the same in Python."""
+    def _ticked(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
         estimate = self.estimate
         number = int(estimate.estimate(length, speed, dt=dt))
         time = self.period if dt is None else elapsed_time(dt)
