@@ -6,7 +6,6 @@ their bits are, and as multiples of powers of ten. NumPy raises where it would o
 
 from __future__ import annotations
 
-import math
 import struct
 from typing import Any
 
@@ -15,27 +14,14 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from rps_pin import RPSRobot
-from rps_pin.control import ComputedTorque, Gains, PDControl, RealTimeRobot, Status
+from rps_pin.control import Gains, RealTimeRobot, Status
 from rps_pin.control.loop.controller import Controller
-from rps_pin.rps.dynamics.loads import Payload
+from tests.control.float_ticks import LAWS, LENGTH, ROBOT, SPECIAL_NUMBERS, START
 
 pytestmark = pytest.mark.usefixtures("both_engines")
 
-START = (0.223, 0.02, -0.01)
-ROBOT = RPSRobot(
-    RPSRobot.from_preset("micro").parameters.replace(prismatic_damping=3.0, prismatic_friction=0.5),
-    Payload(0.1, [0.0, 0.01, 0.02], np.diag([2e-5, 3e-5, 4e-5])),
-)
-LENGTH = tuple(ROBOT.inverse_kinematics(START).length.tolist())
-
 BITS = st.integers(0, 2**64 - 1).map(lambda bits: struct.unpack("<d", struct.pack("<Q", bits))[0])
-SPECIAL = st.sampled_from(
-    [
-        *(0.0, -0.0, 5e-324, -5e-324, 2.0**-1022, 1e-162, 1e154, -1e154, 1.4e154, 1e300, -1e300),
-        *(np.finfo(float).max, -np.finfo(float).max, math.inf, -math.inf, math.nan),
-    ]
-)
+SPECIAL = st.sampled_from(SPECIAL_NUMBERS)
 POWERS = st.builds(lambda x, k: x * 10.0**k, st.floats(-9.0, 9.0), st.integers(-320, 307))
 ANY = BITS | SPECIAL | POWERS | st.floats(-1.0, 1.0)
 TRIPLES = st.tuples(ANY, ANY, ANY)
@@ -49,13 +35,6 @@ TICKS = st.lists(
     min_size=1,
     max_size=8,
 )
-NO_JUMP = {"largest_jump": math.inf}
-LAWS: dict[str, tuple[type[Controller], dict[str, Any]]] = {
-    "computed torque": (ComputedTorque, {}),
-    "actuator space": (ComputedTorque, {"space": "actuator", **NO_JUMP, "cut_off": math.inf}),
-    "PD": (PDControl, NO_JUMP),
-    "PD in task space": (PDControl, {"space": "task", "compensation": "feed_forward", **NO_JUMP}),
-}
 MANY = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 
 
