@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.progress import Progress, track
 from rich.table import Table
 
+from rps_pin.bounds import STEPS, most
 from rps_pin.cli.completion import names_or_files, preset_names
 from rps_pin.cli.printing import PlainConsole, say
 from rps_pin.rps import robot_file
@@ -93,7 +94,7 @@ def doubt_lengths(name: str, what: str, values: Sequence[float]) -> None:
 def tell_size(name: str, rows: float, columns: int) -> None:
     """Print a note on a table that will be larger than `LARGE`, before it is computed."""
     size = BYTES * rows * columns
-    if LARGE < size < math.inf:  # an infinite duration is refused elsewhere
+    if size > LARGE and rows <= most(STEPS):  # more are refused elsewhere
         say(
             f"note: {name} will have {rows:.3g} rows of {columns} columns, about "
             f"{1e-6 * size:.3g} MB. Ctrl-C stops it",
