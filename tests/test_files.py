@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rps_pin import files
+from rps_pin import files, interruption
 from rps_pin.errors import InputError
 from rps_pin.files import opened, whole_file
 from tests.each import each
@@ -156,7 +156,7 @@ def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path) -> No
 def test_what_others_write_or_keep_is_left_alone(tmp_path: Path) -> None:
     old, young = time.time() - 1e6, time.time()
     elsewhere = ".a.rps_pin-{}-1-01234567.txt".format("f" * 8)
-    one_of_theirs = f".a.rps_pin-{files._place()}-{os.getpid()}-01234567.txt"
+    one_of_theirs = f".a.rps_pin-{interruption._place()}-{os.getpid()}-01234567.txt"
     kept = (".a.txt", ".a-kx3_9v2q.txt", one_of_theirs, one_of_theirs[1:])
     for name in kept:
         (tmp_path / name).touch()

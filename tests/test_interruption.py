@@ -15,8 +15,11 @@ from rps_pin.interruption import signals_as_ctrl_c
 class Slow:
     """Its destructor is where a signal arrives: Python cannot pass on what is raised there."""
 
+    def __init__(self, number: signal.Signals) -> None:
+        self.number = number
+
     def __del__(self) -> None:
-        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(self.number)
         time.sleep(0.001)
 
 
@@ -42,9 +45,12 @@ def test_a_signal_interrupts_and_ends_with_the_status_of_a_shell() -> None:
 def test_a_signal_that_arrives_in_a_destructor_is_not_lost() -> None:
     hook = sys.unraisablehook
     with pytest.raises(SystemExit) as caught, signals_as_ctrl_c():
-        Slow()
+        Slow(signal.SIGTERM)
         wait()
     assert caught.value.code == 143
+    with pytest.raises(KeyboardInterrupt), signals_as_ctrl_c():
+        Slow(signal.SIGINT)
+        wait()
     assert sys.unraisablehook is hook
 
 

@@ -5,28 +5,16 @@ Regular files alone are read: a FIFO would be waited for without end, and a devi
 
 from __future__ import annotations
 
-import functools
-import hashlib
 import os
-import platform
-import re
-import secrets
 import stat
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 from rps_pin.errors import InputError, shown
-from rps_pin.interruption import signals_as_ctrl_c
+from rps_pin.interruption import remove_leftovers, scratch_name, signals_as_ctrl_c
 from rps_pin.output_places import FILES_READ, through_links_and_streams
-
-#: Names of temporary files: see `_scratch_name`.
-_SCRATCH = re.compile(
-    r"\..*\.rps_pin-(?P<place>[0-9a-f]{8})-(?P<process>[0-9]+)-[0-9a-f]{8}(\..*)?", re.DOTALL
-)
-_DAY = 86400.0
 
 
 @contextmanager
@@ -98,10 +86,10 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         A path in the same folder, with the same suffix, to write to.
     """
     target = Path(path)
-    scratch = target.with_name(_scratch_name(target))
+    scratch = target.with_name(scratch_name(target))
     with signals_as_ctrl_c():
         try:
-            _remove_leftovers(target.parent)
+            remove_leftovers(target.parent)
             try:
                 os.close(os.open(scratch, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
             except OSError as error:  # name the file that was asked for
@@ -111,47 +99,6 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
             scratch.replace(target)
         finally:
             scratch.unlink(missing_ok=True)
-
-
-def _scratch_name(target: Path) -> str:
-    """Return a hidden name that says which process writes the file, and where that runs."""
-    # 40 characters of the name: a longer one could be too long for a file system.
-    who = f"{_place()}-{os.getpid()}-{secrets.token_hex(4)}"
-    return f".{target.stem[:40]}.rps_pin-{who}{target.suffix}"
-
-
-@functools.cache
-def _place() -> str:
-    """Return eight digits of this machine or container: process numbers are unique within it."""
-    try:
-        numbers = str(Path("/proc/self/ns/pid").readlink())
-    except OSError:  # not Linux
-        numbers = ""
-    return hashlib.sha256(f"{platform.node()} {numbers}".encode()).hexdigest()[:8]
-
-
-def _remove_leftovers(folder: Path) -> None:
-    """Remove temporary files whose process has ended; of other machines, those a day old."""
-    with suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
-            found = _SCRATCH.fullmatch(entry.name)
-            if found is not None and _left_behind(entry, found["place"], int(found["process"])):
-                with suppress(OSError):  # another process did, or it is another user's
-                    Path(entry).unlink()
-
-
-def _left_behind(entry: os.DirEntry[str], place: str, process: int) -> bool:
-    if not entry.is_file(follow_symlinks=False):
-        return False
-    if place != _place():
-        return time.time() - entry.stat(follow_symlinks=False).st_mtime > _DAY
-    try:
-        os.kill(process, 0)  # sends nothing
-    except ProcessLookupError:
-        return True
-    except (OSError, OverflowError):  # of another user, or no number of a process
-        return False
-    return False
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

@@ -1,14 +1,27 @@
-"""Ends from outside: SIGTERM and SIGHUP as Ctrl-C, and workers that end with their parent."""
+"""Ends from outside: SIGTERM and SIGHUP as Ctrl-C, workers that end with their parent, leftovers.
+
+A process that is killed cannot clear up. Its temporary files and folders have names that say which
+process made them, so that the next one can remove them.
+"""
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import os
+import platform
+import re
+import secrets
+import shutil
 import signal
+import stat
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 #: Signals whose default action ends a process without a word to Python.
 _DEADLY = (signal.SIGTERM, signal.SIGHUP)
@@ -16,6 +29,10 @@ _DEADLY = (signal.SIGTERM, signal.SIGHUP)
 _AGAIN = 0.01
 #: How often a worker looks whether its parent lives, s.
 _PAUSE = 0.25
+#: Names of temporary files (hidden, beside the file that is written) and folders.
+_WHO = r"rps_pin-(?P<place>[0-9a-f]{8})-(?P<process>[0-9]+)-[0-9a-f]{8}"
+_FILE, _FOLDER = re.compile(rf"\..*\.{_WHO}(\..*)?", re.DOTALL), re.compile(_WHO)
+_DAY = 86400.0
 
 
 class Interrupted(KeyboardInterrupt):
@@ -29,7 +46,7 @@ def signals_as_ctrl_c() -> Iterator[None]:
     They raise `KeyboardInterrupt`; where the block passes it on, the process ends with the exit
     status that a shell gives for the signal, 143 or 129. A signal that the caller handles, or
     ignores, is left alone, and so are all of them in a thread: only the main thread receives
-    signals.
+    signals. An interruption that is lost, as it came in a destructor, is repeated, Ctrl-C's too.
 
     Raises
     ------
@@ -40,6 +57,7 @@ def signals_as_ctrl_c() -> Iterator[None]:
         yield
         return
     ours = [number for number in _DEADLY if signal.getsignal(number) == signal.SIG_DFL]
+    ctrl_c = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     received: list[int] = []
     hook = sys.unraisablehook
 
@@ -50,9 +68,13 @@ def signals_as_ctrl_c() -> Iterator[None]:
     def lost(found: sys.UnraisableHookArgs) -> None:
         # Raised where Python can only report it, in a destructor: the signal is sent again.
         if isinstance(found.exc_value, Interrupted):
-            threading.Timer(_AGAIN, _to_main_thread, (received[-1],)).start()
+            again = received[-1]
+        elif isinstance(found.exc_value, KeyboardInterrupt) and ctrl_c:
+            again = signal.SIGINT
         else:
             hook(found)
+            return
+        threading.Timer(_AGAIN, _to_main_thread, (again,)).start()
 
     try:
         sys.unraisablehook = lost
@@ -90,3 +112,88 @@ def end_with_parent(parent: int) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, name="end with the parent", daemon=True).start()
+
+
+@contextmanager
+def workers_without_signals() -> Iterator[None]:
+    """Start processes in the block that never see Ctrl-C nor a terminal's end, not even at first.
+
+    Their parent sees them, and ends its workers. In this process the signals wait for the end of
+    the block.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# Temporary files and folders ----------------------------------------------------------------------
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Give a folder for temporary files; remove it, and those that killed processes left."""
+    place = Path(tempfile.gettempdir())
+    remove_leftovers(place)
+    folder = place / _who()
+    folder.mkdir(mode=0o700)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def scratch_name(target: Path) -> str:
+    """Return a hidden name for a file that becomes `target`."""
+    # 40 characters of the name: a longer one could be too long for a file system.
+    return f".{target.stem[:40]}.{_who()}{target.suffix}"
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove files and folders of such names whose process has ended.
+
+    Of other machines, those that are a day old.
+    """
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            with suppress(OSError):  # another process was faster
+                is_folder = entry.is_dir(follow_symlinks=False)
+                found = (_FOLDER if is_folder else _FILE).fullmatch(entry.name)
+                if found is None or not _left_behind(entry, found["place"], int(found["process"])):
+                    continue
+                if is_folder:
+                    shutil.rmtree(entry)
+                else:
+                    Path(entry).unlink()
+
+
+def _who() -> str:
+    return f"rps_pin-{_place()}-{os.getpid()}-{secrets.token_hex(4)}"
+
+
+@functools.cache
+def _place() -> str:
+    """Return eight digits of this machine or container: process numbers are unique within it."""
+    try:
+        numbers = str(Path("/proc/self/ns/pid").readlink())
+    except OSError:  # not Linux
+        numbers = ""
+    return hashlib.sha256(f"{platform.node()} {numbers}".encode()).hexdigest()[:8]
+
+
+def _left_behind(entry: os.DirEntry[str], place: str, process: int) -> bool:
+    status = entry.stat(follow_symlinks=False)
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+        return False
+    if status.st_uid != os.geteuid():
+        return False
+    if place != _place():
+        return time.time() - status.st_mtime > _DAY
+    try:
+        os.kill(process, 0)  # sends nothing
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):  # of another user, or no number of a process
+        return False
+    return False

@@ -6,13 +6,13 @@ import functools
 import os
 import shutil
 import stat
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
 from rps_pin.errors import InputError
+from rps_pin.interruption import scratch_folder
 
 #: Devices and numbers of the files that were read; None where nobody asks.
 FILES_READ: ContextVar[set[tuple[int, int]] | None] = ContextVar("FILES_READ", default=None)
@@ -65,8 +65,8 @@ def through_links_and_streams(
             with whole(Path(os.path.realpath(target)) if target.is_symlink() else target) as place:
                 yield place
             return
-        with tempfile.TemporaryDirectory() as folder:
-            finished = Path(folder) / f"finished{target.suffix}"
+        with scratch_folder() as folder:
+            finished = folder / f"finished{target.suffix}"
             with whole(finished) as place:
                 yield place
             _copy(finished, target)

@@ -7,10 +7,15 @@ computed here.
 
 def main() -> None:
     """Run the command line; where a package cannot be imported, say what is missing."""
-    try:
-        from rps_pin.cli.app import run
+    from rps_pin.interruption import signals_as_ctrl_c
 
-        run()
+    try:
+        with signals_as_ctrl_c():
+            from rps_pin.cli.app import run
+
+            run()
+    except KeyboardInterrupt:  # while it is imported
+        raise SystemExit(130) from None
     except ImportError as error:
         from rps_pin.cli.doctor import doctor
 

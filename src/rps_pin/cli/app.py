@@ -17,7 +17,6 @@ from rps_pin.cli.doctor import doctor
 from rps_pin.cli.lazy_group import SETTINGS, LazyGroup
 from rps_pin.cli.printing import say, tell_error, tell_fault
 from rps_pin.errors import AccuracyWarning, RPSPinError
-from rps_pin.interruption import signals_as_ctrl_c
 from rps_pin.output_places import FILES_READ
 from rps_pin.plain_text import plain
 
@@ -101,8 +100,7 @@ def run() -> None:
     FILES_READ.set(set())
     threading.excepthook = _tell_fault_of_thread
     try:
-        with signals_as_ctrl_c():
-            app(prog_name="rps-pin")
+        app(prog_name="rps-pin")
         return
     except BrokenPipeError:  # the reader of the output ended: no message
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

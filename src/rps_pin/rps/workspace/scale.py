@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import multiprocessing.resource_tracker
 import os
 import shutil
 from collections import deque
@@ -15,9 +16,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from loky import ProcessPoolExecutor, cpu_count
+from loky.backend import resource_tracker
 from numpy.typing import ArrayLike
 
-from rps_pin.interruption import end_with_parent
+from rps_pin.interruption import end_with_parent, workers_without_signals
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import BLOCK, GridJob, Progress
 from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, Fields
@@ -137,6 +139,9 @@ def _computed(
         for i in progress(range(len(blocks))):
             yield blocks[i], job.compute(blocks[i])
         return
+    with workers_without_signals():  # these two unblock Ctrl-C: they must run before the workers
+        multiprocessing.resource_tracker.ensure_running()
+        resource_tracker.ensure_running()
     pool = ProcessPoolExecutor(
         workers, initializer=end_with_parent, initargs=(os.getpid(),), env=_ONE_THREAD
     )
@@ -145,7 +150,8 @@ def _computed(
         ahead = iter(blocks)
         for i in progress(range(len(blocks))):
             while len(pending) < _AHEAD * workers and (block := next(ahead, None)) is not None:
-                pending.append(pool.submit(cast, block))
+                with workers_without_signals():  # the first call starts them
+                    pending.append(pool.submit(cast, block))
             yield blocks[i], pending.popleft().result()
     except BaseException:
         pool.shutdown(kill_workers=True)

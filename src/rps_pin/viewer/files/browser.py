@@ -8,9 +8,11 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from rps_pin.errors import RPSPinError
+from rps_pin.interruption import scratch_folder
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page, ViewportSize
@@ -27,6 +29,8 @@ ARGUMENTS = [
     "--force-color-profile=srgb",
 ]
 _LOAD_SECONDS = 60.0
+#: Where Chromium makes a socket, and the longest path of one, bytes.
+_SOCKET, _LONGEST_SOCKET = "org.chromium.Chromium.XXXXXX/SingletonSocket", 103
 _Answer = TypeVar("_Answer")
 
 
@@ -70,9 +74,13 @@ def opened_page(text: str, size: tuple[int, int], scale: float) -> Iterator[Page
             "pictures need Playwright: pip install 'rps-pin[pictures]' (and a Chromium: "
             "apt-get install chromium, or playwright install chromium)"
         ) from None
-    with sync_playwright() as playwright:
+    with scratch_folder() as folder, sync_playwright() as playwright:
         try:
-            browser = playwright.chromium.launch(executable_path=find_browser(), args=ARGUMENTS)
+            browser = playwright.chromium.launch(
+                executable_path=find_browser(),
+                args=ARGUMENTS,
+                env=_environment(folder),
+            )
         except Error as error:
             raise RPSPinError(
                 "pictures need a Chromium that runs: apt-get install chromium, or playwright "
@@ -91,6 +99,12 @@ def opened_page(text: str, size: tuple[int, int], scale: float) -> Iterator[Page
             yield page
         finally:
             browser.close()
+
+
+def _environment(folder: Path) -> dict[str, str | float | bool]:
+    """Return Chromium's environment: `folder` takes what it does not remove if a signal ends it."""
+    fits = len(os.fsencode(folder / _SOCKET)) <= _LONGEST_SOCKET
+    return {**os.environ, "TMPDIR": str(folder)} if fits else {**os.environ}
 
 
 def find_browser() -> str | None:
