@@ -101,6 +101,7 @@ LAYERS = [
     {"numerics"},
     {"closed_loop"},
     {"codegen"},
+    {"task"},
     {"trajectories"},
     {"rps"},
     {"control"},

@@ -8,6 +8,7 @@ from . import (
     plots,
     reproduction,
     rps,
+    task,
     trajectories,
     viewer,
 )
@@ -33,6 +34,7 @@ from .errors import (
     UnreachableError,
 )
 from .rps import RPSParameters, RPSRobot
+from .task import Task
 from .trajectories import helix
 
 __version__: str
@@ -55,6 +57,7 @@ __all__ = [
     "RPSPinError",
     "RPSRobot",
     "SingularityError",
+    "Task",
     "ThreadError",
     "UnreachableError",
     "__version__",
@@ -68,6 +71,7 @@ __all__ = [
     "plots",
     "reproduction",
     "rps",
+    "task",
     "trajectories",
     "viewer",
 ]

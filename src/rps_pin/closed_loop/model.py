@@ -55,7 +55,7 @@ from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.closed_loop.summary import in_lines, in_one_line
 from rps_pin.errors import ClosureError, CompileError, MechanismError
 from rps_pin.one_thread import one_thread, refuse_second_thread
-from rps_pin.validation import choice, non_negative_number, real_vector
+from rps_pin.validation import choice, non_negative_number, real_vector, whole_number
 
 _REFERENCES = {
     "world": pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
@@ -103,6 +103,8 @@ class ClosedLoopModel:
         much where no motion closes them (see `rank_rule`). 0: the numbers are exact. Left out: 1e-3
         (5e-3 where the rows, if they counted, would leave fewer motions than there are actuators).
         A mechanism in whose closures no such error is found is exact in any case.
+    task
+        What the mechanism is for: the arguments of a `rps_pin.task.Task`, by name; see `task`.
     notes
         Sentences that `describe` prints: what the reader of a file has decided.
 
@@ -135,6 +137,7 @@ class ClosedLoopModel:
         characteristic_length: float | None = None,
         max_condition: float = MAX_CONDITION,
         accuracy: float | None = None,
+        task: Mapping[str, Any] | None = None,
         notes: Sequence[str] = (),
     ) -> None:
         self.system = system = ConstraintSystem(
@@ -156,6 +159,7 @@ class ClosedLoopModel:
         self.effects = effects
         self.name: str = name or model.name
         self.notes = tuple(notes)
+        self._task = None if task is None else dict(task)
         self._home: Array | None = None
         self._start: Array = pin.neutral(model)
         self._given_length = characteristic_length
@@ -336,6 +340,7 @@ class ClosedLoopModel:
             characteristic_length=parts.characteristic_length,
             max_condition=parts.max_condition or MAX_CONDITION,
             accuracy=parts.accuracy,
+            task=parts.task,
             notes=parts.notes,
         )
         if parts.home is None:
@@ -369,6 +374,7 @@ class ClosedLoopModel:
             "characteristic_length": self._given_length,
             "max_condition": self.max_condition,
             "accuracy": self.accuracy,
+            "task": self._task,
             "notes": self.notes,
         }
 
@@ -540,6 +546,23 @@ class ClosedLoopModel:
                 ) from None
         return self._home.copy()
 
+    @cached_property
+    def task(self) -> Any:
+        """What the mechanism is for, as its description says; see `rps_pin.task.Task`.
+
+        Raises
+        ------
+        MechanismError
+            If neither a description nor the constructor says; or as `Task`.
+        """
+        if self._task is None:
+            raise MechanismError(
+                f"{self.name or 'the mechanism'} has no task: give one in its description "
+                "(task: {frame: ..., coordinates: [...]}), or make one: "
+                "Task(mechanism, frame=..., coordinates=[...])"
+            )
+        return import_module("rps_pin.task").Task(self, **self._task)
+
     @property
     def constraint_size(self) -> int:
         """Number of closure rows, nc."""
@@ -672,6 +695,7 @@ class ClosedLoopModel:
         *,
         within_limits: bool = True,
         jump: bool = False,
+        restarts: int = 20,
     ) -> Array:
         """Return the closed configuration in which some joints have given values.
 
@@ -697,6 +721,9 @@ class ClosedLoopModel:
             Whether the assembly mode may change: the values are set in the guess, and the loops are
             closed from there as by `close`, with these joints fixed. That finds some configuration
             wherever one is found at all.
+        restarts
+            How often it is looked for from other configurations, as by `close`; where the assembly
+            mode ends, the error says by that whether there are any.
 
         Raises
         ------
@@ -709,7 +736,9 @@ class ClosedLoopModel:
         """
         guess = self.home if q_guess is None else q_guess
         start = self.system.normalised(guess, "q_guess")
-        return complete(self.system, values, start, within_limits=within_limits, jump=jump)
+        whole_number(restarts, "restarts", 0)
+        options: dict[str, Any] = {"within_limits": within_limits, "jump": jump}
+        return complete(self.system, values, start, restarts=restarts, **options)
 
     def assembly_modes(
         self,
@@ -1348,6 +1377,7 @@ class ClosedLoopModel:
             self.characteristic_length,
             self.max_condition,
             self.accuracy,
+            self._task,
         )
 
     # Other engines --------------------------------------------------------------------------------

@@ -31,13 +31,16 @@ def complete(
     *,
     within_limits: bool = True,
     jump: bool = False,
+    restarts: int = 20,
 ) -> Array:
     """Return the closed configuration with given joint values; see `ClosedLoopModel.complete`."""
     named = by_name(system, values)
     given = system.velocity_indices(list(named), "to give a value")
     target = with_values(system, guess, named)
     if jump:
-        return close(system, target, fixed=list(named), within_limits=within_limits)
+        return close(
+            system, target, fixed=list(named), within_limits=within_limits, restarts=restarts
+        )
     if within_limits:
         refuse_values_outside(system, target, named)
     start = _closed_start(system, guess, within_limits)
@@ -50,7 +53,7 @@ def complete(
     if found.share < 1 and not found.consistent:
         q = _overdetermined(system, named, given, start, target)
     elif found.share < 1:
-        _refuse(system, named, target, found, within_limits, start is guess)
+        _refuse(system, named, target, found, within_limits, start is guess, restarts)
     if not is_closed(system, q):
         q = close(system, q, fixed=list(named), within_limits=False, restarts=0)
     return _within_limits(system, q, named) if within_limits else q
@@ -137,6 +140,7 @@ def _refuse(
     found: Followed,
     within_limits: bool,
     closed: bool,
+    restarts: int,
 ) -> None:
     """Raise the error of a path that ends in a singularity."""
     if found.is_long:
@@ -149,7 +153,7 @@ def _refuse(
     if not closed:
         where = f"after the guess, which is open, was closed, and {where[6:]}"
     try:
-        close(system, target, fixed=list(named), within_limits=within_limits)
+        close(system, target, fixed=list(named), within_limits=within_limits, restarts=restarts)
     except ClosureError as error:
         raise ClosureError(
             f"no closed configuration with these values was found: {error}; {where} the assembly "

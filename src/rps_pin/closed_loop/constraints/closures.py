@@ -31,7 +31,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 import pinocchio as pin
@@ -70,7 +70,7 @@ Placement = tuple[tuple[float, ...], ...]
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _ROWS = dict(zip(KINDS, (3, 6, 5, 5, 4, 4, 3, 2, 1, 1), strict=True))
-_WITHOUT_AXIS = ("spherical", "rigid", "distance")
+_WITHOUT_AXIS = ("spherical", "rigid", "distance", "coordinates")
 #: How far R R' of a placement may be from 1: as files round it, and as computers do.
 _RIGID, _EXACT = 1e-4, 1e-12
 _WITH_AXIS_OF_B = ("revolute", "cylindrical", "universal", "planar")
@@ -123,6 +123,8 @@ class LoopClosure:
         is not one, or an option does not belong to the kind.
     """
 
+    _kinds: ClassVar[tuple[str, ...]] = KINDS
+
     frame_a: str
     frame_b: str
     kind: Kind = "spherical"
@@ -135,7 +137,7 @@ class LoopClosure:
     placement_b: Placement | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in _ROWS:
+        if self.kind not in self._kinds:
             raise MechanismError(f"no closure kind {self.kind!r}; there are: {', '.join(KINDS)}")
         if not self.name:
             object.__setattr__(self, "name", f"{self.frame_a} = {self.frame_b}")

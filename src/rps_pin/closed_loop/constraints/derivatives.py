@@ -69,6 +69,7 @@ class FrameMotions:
     def __init__(self, equations: ClosureEquations, motion: tuple[Array, Array, Array]) -> None:
         self.equations, self.motion = equations, motion
         self._frames: dict[ClosedFrame, _Frame] = {}
+        equations.look_at(motion[0])
         pin.computeForwardKinematicsDerivatives(equations.model, equations.data, *motion)
 
     def __getitem__(self, frame: ClosedFrame) -> _Frame:

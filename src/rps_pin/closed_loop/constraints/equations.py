@@ -24,9 +24,11 @@ from rps_pin.closed_loop.constraints.closures import (
     Closure,
     JointCoupling,
     LoopClosure,
+    joint_id,
 )
 from rps_pin.closed_loop.constraints.couplings import CouplingRow, coupling_row
-from rps_pin.closed_loop.constraints.rows import Floats, Rows, rows_of
+from rps_pin.closed_loop.constraints.frame_coordinates import FrameCoordinates
+from rps_pin.closed_loop.constraints.rows import Floats, RotationVectorRows, Rows, Stack, rows_of
 from rps_pin.errors import InputError, MechanismError, shown
 from rps_pin.validation import positive_number
 
@@ -69,6 +71,17 @@ class ClosedFrames(NamedTuple):
     """Whether its rows in J are turned to world axes."""
     constraint_data: Any
     """Pinocchio's; holds ``oMc1`` and ``c1Mc2`` once J or the gaps are computed."""
+
+
+class HeldCoordinates(NamedTuple):
+    """Coordinates of a frame that joints hold."""
+
+    rows: Indices
+    """In J."""
+    idx_q: Indices
+    idx_v: Indices
+    turns: RotationVectorRows
+    """The rows of the rotation vector, which are the last."""
 
 
 class ClosureEquations:
@@ -167,6 +180,10 @@ class ClosureEquations:
                 for term in coupling.terms:
                     self._coupling_rows[coupling.row, term.idx_v] = -term.coefficients[0]
                 self.angular_rows[coupling.row] = angular[coupling.idx_v]
+        #: Coordinates of frames, which joints hold.
+        self.held = [self._held(f) for f in self.closed_frames if _has_joints(f)]
+        for held in self.held:
+            self._coupling_rows[held.rows, held.idx_v] = 1.0
         #: Those whose rows of J depend on q.
         self.curved = [coupling for coupling in self.couplings if not coupling.is_linear]
         self.row_scale = np.where(self.angular_rows, self.length, 1.0)
@@ -205,13 +222,14 @@ class ClosureEquations:
         """Return J (nc, nv) at q from what Pinocchio's `getConstraintsJacobian` returned there."""
         if self.plain:
             return jacobian.reshape(self.size, self.model.nv)  # a single row or column comes flat
+        self.look_at(q)
         rows = self._rows_of_couplings(q)
         all_rows = jacobian.reshape(-1, self.model.nv)
         start = 0
         for frames in self.closed_frames:
             stop = start + (3 if frames.closure.kind == "spherical" else 6)
             block = all_rows[start:stop]
-            rows[frames.rows] = (
+            rows[frames.rows] += (
                 block
                 if frames.in_world
                 else frames.selected.wrenches(frames.constraint_data.c1Mc2) @ block
@@ -219,8 +237,30 @@ class ClosureEquations:
             start = stop
         return rows
 
+    def look_at(self, q: Array) -> None:
+        """Take the rotation vectors of frames that are nearest to what their joints hold at q."""
+        for held in self.held:
+            held.turns.near[held.turns.axes] = q[
+                held.idx_q[held.idx_q.size - len(held.turns.axes) :]
+            ]
+
+    def _held(self, frames: ClosedFrames) -> HeldCoordinates:
+        """Return where joints hold the coordinates of a frame."""
+        closure, model = frames.closure, self.model
+        assert isinstance(closure, FrameCoordinates)
+        assert isinstance(frames.selected, Stack)
+        turns = frames.selected.parts[1]
+        assert isinstance(turns, RotationVectorRows)
+        joints = [model.joints[joint_id(model, name, closure.name)] for name in closure.joints]
+        return HeldCoordinates(
+            np.arange(frames.rows.start, frames.rows.stop),
+            np.array([joint.idx_q for joint in joints], dtype=np.intp),
+            np.array([joint.idx_v for joint in joints], dtype=np.intp),
+            turns,
+        )
+
     def _rows_of_couplings(self, q: Array) -> Array:
-        """Return the couplings' rows of J, and zeros for the others, shape (nc, nv)."""
+        """Return the rows of J of joints' coordinates, and zeros for others, shape (nc, nv)."""
         rows = self._coupling_rows.copy()
         for coupling in self.curved:
             for k, (_, first, _, _) in coupling.slopes(q):
@@ -247,6 +287,7 @@ class ClosureEquations:
     def current_gaps(self, q: Array) -> Array:
         """Return e(q), from the placements that `jacobian` or `gaps` has computed at q."""
         gaps = np.empty(self.size)
+        self.look_at(q)
         for frames in self.closed_frames:
             gap = frames.selected.gap(frames.constraint_data.c1Mc2)
             if frames.in_world:
@@ -254,6 +295,8 @@ class ClosureEquations:
             gaps[frames.rows] = gap
         for coupling in self.couplings:
             gaps[coupling.row] = coupling.gap(q)
+        for held in self.held:
+            gaps[held.rows] += q[held.idx_q]
         return gaps
 
     def largest_gap(self, gaps: Array) -> float:
@@ -279,7 +322,7 @@ class ClosureEquations:
             gap = self.row_scale[coupling.row] * coupling.gap(q)
             if not gap * gap <= limit:
                 return True
-        return False
+        return bool(self.held) and not self.largest_gap(self.current_gaps(q)) <= reach
 
     def accept(self, gap: float) -> None:
         """Count configurations with this gap (m) as closed: a rounded file leaves it."""
@@ -314,6 +357,8 @@ class ClosureEquations:
             if frames.closure.kind == "spherical":
                 points.append(point)
                 continue
+            if isinstance(frames.closure, FrameCoordinates):
+                continue  # tested by their gaps
             rotation = partial(_NINE, memoryview(placement.rotation.T))
             squared_gap = partial(frames.selected.squared_gap, self.length)
             others.append((point, rotation, squared_gap))
@@ -326,9 +371,11 @@ class ClosureEquations:
         rows = self._rows_of_couplings(q)
         rates, accelerations = rows @ v, rows @ a + self._curvature(q, v)
         for frames in self.closed_frames:
-            rates[frames.rows], accelerations[frames.rows] = (
+            rate, acceleration = (
                 self._world_motion(frames) if frames.in_world else self._selected_motion(frames)
             )
+            rates[frames.rows] += rate
+            accelerations[frames.rows] += acceleration
         return LoopErrors(gaps, rates, accelerations)
 
     def bias(self, q: Array, v: Array) -> Array:
@@ -339,6 +386,7 @@ class ClosureEquations:
         model, data, acceleration = self.model, self.data, pin.getFrameClassicalAcceleration
         pin.forwardKinematics(model, data, q, v, self._still)
         bias = self._curvature(q, v)
+        self.look_at(q)
         for frames in self._points:
             bias[frames.rows] = (
                 acceleration(model, data, frames.a.joint, frames.a.placement, _WORLD).linear
@@ -417,6 +465,10 @@ class ClosureEquations:
             subspace = local.reshape(6, self.model.nv)[:, columns]
             angular[columns] = np.abs(subspace[3:]).max(axis=0) > 1e-12
         return angular
+
+
+def _has_joints(frames: ClosedFrames) -> bool:
+    return isinstance(frames.closure, FrameCoordinates)
 
 
 def _refuse_other_orders(model: pin.Model) -> None:

@@ -7,14 +7,17 @@ X = J6 v = -xi, the twist of a relative to b. Each row of a closure is a wrench 
     rate of the gap = w . X,
 
 and, by duality, the wrench that a unit of its multiplier exerts on a's side, in a's axes at a's
-origin. A `Rows` object stacks some: W(M), shape (k, 6). There are four sorts:
+origin. A `Rows` object stacks some: W(M), shape (k, 6). There are five sorts:
 
 - `PointRows`: p stays in the planes through the origin across directions u fixed in a,
   gap -u . p, w = (u, p x u): a force along u through b's origin;
 - `AxisRows`: a direction n = R n_b fixed in b stays perpendicular to m fixed in a, gap m . n,
   w = (0, m x n);
 - `FrameRows`: the frames stay parallel, gap -log(R), w = (0, e_i);
-- `DistanceRows`: |p| stays as it is, gap L - |p|, w = (p / |p|, 0).
+- `DistanceRows`: |p| stays as it is, gap L - |p|, w = (p / |p|, 0);
+- `RotationVectorRows`: components of R's rotation vector r, gap -r_i, w = (0, row i of A(r)), see
+  `rotation_vector`; with `PointRows` along the axes they are `FrameCoordinates`, whose joints'
+  values are added to the gaps.
 
 Since W depends on M, accelerations need its first derivative along a twist eta of b relative to a,
 and derivatives of the dynamics its first and second.
@@ -31,7 +34,9 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array, Bools
+from rps_pin.closed_loop.constraints import rotation_vector
 from rps_pin.closed_loop.constraints.closures import LoopClosure
+from rps_pin.closed_loop.constraints.frame_coordinates import FrameCoordinates
 
 skew = pin.skew
 
@@ -83,7 +88,7 @@ class PointRows(Rows):
         self.directions = directions
         self._at_origin = np.hstack([directions, np.zeros_like(directions)])
         self.angular = np.zeros(len(directions), dtype=bool)
-        self._cross = np.array([skew(u) for u in directions])
+        self._cross = np.array([skew(u) for u in directions]).reshape(-1, 3, 3)
         self._rows: list[list[float]] = directions.tolist()
 
     def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
@@ -269,6 +274,61 @@ class DistanceRows(Rows):
         return p / length, length
 
 
+class RotationVectorRows(Rows):
+    """Components of the rotation vector r of b in a, by their axes (k,).
+
+    Of the two rotation vectors below a whole turn it is the one whose components are nearer to
+    `near` (3,), which is set before each use; NaN where a component does not count.
+    """
+
+    def __init__(self, axes: Sequence[int]) -> None:
+        self.axes = list(axes)
+        self.angular = np.ones(len(self.axes), dtype=bool)
+        self.near = np.full(3, np.nan)
+
+    def squared_gap(self, lever: float, p: Floats, R: Floats) -> float:
+        """Return NaN: joints hold the values of these rows, which are not known here."""
+        return math.nan
+
+    def gap(self, placement: pin.SE3) -> Array:
+        """Return -r_i."""
+        return -self._vector(placement)[self.axes]
+
+    def wrenches(self, placement: pin.SE3) -> Array:
+        """Return (0, A)."""
+        rates = rotation_vector.rate_matrix(self._vector(placement))
+        return np.hstack([np.zeros((len(self.axes), 3)), rates[self.axes]])
+
+    def bias(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return A' X_a, A' along r' = -A X_a."""
+        r, spin = self._vector(placement), twist[3:]
+        rate = -rotation_vector.rate_matrix(r) @ spin
+        return np.asarray(rotation_vector.rate_slope(r, rate) @ spin)[self.axes]
+
+    def slope(self, placement: pin.SE3) -> Array:
+        """Return dA along dr = A eta_a."""
+        r = self._vector(placement)
+        slopes = np.zeros((3, 6, 6))
+        for k, along in enumerate(rotation_vector.rate_matrix(r).T):
+            slopes[:, 3:, 3 + k] = rotation_vector.rate_slope(r, along)
+        return slopes[self.axes]
+
+    def slope_rate(self, placement: pin.SE3, twist: Array) -> Array:
+        """Return d(dA along A xi_a): the second derivative of A, and dA along (dA) xi_a."""
+        r, spin = self._vector(placement), twist[3:]
+        rates = rotation_vector.rate_matrix(r)
+        along, slopes = rates @ spin, np.zeros((3, 6, 6))
+        for k, moved in enumerate(rates.T):
+            turned = rotation_vector.rate_slope(r, moved) @ spin
+            slopes[:, 3:, 3 + k] = rotation_vector.rate_curvature(r, along, moved)
+            slopes[:, 3:, 3 + k] += rotation_vector.rate_slope(r, turned)
+        return slopes[self.axes]
+
+    def _vector(self, placement: pin.SE3) -> Array:
+        near = None if np.isnan(self.near).all() else self.near
+        return rotation_vector.rotation_vector(placement.rotation, near)
+
+
 class Stack(Rows):
     """Several sorts of rows, one below the other."""
 
@@ -322,6 +382,9 @@ def _dot(a: Sequence[float], b: Floats) -> float:
 def rows_of(closure: LoopClosure) -> Rows:
     """Return the rows of a closure, in frame a's axes, forces before moments."""
     point = PointRows(np.eye(3))
+    if isinstance(closure, FrameCoordinates):
+        positions = PointRows(np.eye(3)[list(closure.linear)])
+        return Stack([positions, RotationVectorRows(closure.angular)])
     if closure.kind == "spherical":
         return point
     if closure.kind == "rigid":

@@ -23,7 +23,14 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.assembly.closing import close, closed_gap
 from rps_pin.closed_loop.column_names import named_velocities
-from rps_pin.closed_loop.constraints.closures import Closure, JointCoupling, LoopClosure, frame_id
+from rps_pin.closed_loop.constraints.closures import (
+    Closure,
+    JointCoupling,
+    LoopClosure,
+    frame_id,
+    joint_id,
+)
+from rps_pin.closed_loop.constraints.frame_coordinates import check_coordinates
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.editing.merge import (
     JointMerge,
@@ -34,7 +41,12 @@ from rps_pin.closed_loop.editing.merge import (
 from rps_pin.closed_loop.editing.present_pose import closure_at
 from rps_pin.closed_loop.editing.replace import replace_joints, replaced_configuration
 from rps_pin.closed_loop.io.gepetto import is_gepetto, parts_from_gepetto
-from rps_pin.closed_loop.io.mechanism_schema import ClosureEntry, CouplingEntry, Description
+from rps_pin.closed_loop.io.mechanism_schema import (
+    ClosureEntry,
+    CouplingEntry,
+    Description,
+    PlacementEntry,
+)
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts, without_position_limits
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
@@ -103,6 +115,7 @@ def parts_from_yaml(
         characteristic_length=description.characteristic_length,
         max_condition=description.max_condition,
         accuracy=description.accuracy,
+        task=_task(file, description, parts.model),
     )
 
 
@@ -275,6 +288,36 @@ def _angle(where: str, name: str, given: Array) -> float:
     return float(np.arctan2(given[1], given[0]))
 
 
+# Task ---------------------------------------------------------------------------------------------
+
+
+def _task(file: YamlFile, description: Description, model: pin.Model) -> dict[str, Any] | None:
+    """Return the arguments of a task whose frames, joints and coordinates there are."""
+    entry = description.task
+    if entry is None:
+        return None
+    if (entry.frame is None) != (entry.coordinates is None) or (
+        (entry.frame is None) == (entry.joints is None)
+    ):
+        raise MechanismError(
+            f"{file.place(('task',))}: a task has a frame and its coordinates, or joints"
+        )
+    if entry.joints is not None and (entry.placement or entry.reference != "universe"):
+        key = "placement" if entry.placement else "reference"
+        raise MechanismError(f"{file.place(('task', key))}: {key} belongs to a frame's task")
+    for i, name in enumerate(entry.coordinates or ()):
+        with file.at("task", "coordinates", i):
+            check_coordinates([name])
+    for key in ("frame", "reference"):
+        if getattr(entry, key) is not None:
+            with file.at("task", key):
+                frame_id(model, getattr(entry, key), "task")
+    for i, name in enumerate(entry.joints or ()):
+        with file.at("task", "joints", i):
+            joint_id(model, name, "task")
+    return entry.model_dump() | {"placement": _placed(entry.placement)}
+
+
 # Closures -----------------------------------------------------------------------------------------
 
 
@@ -304,14 +347,17 @@ def _closures(
 
 
 def _fields(entry: ClosureEntry) -> dict[str, Any]:
-    """Return the fields of a closure; R = R_z(yaw) R_y(pitch) R_x(roll) of an offset."""
+    """Return the fields of a closure."""
     fields = entry.model_dump(exclude={"at_home"})
-    for end in ("placement_a", "placement_b"):
-        offset = getattr(entry, end)
-        if offset is not None:
-            turn = pin.rpy.rpyToMatrix(*offset.rpy)
-            fields[end] = pin.SE3(turn, np.array(offset.xyz)).homogeneous
-    return fields
+    return fields | {end: _placed(getattr(entry, end)) for end in ("placement_a", "placement_b")}
+
+
+def _placed(offset: PlacementEntry | None) -> Array | None:
+    """Return the matrix of an offset, R = R_z(yaw) R_y(pitch) R_x(roll)."""
+    if offset is None:
+        return None
+    turn = pin.rpy.rpyToMatrix(*offset.rpy)
+    return np.asarray(pin.SE3(turn, np.array(offset.xyz)).homogeneous)
 
 
 def _standing(

@@ -52,6 +52,17 @@ class MergeEntry(Entry):
     name: Text
 
 
+class TaskEntry(Entry):
+    """The arguments of a `Task`: a frame and its coordinates, or joints."""
+
+    frame: Text | None = None
+    coordinates: list[Text] | None = None
+    joints: list[Text] | None = None
+    reference: Text = "universe"
+    placement: PlacementEntry | None = None
+    characteristic_length: Positive | None = None
+
+
 class Description(Entry):
     """A mechanism file; it has one of `urdf` and `mjcf`.
 
@@ -83,3 +94,4 @@ class Description(Entry):
     characteristic_length: Positive | None = None
     max_condition: Annotated[float, Field(ge=1, allow_inf_nan=False)] | None = None
     accuracy: NonNegative | None = None
+    task: TaskEntry | None = None

@@ -47,6 +47,8 @@ class MechanismParts:
         Or None if the description does not say.
     accuracy
         As for `ClosedLoopModel`; None if the description does not say.
+    task
+        Arguments of the mechanism's `Task`; None if the description does not say.
     continuous
         Revolute joints that the file calls continuous; a home may give their cosine and sine.
     notes
@@ -68,6 +70,7 @@ class MechanismParts:
     characteristic_length: float | None = None
     max_condition: float | None = None
     accuracy: float | None = None
+    task: Mapping[str, Any] | None = None
     continuous: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
     place_of: Callable[[str], str] | None = field(default=None, compare=False)

@@ -22,6 +22,7 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.assembly.modes import FoundModes, assembly_modes
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.constraints.equations import LoopErrors
+from rps_pin.closed_loop.constraints.unit_parts import normalised, unit_parts
 from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.dynamics.derivatives import (
     ForwardDynamicsDerivatives,
@@ -86,6 +87,7 @@ class CompiledMechanism:
         self._calls, self._single = _Calls(code), _Single(code)
         self._is_actuated = code.partition.is_actuated
         self._chosen: dict[tuple[str, ...], bool] = {}  # whether these are the independent joints
+        self._unit_parts = unit_parts(self.mechanism.model)
         self._underactuated = code.partition.actuated_rank < code.partition.independent.size
 
     def __copy__(self) -> CompiledMechanism:
@@ -301,6 +303,7 @@ class CompiledMechanism:
         *,
         within_limits: bool = True,
         jump: bool = False,
+        restarts: int = 20,
         **options: Any,
     ) -> Array:
         """Return the closed configurations in which some joints have given values, (..., nq).
@@ -311,7 +314,9 @@ class CompiledMechanism:
         is an array (..., na) of the actuated joints'; by name, one value for each joint.
         """
         ordered: Any = values
+        whole_number(restarts, "restarts", 0)
         given: dict[str, Any] = {"within_limits": within_limits, "jump": jump}
+        given["restarts"] = restarts
         guess = self.reference().home if q_guess is None else self._normalised(q_guess)
         if isinstance(values, Mapping):
             if any(np.ndim(one) for one in values.values()) or set(values) != set(self.actuated):
@@ -327,17 +332,15 @@ class CompiledMechanism:
         def answer(m: ClosedLoopModel, q: Array, wanted: Array) -> Sequence[Any]:
             return (m.complete(wanted[at], q, **given),)
 
-        if not all(map(self.model.existJointName, self.actuated)):  # a part of a joint
+        at = self._actuated_coordinates
+        if at is None:
             return self._by_one(
                 lambda m, q, x: (m.complete(x, q, **given),), (guess, asked), **options
             )
-        joints = [self.model.joints[self.model.getJointId(name)] for name in self.actuated]
-        at = np.array([joint.idx_q for joint in joints], dtype=np.intp)
         batch = np.broadcast_shapes(asked.shape[:-1], guess.shape[:-1])
         wanted = np.broadcast_to(guess, (*batch, self.model.nq)).copy()
         wanted[..., at] = asked
-        simple = system.actuated.size == count and all(joint.nq == 1 for joint in joints)
-        if not (simple and self.code.partition.is_actuated):
+        if not (system.actuated.size == count and self._is_actuated):
             return self._by_one(answer, (guess, wanted), **options)
         if jump:
             return self._closed(
@@ -387,17 +390,26 @@ class CompiledMechanism:
         refused = outside if within_limits and limits.q.size else None
         return np.asarray(self._run(name, given, answer, refused=refused, **options)[0])
 
+    @cached_property
+    def _actuated_coordinates(self) -> Indices | None:
+        """Where the actuated joints are in q; None if one has not one coordinate of its own."""
+        model = self.model
+        if not all(map(model.existJointName, self.actuated)):
+            return None
+        joints = [model.joints[model.getJointId(name)] for name in self.actuated]
+        if any(joint.nq != 1 for joint in joints):
+            return None
+        return np.array([joint.idx_q for joint in joints], dtype=np.intp)
+
     def _normalised(self, q: ArrayLike) -> Array:
         """Return configurations with quaternions of unit length."""
-        system = self.mechanism.system
         nq = self.model.nq
         given = numbers(q, "q_guess", f"numbers of shape (..., {nq})")
         if given.shape[-1:] != (nq,):
             raise InputError(f"q_guess has shape {given.shape}; expected (..., {nq})")
-        if all(joint.nq == joint.nv for joint in list(self.model.joints)[1:]):
-            return given
-        normalised = by_samples(lambda one: (system.normalised(one, "q_guess"),), (given,), [(nq,)])
-        return np.asarray(normalised[0])
+        if given.ndim == 1:
+            return self.mechanism.system.normalised(given, "q_guess")
+        return normalised(given, self._unit_parts, "q_guess")
 
     # Velocity and acceleration --------------------------------------------------------------------
 

@@ -65,6 +65,9 @@ _STENCIL = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
 #: Of a proof's steps in time, those of a call together, s, and of Newton's guesses, rad or
 #: characteristic lengths.
 STEP, _AWAY = 1e-5, 1e-3
+#: Condition number of J_d up to which Newton's method contracts from such guesses; beside a
+#: singularity it does from proportionally nearer ones.
+_CONTRACTS = 100.0
 #: Condition number of J_d that the walk towards a singularity does not pass.
 _SINGULAR = 1e3
 #: And above which a state is too near to one to be of use.
@@ -167,7 +170,8 @@ class Proof:
         v = basis @ u
         move = np.zeros(model.nv)
         move[self._dependent] = rng.normal(size=self._dependent.size)
-        near = pin.integrate(model, q, _AWAY * move * m.system.column_scale)
+        away = _AWAY * min(1.0, _CONTRACTS / self._condition(q))
+        near = pin.integrate(model, q, away * move * m.system.column_scale)
         a = self._acceleration(q, v, w)
         weight = float(
             np.abs(pin.computeGeneralizedGravity(model, m.system.data, q)).max(initial=0)

@@ -19,6 +19,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import JointCoupling, LoopClosure
 from rps_pin.closed_loop.constraints.couplings import coupling_row
 from rps_pin.closed_loop.constraints.equations import ClosureEquations
+from rps_pin.closed_loop.constraints.frame_coordinates import FrameCoordinates
 from rps_pin.closed_loop.constraints.rows import across
 from rps_pin.codegen.expressions.chains import Chains, End, Motion, constant, cross, tidy
 from rps_pin.codegen.expressions.joints import Expression
@@ -27,6 +28,8 @@ from rps_pin.codegen.expressions.tree import Tree
 #: A sine that vanishes beside rounding errors, in place of 0 in the quotient of an angle and its
 #: sine. Its square is a normal number in single precision too.
 _TINY = 2.0**-62
+#: Square of an angle below which series stand for quotients.
+_SMALL_TURN = 1e-4
 #: A direction that is perpendicular to no likely axis.
 _ANY = np.array([1.0, 0.7, 0.4])
 
@@ -188,6 +191,9 @@ def closure_rows(tree: Tree, equations: ClosureEquations) -> ClosureRows:
             parts.append(_coupling(tree, closure, bool(equations.angular_rows[rows.start])))
             continue
         ends = _ends(tree, closure)
+        if isinstance(closure, FrameCoordinates):
+            parts.append(_coordinates(tree, chains, ends, closure))
+            continue
         parts.append(_KINDS[closure.kind](chains, ends, closure))
         if closure.kind in ("spherical", "rigid"):
             root = chains.ancestor(ends[0].joint, ends[1].joint)
@@ -301,6 +307,62 @@ def _selected(
         )
 
     return rows
+
+
+def _coordinates(tree: Tree, chains: Chains, ends: _Ends, closure: FrameCoordinates) -> _Rows:
+    """Coordinates of b in a, less what joints hold: x - p, and x - r with r' = A w.
+
+    A' w = -r' x w / 2 + beta (r' x (r x w) + r x (r' x w)) + beta' r x (r x w).
+    """
+    motion = chains.between(*ends, sign=-1)
+    joints = [tree.model.joints[tree.model.getJointId(name)] for name in closure.joints]
+    held = ca.vertcat(*(tree.q[joint.idx_q] for joint in joints))
+    columns = ca.SX(closure.size, tree.v.numel())
+    for row, joint in enumerate(joints):
+        columns[row, joint.idx_v] = 1
+    axes, count = np.eye(3), len(closure.linear)
+    directions, turning = constant(axes[[*closure.linear]]), constant(axes[[*closure.angular]])
+    gap = held[:count] - directions @ motion.origin
+    jacobian, rate = directions @ motion.jacobian, directions @ motion.velocity
+    bias, turned = directions @ motion.acceleration, ca.SX(1, 1)
+    if closure.angular:
+        r, spin = _nearer_vector(motion.rotation, held[count:], turning), motion.spin
+        squared = ca.sumsqr(r)
+        value, slope = _beta(squared)
+        rates = ca.SX.eye(3) - ca.skew(r) / 2 + value * (r @ r.T - squared * ca.SX.eye(3))
+        r_rate = rates @ spin
+        across, moved = cross(r, spin), cross(r_rate, spin)
+        change = value * (cross(r_rate, across) + cross(r, moved)) - moved / 2
+        change += 2 * slope * (r.T @ r_rate) * cross(r, across)
+        away = held[count:] - turning @ r
+        gap, turned = ca.vertcat(gap, away), ca.sumsqr(away)
+        jacobian = ca.vertcat(jacobian, -turning @ (rates @ motion.spin_jacobian))
+        rate = ca.vertcat(rate, -turning @ r_rate)
+        bias = ca.vertcat(bias, -turning @ (change + rates @ motion.spin_rate))
+    apart = ca.sumsqr(gap[:count])
+    return _Rows(gap, jacobian + columns, rate + columns @ tree.v, bias, apart, turned)
+
+
+def _nearer_vector(rotation: Expression, near: Expression, chosen: Expression) -> Expression:
+    """Return the rotation vector whose chosen components are nearer: r, or r less a whole turn."""
+    r = -_turn_between(ca.SX.eye(3), rotation)[0]
+    angle = ca.sqrt(ca.fmax(ca.sumsqr(r), _TINY**2))
+    other = r * (1 - 2 * np.pi / angle)
+    nearer = ca.sumsqr(chosen @ other - near) < ca.sumsqr(chosen @ r - near)
+    return ca.if_else(nearer, other, r)
+
+
+def _beta(squared: Expression) -> tuple[Expression, Expression]:
+    """Return beta and its derivative by t = r . r; see `rotation_vector`."""
+    small, t = squared < _SMALL_TURN, ca.fmax(squared, _SMALL_TURN)
+    half = ca.sqrt(t) / 2
+    c = half * ca.cos(half) / ca.sin(half)
+    value = (1 - c) / t
+    slope = -((c - c * c) / (2 * t) - 1 / 8 + value) / t
+    return (
+        ca.if_else(small, 1 / 12 + squared / 720 + squared * squared / 30240, value),
+        ca.if_else(small, 1 / 720 + squared / 15120 + squared * squared / 403200, slope),
+    )
 
 
 def _whole(closure: LoopClosure) -> Array:

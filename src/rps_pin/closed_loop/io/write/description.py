@@ -60,6 +60,8 @@ def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, An
         lines.append(f"max_condition: {number(source.max_condition)}")
     if source.accuracy is not None:
         lines.append(f"accuracy: {number(source.accuracy)}")
+    if source.task is not None:
+        lines.append(f"task: {_value(_with_offsets(source.task))}")
     return "\n".join(lines) + "\n"
 
 
@@ -85,8 +87,13 @@ def _by_joint(model: pin.Model, array: Array) -> dict[str, Any]:
 
 
 def _closure(closure: LoopClosure) -> dict[str, Any]:
-    entry = {name: value for name, value in vars(closure).items() if value is not None}
-    for end in ("placement_a", "placement_b"):
+    return _with_offsets(vars(closure))
+
+
+def _with_offsets(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is given of some fields, placements as offsets."""
+    entry = {name: value for name, value in given.items() if value is not None}
+    for end in ("placement", "placement_a", "placement_b"):
         if end in entry:
             offset = pin.SE3(np.array(entry[end]))
             angles = pin.rpy.matrixToRpy(offset.rotation)

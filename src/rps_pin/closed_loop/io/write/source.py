@@ -8,7 +8,7 @@ that row, with massless links between: q and v keep their entries.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,7 +40,7 @@ class Source(NamedTuple):
         A closed configuration, shape (nq,), or None if the mechanism has none.
     characteristic_length
         m.
-    max_condition, accuracy
+    max_condition, accuracy, task
         Of `ClosedLoopModel`.
     """
 
@@ -53,6 +53,7 @@ class Source(NamedTuple):
     characteristic_length: float
     max_condition: float
     accuracy: float | None = None
+    task: Mapping[str, Any] | None = None
 
 
 _IN_XML = re.compile("[\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")

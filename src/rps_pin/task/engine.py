@@ -1,0 +1,74 @@
+"""The Pinocchio engine with the batches that generated code has, for the maps of a task."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.codegen.engine.batches import Errors, by_samples
+
+
+class PinocchioEngine:
+    """Calls of a `ClosedLoopModel`, sample by sample; named as those of `CompiledMechanism`."""
+
+    def __init__(self, mechanism: ClosedLoopModel) -> None:
+        self._mechanism = mechanism
+        model = mechanism.model
+        self._nq, self._nv, self._count = model.nq, model.nv, mechanism.actuated_indices.size
+
+    def complete(
+        self,
+        values: ArrayLike,
+        q_guess: ArrayLike | None = None,
+        *,
+        within_limits: bool = True,
+        restarts: int = 20,
+        errors: Errors = "raise",
+    ) -> Array:
+        """Return configurations with given actuated coordinates, (..., nq)."""
+        guess = self._mechanism.home if q_guess is None else q_guess
+
+        def answer(x: Array, q: Array) -> Array:
+            return self._mechanism.complete(x, q, within_limits=within_limits, restarts=restarts)
+
+        return self._each(answer, (values, guess), (self._nq,), errors)
+
+    def velocity(self, q: ArrayLike, v_actuated: ArrayLike, errors: Errors = "raise") -> Array:
+        """Return velocities of given actuated ones, (..., nv)."""
+        return self._each(self._mechanism.velocity, (q, v_actuated), (self._nv,), errors)
+
+    def acceleration(
+        self, q: ArrayLike, v: ArrayLike, a_actuated: ArrayLike, errors: Errors = "raise"
+    ) -> Array:
+        """Return accelerations of given actuated ones, (..., nv)."""
+        return self._each(self._mechanism.acceleration, (q, v, a_actuated), (self._nv,), errors)
+
+    def motion_basis(self, q: ArrayLike, errors: Errors = "raise") -> Array:
+        """Return T, (..., nv, m)."""
+        return self._each(self._mechanism.motion_basis, (q,), (self._nv, self._count), errors)
+
+    def gaps(self, q: ArrayLike, errors: Errors = "raise") -> Array:
+        """Return the gaps of the closures' rows, (..., nc)."""
+
+        def answer(q: Array) -> Array:
+            return self._mechanism.loop_errors(q).position
+
+        return self._each(answer, (q,), (self._mechanism.constraint_size,), errors)
+
+    def mass_matrix(self, q: ArrayLike, errors: Errors = "raise") -> Array:
+        """Return the reduced mass matrix, (..., m, m)."""
+        return self._each(self._mechanism.mass_matrix, (q,), (self._count, self._count), errors)
+
+    @staticmethod
+    def _each(
+        answer: Callable[..., Any],
+        given: Sequence[ArrayLike],
+        shape: tuple[int, ...],
+        errors: Errors,
+    ) -> Array:
+        return np.asarray(by_samples(lambda *x: (answer(*x),), given, [shape], errors)[0])

@@ -1,0 +1,397 @@
+"""Task: the coordinates that a mechanism is for.
+
+With x the task's coordinates, a the actuators' and K = da/dx, forces that belong to them do the
+same work, and gains the same forces:
+
+    f = K' tau,   G_x = K' G_a K + sum_i tau_i H_i.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.codegen.engine.batches import Errors
+from rps_pin.errors import InputError, MechanismError, SingularityError
+from rps_pin.numerics.linear_algebra import rank, singular_values
+from rps_pin.task import polytope
+from rps_pin.task.maps import TaskMaps, options_of
+from rps_pin.task.singularity import SingularityMeasures
+from rps_pin.validation import numbers
+
+
+class Task(TaskMaps):
+    """What a mechanism is for: coordinates of a frame, or of joints.
+
+    As many coordinates as the mechanism has motions, idle freedoms not counted. All array arguments
+    take leading batch dimensions. An object serves one thread at a time, as its mechanism does;
+    that of `compile` serves any number.
+
+    Parameters
+    ----------
+    mechanism
+        The mechanism.
+    frame
+        Name of the output frame.
+    coordinates
+        Of the frame: some of ``"x"``, ``"y"``, ``"z"``, the place of its origin (m), and ``"rx"``,
+        ``"ry"``, ``"rz"``, its rotation vector (rad), in the reference frame's axes. A rotation
+        vector is less than a whole turn long.
+    joints
+        Names of joints of one coordinate, in place of a frame and its coordinates.
+    reference
+        Name of the frame that coordinates are taken in; the world if left out.
+    placement
+        Where the output frame stands in the frame named: a `pin.SE3` or a matrix of shape (4, 4).
+    characteristic_length
+        Length that makes angles and lengths of the task comparable, m; that of the mechanism if
+        left out.
+
+    Attributes
+    ----------
+    mechanism : ClosedLoopModel
+        As given.
+    extended : ClosedLoopModel
+        The mechanism with a joint without mass for each coordinate of the frame, after its own
+        joints, and these as its actuated joints: its dynamics is that of the task.
+    coordinates : tuple of str
+        Names of the coordinates.
+    angular : tuple of bool
+        Which are angles.
+
+    Raises
+    ------
+    InputError
+        If neither a frame with coordinates nor joints are given, or both.
+    MechanismError
+        If a frame, joint or coordinate is unknown; if there are too many coordinates or too few, or
+        some do not move independently.
+    """
+
+    # Forces ---------------------------------------------------------------------------------------
+
+    def forces_to_actuators(
+        self, q: ArrayLike, forces: ArrayLike, *, errors: Errors = "raise"
+    ) -> Array:
+        """Return the actuators' forces that make forces of the task, shape (..., na), N or N m.
+
+        K' tau = f; of least norm where there are more actuators than coordinates.
+
+        Parameters
+        ----------
+        q
+            Closed configurations, shape (..., nq).
+        forces
+            f, shape (..., m): the power is f . x'. Those of a rotation vector are moments about the
+            axes only where it is zero; for moments use `wrench_to_actuators`.
+
+        Raises
+        ------
+        SingularityError
+            If the actuators do not determine the task here (type II).
+        """
+        K = self.jacobian(q, errors=errors)
+        f = self._rows(forces, self.size, "forces")
+        return self._carried(K, f, errors)
+
+    def forces_to_task(self, q: ArrayLike, tau: ArrayLike, *, errors: Errors = "raise") -> Array:
+        """Return the task's forces f = K' tau of actuators' forces (..., na), shape (..., m)."""
+        tau_ = self._rows(tau, self._actuated.size, "tau")
+        return np.asarray(np.einsum("...ij,...i->...j", self.jacobian(q, errors=errors), tau_))
+
+    def twist_map(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
+        """Return E, shape (..., 6, m): the output frame's twist is E x'.
+
+        (linear, angular) of the frame's origin in world axes, m/s and rad/s.
+
+        Raises
+        ------
+        MechanismError
+            If the task is one of joints, which has no output frame.
+        """
+        if self._x.frame is None:
+            raise MechanismError(
+                "a task of joints has no output frame; name one: Task(mechanism, frame=...)"
+            )
+        q_ = self._rows(q, self._nq, "q")
+        basis = self._basis(q_, errors)[..., : self._nv, :]
+        batch = np.broadcast_shapes(q_.shape[:-1], basis.shape[:-2])
+        found = np.empty((*batch, 6, self.size))
+        for index in np.ndindex(batch):
+            found[index] = self._frame_jacobian(q_[index]) @ basis[index]
+        return found
+
+    def wrench_to_actuators(
+        self, q: ArrayLike, wrench: ArrayLike, *, errors: Errors = "raise"
+    ) -> Array:
+        """Return the actuators' forces that make a wrench of the output frame, (..., na).
+
+        Parameters
+        ----------
+        q
+            Closed configurations, shape (..., nq).
+        wrench
+            (force, moment) that the frame exerts at its origin, in world axes, N and N m, shape
+            (..., 6). Parts that the closures bear need no actuator.
+
+        Raises
+        ------
+        SingularityError, MechanismError
+            As `forces_to_actuators` and `twist_map`.
+        """
+        given = self._rows(wrench, 6, "wrench")
+        forces = np.einsum("...ij,...i->...j", self.twist_map(q, errors=errors), given)
+        return self.forces_to_actuators(q, forces, errors=errors)
+
+    # Gains and inertia ----------------------------------------------------------------------------
+
+    def gains_to_actuators(
+        self,
+        q: ArrayLike,
+        gains: ArrayLike,
+        *,
+        forces: ArrayLike | None = None,
+        errors: Errors = "raise",
+    ) -> Array:
+        """Return stiffness or damping of the actuators that gives the task's, (..., na, na).
+
+        G_a = K^-T (G_x - sum_i tau_i H_i) K^-1: G_x = K' G_a K + sum_i tau_i H_i, where the second
+        term, only of stiffness, is that of actuators that push while K changes.
+
+        Parameters
+        ----------
+        q
+            Closed configurations, shape (..., nq).
+        gains
+            G_x, shape (..., m, m), or its diagonal, (m,): N/m, N m/rad (stiffness) or N s/m.
+        forces
+            The actuators' forces tau there, shape (..., na); zero if left out. For damping leave
+            them out.
+
+        Raises
+        ------
+        SingularityError
+            If the actuators do not determine the task here.
+        MechanismError
+            If there are more actuators than coordinates: their gains are not determined.
+        """
+        K = self._square(q, errors)
+        wanted = self._matrix(gains, self.size, "gains")
+        if forces is not None:
+            wanted = wanted - self._geometric(q, forces, errors)
+        half = np.swapaxes(self._solved(np.swapaxes(K, -1, -2), wanted, errors), -1, -2)
+        return np.swapaxes(self._solved(np.swapaxes(K, -1, -2), half, errors), -1, -2)
+
+    def gains_to_task(
+        self,
+        q: ArrayLike,
+        gains: ArrayLike,
+        *,
+        forces: ArrayLike | None = None,
+        errors: Errors = "raise",
+    ) -> Array:
+        """Return stiffness or damping of the task that the actuators' gives, (..., m, m).
+
+        K' G_a K + sum_i tau_i H_i; see `gains_to_actuators`. ``gains`` are (..., na, na) or (na,).
+        """
+        K = self.jacobian(q, errors=errors)
+        found = np.swapaxes(K, -1, -2) @ self._matrix(gains, self._actuated.size, "gains") @ K
+        return found if forces is None else found + self._geometric(q, forces, errors)
+
+    def mass_matrix(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
+        """Return the task's mass matrix, shape (..., m, m): the kinetic energy is x' M x' / 2."""
+        q_ = self._rows(q, self._nq, "q")
+        whole = self._whole(q_, errors)
+        return np.asarray(self._by_task.mass_matrix(whole, **options_of(errors)))
+
+    # Polytopes ------------------------------------------------------------------------------------
+
+    def force_polytope(
+        self,
+        q: ArrayLike,
+        limits: tuple[ArrayLike, ArrayLike] | None = None,
+        *,
+        used: ArrayLike | None = None,
+    ) -> polytope.Polytope:
+        """Return the forces of the task that actuators within limits make, at one configuration.
+
+        Parameters
+        ----------
+        q
+            Closed configuration, shape (nq,).
+        limits
+            Least and largest forces of the actuators, shape (na,) each, N or N m; left out, the
+            model's effort limits.
+        used
+            Forces that the actuators exert already, (na,), for weight as an example; zero if left
+            out.
+
+        Raises
+        ------
+        InputError
+            If an actuator has no limit.
+        SingularityError
+            If the actuators do not determine the task here.
+        """
+        lower, upper = self._limits(limits, self.mechanism.model.effortLimit, "force")
+        if used is not None:
+            taken = self._rows(used, self._actuated.size, "used")
+            lower, upper = lower - taken, upper - taken
+        K = self.jacobian(self._one(q))
+        return polytope.of_forces(K, lower, upper, 1 / self._units)
+
+    def speed_polytope(
+        self, q: ArrayLike, limits: tuple[ArrayLike, ArrayLike] | None = None
+    ) -> polytope.Polytope:
+        """Return the rates of the task that actuators within limits make, at one configuration.
+
+        Parameters
+        ----------
+        q
+            Closed configuration, shape (nq,).
+        limits
+            Least (negative) and largest speeds of the actuators, (na,) each; left out, the model's.
+
+        Raises
+        ------
+        InputError, SingularityError
+            As `force_polytope`.
+        """
+        lower, upper = self._limits(limits, self.mechanism.model.velocityLimit, "speed")
+        if not ((lower < 0) & (upper > 0)).all():
+            raise InputError("limits of speeds: the least must be negative, the largest positive")
+        return polytope.of_speeds(self.jacobian(self._one(q)), lower, upper, self._units)
+
+    # Singularities --------------------------------------------------------------------------------
+
+    def singularities(self, q: ArrayLike) -> SingularityMeasures:
+        """Return how far configurations are from singularities; see `singularity`.
+
+        Parameters
+        ----------
+        q
+            Closed configurations, shape (..., nq).
+        """
+        q_ = self._rows(q, self._nq, "q")
+        found = np.empty((*q_.shape[:-1], 4))
+        for index in np.ndindex(q_.shape[:-1]):
+            found[index] = self._measures(q_[index])
+        return SingularityMeasures(*np.moveaxis(found, -1, 0))
+
+    def _measures(self, q: Array) -> tuple[float, float, float, float]:
+        system = self.mechanism.system
+        jacobian = system.scaled(self.mechanism.jacobian(q))
+        values = singular_values(jacobian)
+        motions = self._motions(q)
+        counting = system.model.nv - motions.shape[1]
+        constraint = float(values[counting - 1] / values[0]) if counting else 1.0
+        A = self._frame_rows(q, "raise") @ motions / self._units[:, None]
+        S = motions[self._actuated] / system.column_scale[self._actuated][:, None]
+        type_i = float(singular_values(A)[self.size - 1]) if A.shape[1] >= self.size else 0.0
+        if rank(singular_values(A)) < self.size:
+            return type_i, np.nan, constraint, np.nan
+        K = S @ np.linalg.pinv(A)
+        gains = singular_values(K)
+        type_ii = float(gains[-1]) if K.shape[0] >= self.size else 0.0
+        determinant = np.linalg.det(K) if K.shape[0] == self.size else np.prod(gains)
+        return type_i, type_ii, constraint, float(determinant)
+
+    # Parts ----------------------------------------------------------------------------------------
+
+    def _frame_jacobian(self, q: Array) -> Array:
+        """Return the output frame's Jacobian, (6, nv), in world axes."""
+        mechanism, x = self.mechanism, self._x
+        frame = mechanism.system.frame(x.frame or "")
+        model, data = mechanism.model, mechanism.system.data
+        pin.computeJointJacobians(model, data, q)
+        pin.framesForwardKinematics(model, data, q)
+        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        jacobian = pin.getFrameJacobian(model, data, frame, world).reshape(6, self._nv).copy()
+        lever = data.oMf[frame].rotation @ x.placement.translation
+        jacobian[:3] -= pin.skew(lever) @ jacobian[3:]
+        return np.asarray(jacobian)
+
+    def _one(self, q: ArrayLike) -> Array:
+        found = self._rows(q, self._nq, "q")
+        if found.ndim != 1:
+            raise InputError(f"q has shape {found.shape}; expected ({self._nq},)")
+        return found
+
+    def _matrix(self, given: ArrayLike, size: int, name: str) -> Array:
+        found = numbers(given, name, f"numbers of shape (..., {size}, {size}), or ({size},)")
+        if not np.isfinite(found).all():
+            raise InputError(f"{name} holds numbers that are not finite")
+        if found.shape == (size,):
+            return np.diag(found)
+        if found.shape[-2:] != (size, size):
+            raise InputError(
+                f"{name} has shape {found.shape}; expected (..., {size}, {size}) or ({size},)"
+            )
+        return found
+
+    def _geometric(self, q: ArrayLike, forces: ArrayLike, errors: Errors) -> Array:
+        """Return sum_i tau_i H_i, shape (..., m, m)."""
+        tau = self._rows(forces, self._actuated.size, "forces")
+        return np.asarray(np.einsum("...ijk,...i->...jk", self.hessian(q, errors=errors), tau))
+
+    def _square(self, q: ArrayLike, errors: Errors) -> Array:
+        if self._actuated.size != self.size:
+            raise MechanismError(
+                f"{self._actuated.size} actuators have no determined gains of {self.size} "
+                "coordinates"
+            )
+        return self.jacobian(q, errors=errors)
+
+    def _carried(self, K: Array, f: Array, errors: Errors) -> Array:
+        """Return tau with K' tau = f, of least norm in one unit."""
+        if self._actuated.size < self.size:
+            raise MechanismError(
+                f"{self._actuated.size} actuators do not make all forces of {self.size} coordinates"
+            )
+        return self._solved(np.swapaxes(K, -1, -2), f[..., None], errors)[..., 0]
+
+    def _solved(self, matrix: Array, right: Array, errors: Errors) -> Array:
+        """Return X with matrix X = right, matrix (..., m, na) = K'; checked in one unit."""
+        of_actuators = self.mechanism.velocity_scale[self._actuated]
+        scaled = matrix * self._units[:, None] / of_actuators
+        values = np.linalg.svd(np.nan_to_num(scaled), compute_uv=False)
+        limit = self.mechanism.max_condition
+        bad = np.atleast_1d(values[..., -1] * limit < values[..., 0])
+        if bad.any() and errors == "raise":
+            largest = float((values[..., 0] / np.maximum(values[..., -1], 1e-300)).max())
+            raise SingularityError(
+                "the actuators do not determine the task here: d(actuators)/d(task) has the "
+                f"condition number {largest:.3g}, above {limit:.3g}",
+                largest,
+                limit,
+            )
+        if bad.any():
+            scaled = np.where(bad.reshape(values.shape[:-1])[..., None, None], np.nan, scaled)
+        inverse = _pseudo_inverse(scaled)
+        found: Array = (inverse / of_actuators[:, None] * self._units) @ right
+        return found
+
+    def _limits(
+        self, given: tuple[ArrayLike, ArrayLike] | None, of_model: Array, what: str
+    ) -> tuple[Array, Array]:
+        """Return the least and largest of a quantity of the actuators, (na,) each."""
+        if given is None:
+            upper = np.asarray(of_model, dtype=np.float64)[self._actuated]
+            lower = -upper
+        else:
+            lower, upper = (self._rows(one, self._actuated.size, "limits") for one in given)
+        endless = ~(np.isfinite(lower) & np.isfinite(upper))
+        if endless.any():
+            name = self.mechanism.actuated[int(np.flatnonzero(endless)[0])]
+            raise InputError(f"actuator {name!r} has no {what} limit; give limits=(least, largest)")
+        if not (lower < upper).all():
+            raise InputError("limits: the least must be below the largest")
+        return lower, upper
+
+
+def _pseudo_inverse(matrix: Array) -> Array:
+    """Return the pseudo-inverse of matrices; NaN of those that hold NaN."""
+    found = np.linalg.pinv(np.nan_to_num(matrix))
+    return np.asarray(found + 0.0 * np.swapaxes(matrix.sum(axis=(-2, -1), keepdims=True), -1, -2))
