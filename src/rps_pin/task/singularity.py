@@ -5,18 +5,15 @@ the characteristic length l: an angle counts as l times itself, a length. With J
 Jacobian of rank r, N an orthonormal basis of the motions that it allows, and A and S the rows of
 the task and of the actuators,
 
-================== ============================================== ==============================
-measure            definition                                     zero at
-================== ============================================== ==============================
-`type_i` (input)   least |task's speed| of all allowed motions    the mechanism moves, and its
-                   with |speeds of all joints| = 1                output does not
-`type_ii` (output) least |actuators' speed| of all motions with   the output moves, and no
-                   |task's speed| = 1                             actuator does, so that none
-                                                                  resists
-`constraint`       s_r / s_1, singular values of J                a closure's rows fail: there
-                                                                  is one motion more
-`determinant`      that of K = d(actuators)/d(task), signed       type II
-================== ============================================== ==============================
+- `type_i` (input): the least speed of the task in an allowed motion in which the speed of all
+  joints is 1. Zero where the mechanism moves and its output does not.
+- `type_ii` (output): the least speed of the actuators in a motion in which the task's speed is 1.
+  Zero where the output moves and no actuator does, so that none resists.
+- `constraint`: the last singular value of J that counts over the first, s_r / s_1. Zero where a
+  closure's rows fail, and there is one motion more.
+- `determinant`: that of K = d(actuators)/d(task), signed. Zero with `type_ii`.
+
+A speed is the root of the sum of squares.
 
 The 3-RPS has closed forms in place of these, with the same names and zeros: see
 `rps_pin.rps.singularity.measures` for their definitions.
