@@ -6,14 +6,19 @@ attributes too, so that a program need not read the sentence.
 
 from __future__ import annotations
 
+import os
 import reprlib
+import sys
+import warnings
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from rps_pin.arrays import Array, Bools
 
 _LONGEST = 400
+_PACKAGE = str(Path(__file__).parent) + os.sep
 _REPR = reprlib.Repr()
 _REPR.maxlevel, _REPR.maxlist, _REPR.maxstring, _REPR.maxother = 3, 9, _LONGEST, _LONGEST
 
@@ -158,6 +163,14 @@ class SingularityError(RPSPinError, ArithmeticError):
 
 class AccuracyWarning(UserWarning):
     """The numbers of a mechanism's file are rounded: nearly redundant rows count as redundant."""
+
+
+def warn_caller(text: str, category: type[Warning] = UserWarning) -> None:
+    """Warn at the last line outside the package that led here, however deep in it."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_code.co_filename.startswith(_PACKAGE) and frame.f_back is not None:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, category, stacklevel=level)
 
 
 class LimitExcess(NamedTuple):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -53,7 +52,7 @@ from rps_pin.closed_loop.io.write.source import Source
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.closed_loop.summary import in_lines, in_one_line
-from rps_pin.errors import ClosureError, CompileError, MechanismError
+from rps_pin.errors import ClosureError, CompileError, MechanismError, warn_caller
 from rps_pin.one_thread import one_thread, refuse_second_thread
 from rps_pin.validation import choice, non_negative_number, real_vector, whole_number
 
@@ -1074,10 +1073,9 @@ class ClosedLoopModel:
             If q is open by more than 1e-4 characteristic lengths.
         """
         if choice(method, "method", ("reduced", "proximal")) == "proximal":
-            warnings.warn(
+            warn_caller(
                 "method='proximal' is deprecated and computed as 'reduced'; leave method out",
                 DeprecationWarning,
-                stacklevel=2,
             )
         q_, v_, tau_ = self._configuration(q), self._velocity(v), self._forces(tau)
         guard = self.system.guard

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from rps_pin.closed_loop.io.urdf.tree import urdf_file
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.config import read_yaml
 from rps_pin.contents import known_format
-from rps_pin.errors import InputError, few
+from rps_pin.errors import InputError, few, warn_caller
 from rps_pin.files import opened
 
 PackagePath = Sequence[str | os.PathLike[str]]
@@ -66,7 +65,7 @@ def visual_model(
             urdf = urdf.parent / Path(description.urdf).expanduser()
     shapes, missing = urdf_shapes(urdf, model, package_path)
     if missing:
-        warnings.warn(f"{urdf}: not drawn: {few(missing)}", stacklevel=2)
+        warn_caller(f"{urdf}: not drawn: {few(missing)}")
     return shapes if shapes.ngeoms else None
 
 

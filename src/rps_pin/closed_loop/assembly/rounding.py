@@ -17,7 +17,6 @@ would leave fewer motions than there are actuators. Values between the two are r
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
@@ -30,7 +29,7 @@ from rps_pin.closed_loop.assembly.closing import CLOSED, close, close_gaps, is_c
 from rps_pin.closed_loop.constraints.rank_rule import EXACT, RankRule, Rounding, largest
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.regular import around, values_at
-from rps_pin.errors import AccuracyWarning, ClosureError
+from rps_pin.errors import AccuracyWarning, ClosureError, warn_caller
 from rps_pin.numerics.linear_algebra import (
     RANK_TOLERANCE,
     full_svd,
@@ -140,9 +139,10 @@ def _rule(
     rounding = _rounding(trial, places[0], counted, rest)
     name = system.model.name or "the mechanism"
     if size > limit:
-        _warn(
+        warn_caller(
             f"{name}: nearly redundant rows, {rounding}. They count as they stand; if they are the "
-            f"rounding of the file, set accuracy={2 * size:.1g}, and if not, accuracy=0"
+            f"rounding of the file, set accuracy={2 * size:.1g}, and if not, accuracy=0",
+            AccuracyWarning,
         )
         return EXACT
     tolerance = min(np.sqrt(counted.kept * counted.dropped), _MARGIN * counted.dropped)
@@ -151,9 +151,10 @@ def _rule(
         if counted.dropped
         else "That much may stay open"
     )
-    _warn(
+    warn_caller(
         f"{name}: the file's numbers are rounded, {rounding}. {follows}; set accuracy to change "
-        f"that (now {limit:g}; 0: exact)"
+        f"that (now {limit:g}; 0: exact)",
+        AccuracyWarning,
     )
     gap = limit * system.equations.length
     return RankRule(max(float(tolerance), RANK_TOLERANCE), judged.rank, gap, rounding)
@@ -168,10 +169,6 @@ def _is_exact(trial: ConstraintSystem, q: Array, closed: float) -> bool:
         return True
     places = around(trial, q, within_limits=False, steps=_FIRST)
     return max(_gap(trial, at) for at in places) <= closed and not _nearly(trial, places).any()
-
-
-def _warn(text: str) -> None:
-    warnings.warn(text, AccuracyWarning, stacklevel=2)
 
 
 def _closed(trial: ConstraintSystem, guess: Array) -> Array | None:

@@ -17,7 +17,7 @@ from rps_pin.codegen.build.library import Library, load
 from rps_pin.codegen.build.process import Watch
 from rps_pin.codegen.build.progress import Bar
 from rps_pin.codegen.build.source import Source
-from rps_pin.errors import CompileError, InputError, did_you_mean, shown
+from rps_pin.errors import CompileError, InputError, did_you_mean, shown, warn_caller
 
 CompilerName = Literal["auto", "gcc", "clang", "cc", "tcc"]
 #: Compares a library with what it should compute; returns a record for JSON, raises if it differs.
@@ -141,7 +141,7 @@ def _automatically(
             if best is None:
                 raise
             words = str(error).splitlines()[0]
-            warnings.warn(f"{words}; {best} has to", RuntimeWarning, stacklevel=3)
+            warn_caller(f"{words}; {best} has to", RuntimeWarning)
         else:
             if best is not None:
                 library.better = _in_background(

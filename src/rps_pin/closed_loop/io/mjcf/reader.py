@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -22,6 +21,7 @@ from rps_pin.closed_loop.io.mjcf.tendons import Tendons
 from rps_pin.closed_loop.io.mjcf.tree import MjcfTree
 from rps_pin.closed_loop.io.parts import MechanismParts
 from rps_pin.closed_loop.io.unit_doubts import unit_doubts
+from rps_pin.errors import warn_caller
 
 
 def parts_from_mjcf(
@@ -69,7 +69,7 @@ def parts_from_mjcf(
     driven = asked if actuated is not None else _driven(tree, tendons, actuators)
     home = tree.add_key_frames()
     for what, places in source.told.items():
-        warnings.warn(f"{'; '.join(places)}: {what}", UserWarning, stacklevel=3)
+        warn_caller(f"{'; '.join(places)}: {what}")
     return MechanismParts(
         tree.model,
         (*equalities, *tendons.couplings, *closures),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from rps_pin.closed_loop.io.write.mjcf import mjcf_text
 from rps_pin.closed_loop.io.write.mjcf_inertia import Mending
 from rps_pin.closed_loop.io.write.source import Source, kind_of, without_rows
 from rps_pin.closed_loop.io.write.urdf import is_whole, urdf_text
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, warn_caller
 from rps_pin.files import write_text
 from rps_pin.validation import non_negative_number
 
@@ -74,4 +73,4 @@ def _write(texts: Mapping[Path, str], overwrite: bool) -> None:
 def _tell(target: Path, told: Sequence[str]) -> None:
     """Warn of what the format does not have."""
     if told:
-        warnings.warn(f"{target}: {'; '.join(told)}", stacklevel=4)
+        warn_caller(f"{target}: {'; '.join(told)}")
