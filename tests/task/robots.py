@@ -7,21 +7,27 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rps_pin import ClosedLoopModel, RPSPinError
+from rps_pin import ClosedLoopModel, RPSPinError, RPSRobot
 from rps_pin.arrays import Array
 from rps_pin.task import Task
 
 NAMES = (
     *("ankle", "cassie_leg", "delta", "delta_rods", "differential", "five_bar", "four_bar"),
-    *("minitaur_leg", "rps", "rrs", "slider_crank", "stewart"),
+    *("minitaur_leg", "rps", "rrs", "slider_crank", "stewart", "sokolov", "micro"),
 )
 
 #: Those whose generated code the tests build.
-GENERATED = ("ankle", "delta", "five_bar", "rrs", "stewart")
+GENERATED = ("ankle", "delta", "five_bar", "rrs", "stewart", "sokolov")
+
+
+#: Robots with closed forms behind the same names.
+ROBOTS = ("sokolov", "micro")
 
 
 @cache
 def task(name: str) -> Task:
+    if name in ROBOTS:
+        return RPSRobot.from_preset(name).task
     return ClosedLoopModel.load(f"urdf/{name}.yaml").task
 
 
@@ -37,6 +43,7 @@ def poses(name: str, count: int = 8) -> tuple[Array, Array]:
     x: list[Array] = []
     q: list[Array] = []
     size = np.where(one.angular, 0.15, 0.15 * one.characteristic_length)
+    size = size * (0.2 if name in ROBOTS else 1.0)  # whose limits are near
     for _ in range(10 * count):
         wanted = one.home + size * rng.uniform(-1, 1, size=one.size)
         try:

@@ -66,3 +66,28 @@ def test_three_rps_has_its_closed_forms() -> None:
             tau = robot.mechanism.inverse_dynamics(*found).tau
             closed_form = robot.actuator_forces(pose, rate, acceleration)
             assert worst(tau - closed_form) < 1e-9 * worst(closed_form)
+
+
+def test_the_robot_is_a_task_whose_closed_forms_are_the_generic_numbers() -> None:
+    """To 1e-9, without the closed forms; singularity measures have zeros in common only."""
+    for preset in ("sokolov", "micro"):
+        robot = RPSRobot.from_preset(preset)
+        generic = Task(robot.mechanism, "platform", ["z", "rx", "ry"])
+        x, q = poses(preset)
+        motion = (x, *np.random.default_rng(2).normal(size=(2, *x.shape)))
+        one, rate = robot.task, motion[1]
+        assert isinstance(one, Task)
+        assert one.coordinates == generic.coordinates
+        pairs = [
+            (one.to_actuators(x), generic.to_actuators(x)),
+            (one.configuration(x), generic.configuration(x)),
+            (one.to_task(one.to_actuators(x), q), x),
+            (one.jacobian(q), generic.jacobian(q)),
+            (one.hessian(q), generic.hessian(q)),
+            *zip(one.state(*motion), generic.state(*motion), strict=True),
+            (one.forces_to_actuators(q, rate), generic.forces_to_actuators(q, rate)),
+            (one.mass_matrix(q), generic.mass_matrix(q)),
+            [np.sign(each.singularities(q).determinant) for each in (one, generic)],
+        ]
+        for found, expected in pairs:
+            assert worst(found - expected) < 1e-9 * worst(expected, 1)

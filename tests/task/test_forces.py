@@ -12,7 +12,7 @@ from tests.worst import worst
 ALL = pytest.mark.parametrize("name", NAMES)
 BOTH = pytest.mark.parametrize(("make", "name"), EACH)
 OF_FRAMES = pytest.mark.parametrize(
-    "name", [name for name in NAMES if task(name).mechanism._task["frame"]]
+    "name", [name for name in NAMES if task(name)._options["frame"]]
 )
 
 
@@ -30,7 +30,7 @@ def test_forces_do_the_same_work(make, name) -> None:
 @OF_FRAMES
 def test_actuators_bear_a_wrench_as_inverse_dynamics_says(name) -> None:
     one, (_, q), rng = task(name), poses(name), np.random.default_rng(4)
-    m, frame = one.mechanism, one.mechanism._task["frame"]
+    m, frame = one.mechanism, one._options["frame"]
     still = np.zeros(m.model.nv)
     for each in q[:3]:
         wrench = rng.normal(size=6)
@@ -42,7 +42,7 @@ def test_actuators_bear_a_wrench_as_inverse_dynamics_says(name) -> None:
 @OF_FRAMES
 def test_the_twist_is_the_rate_of_the_frame(name) -> None:
     one, (x, q) = task(name), poses(name)
-    m, frame = one.mechanism, one.mechanism._task["frame"]
+    m, frame = one.mechanism, one._options["frame"]
     E = one.twist_map(q)
     for i in range(2):
         placed = m.frame_placement(q[i], frame)

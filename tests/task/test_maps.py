@@ -29,7 +29,7 @@ def test_positions_go_there_and_back(make, name) -> None:
 def test_coordinates_are_those_of_the_frame_in_the_tree(name) -> None:
     one, (x, q) = task(name), poses(name)
     model = one.mechanism.model
-    options = one.mechanism._task
+    options = one._options
     for wanted, each in zip(x, q, strict=True):
         if options["frame"] is None:
             found = [each[model.joints[model.getJointId(joint)].idx_q] for joint in one.coordinates]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from rps_pin.rps.kinematics.inverse_kinematics import inverse_kinematics, reacha
 from rps_pin.rps.kinematics.legs import LegMotion, Legs, PoseLegs, check_legs
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.task import RPSTask
 from rps_pin.rps.urdf import LEGS, ball_frames, build_urdf
 from rps_pin.validation import whole_number
 
@@ -391,6 +393,13 @@ class RPSRobot:
         a[..., self._length_v] = legs.acceleration
         a[..., self._angle_v] = legs.angle_acceleration
         return q, v, a
+
+    # Task -----------------------------------------------------------------------------------------
+
+    @cached_property
+    def task(self) -> RPSTask:
+        """Its pose as a `rps_pin.Task`, coordinates z, rx and ry, with closed forms."""
+        return RPSTask(self)
 
     # Dynamics -------------------------------------------------------------------------------------
 

@@ -381,7 +381,12 @@ class Task(TaskMaps):
             upper = np.asarray(of_model, dtype=np.float64)[self._actuated]
             lower = -upper
         else:
-            lower, upper = (self._rows(one, self._actuated.size, "limits") for one in given)
+            size = self._actuated.size
+            lower, upper = (numbers(one, "limits", f"{size} numbers each") for one in given)
+            if lower.shape != (size,) or upper.shape != (size,):
+                raise InputError(
+                    f"limits have shapes {lower.shape} and {upper.shape}; expected ({size},) each"
+                )
         endless = ~(np.isfinite(lower) & np.isfinite(upper))
         if endless.any():
             name = self.mechanism.actuated[int(np.flatnonzero(endless)[0])]

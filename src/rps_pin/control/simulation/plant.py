@@ -22,6 +22,7 @@ from rps_pin.control.simulation.encoders import Encoders
 from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, shown
 from rps_pin.one_thread import one_thread
+from rps_pin.rps.kinematics.pose import platform_pose
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number, real_vector, whole_number
 
@@ -154,17 +155,3 @@ class Plant(DeepCopied):
     def gap(self) -> float:
         """Largest gap between closed frames, m."""
         return self._stepper.gap
-
-
-def platform_pose(configuration: Array) -> Array:
-    """Return (z, tilt_x, tilt_y) of Pinocchio configurations (..., 13), shape (..., 3).
-
-    The tilt is the rotation vector of the platform's quaternion, whose third component is zero.
-    """
-    q = np.asarray(configuration)
-    x, y, z, w = np.moveaxis(q[..., 9:13], -1, 0)
-    sine = np.sqrt(x * x + y * y + z * z)
-    angle = 2 * np.arctan2(sine, np.abs(w))
-    factor = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-9)
-    factor = np.where(w < 0, -factor, factor)
-    return np.stack([q[..., 8], factor * x, factor * y], axis=-1)

@@ -120,6 +120,20 @@ def position(pose: Array, platform_radius: float) -> Array:
     return stacked(0.5 * radial[1], 0.5 * radial[2], z)
 
 
+def platform_pose(configuration: Array) -> Array:
+    """Return (z, tilt_x, tilt_y) of Pinocchio configurations (..., 13), shape (..., 3).
+
+    The tilt is the rotation vector of the platform's quaternion, whose third component is zero.
+    """
+    q = np.asarray(configuration)
+    x, y, z, w = np.moveaxis(q[..., 9:13], -1, 0)
+    sine = np.sqrt(x * x + y * y + z * z)
+    angle = 2 * np.arctan2(sine, np.abs(w))
+    factor = np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 1e-9)
+    factor = np.where(w < 0, -factor, factor)
+    return np.stack([q[..., 8], factor * x, factor * y], axis=-1)
+
+
 def platform_motion(
     pose: Array, rate: Array, acceleration: Array, platform_radius: float
 ) -> PlatformMotion:

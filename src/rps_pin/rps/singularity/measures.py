@@ -33,8 +33,8 @@ name                   definition                                   range    zer
                        loaded actuator
 ====================== ============================================ ======== ===================
 
-The first five are `SingularityMeasures`; `conditioning` and `transmission` are fields of workspaces
-(`rps_pin.rps.workspace.Fields`).
+The first five are `rps_pin.task.SingularityMeasures`; `conditioning` and `transmission` are fields
+of workspaces (`rps_pin.rps.workspace.Fields`).
 
 ========================================== ====================== ======= =========================
 threshold                                  of                     default below it
@@ -63,7 +63,6 @@ and these two also vanish with a leg's length, type I.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,35 +74,10 @@ from rps_pin.rps.kinematics.legs import RADIAL, refuse_vanishing
 from rps_pin.rps.kinematics.pose import checked_pose, rotation
 from rps_pin.rps.kinematics.samples import Errors, maskable, refuse
 from rps_pin.rps.parameters import RPSParameters
+from rps_pin.task.singularity import SingularityMeasures
 
 #: `distance` below which a path grazes a singularity.
 GRAZE = 1e-3
-
-
-class SingularityMeasures(NamedTuple):
-    """How far poses are from each kind of singularity, shape (...) each; all dimensionless."""
-
-    type_i: Array
-    """Shortest leg over h: tip speed per h |phi'| of a leg that turns; 0 at a type I."""
-    type_ii: Array
-    """Least rms leg speed per rms speed of the platform's spherical joints, 0 to 1 (no leg is
-    faster than its tip); 0 at a type II singularity, where the platform moves and no leg does."""
-    constraint: Array
-    """cos(beta/2), the couple of unit forces across the legs over 3 h; changes sign at half a
-    turn, where the platform is free to twist."""
-    determinant: Array
-    """Signed and smooth: product of the three gains (leg speed per platform speed, as in `type_ii`)
-    with the sign of det K, -1 to 1; changes sign where a path crosses a type II singularity."""
-
-    @property
-    def distance(self) -> Array:
-        """Distance to the nearest singularity: the least of the three in size, 0 to 1."""
-        return np.minimum(np.minimum(self.type_i, self.type_ii), np.abs(self.constraint))
-
-    @property
-    def signed_type_ii(self) -> Array:
-        """`type_ii` with the sign of `determinant`."""
-        return np.copysign(self.type_ii, self.determinant)
 
 
 @maskable(pose=1)

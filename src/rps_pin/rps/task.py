@@ -1,0 +1,123 @@
+"""The task of the 3-RPS, its pose, with closed forms behind the names of `Task`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array
+from rps_pin.rps.kinematics.pose import platform_pose
+from rps_pin.rps.kinematics.rates import leg_jacobian_rates, leg_jacobians
+from rps_pin.rps.kinematics.samples import Errors
+from rps_pin.rps.singularity.measures import singularity_measures
+from rps_pin.task import SingularityMeasures, Task, TaskState
+
+
+class RPSTask(Task):
+    """The pose ``(z, tilt_x, tilt_y)`` of a 3-RPS as a `Task`: coordinates z, rx and ry.
+
+    A pose has one set of leg lengths and angles, so that no configuration is needed to continue
+    from; `near` counts in `to_task`. Errors are those of `RPSRobot`, and with
+    ``within_limits=True`` its limits are the robot's: leg lengths, leg angles and cones of the
+    spherical joints. Singularity measures are those of `rps_pin.rps.singularity.measures`.
+    """
+
+    def __init__(self, robot: Any) -> None:  # an `RPSRobot`, whose module imports this one
+        super().__init__(robot.mechanism, "platform", ["z", "rx", "ry"])
+        self._robot = robot
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self._robot,)
+
+    def compile(self, **options: Any) -> RPSTask:
+        """Return the same task of the robot in generated code; see `RPSRobot.compile`."""
+        return RPSTask(self._robot.compile(**options))
+
+    def at(self, q: ArrayLike, near: ArrayLike | None = None, *, errors: Errors = "raise") -> Array:
+        """Return poses of configurations; see `Task.at`."""
+        return platform_pose(self._rows(q, self._nq, "q"))
+
+    def to_actuators(
+        self,
+        x: ArrayLike,
+        near: ArrayLike | None = None,
+        *,
+        within_limits: bool = True,
+        errors: Errors = "raise",
+    ) -> Array:
+        """Return leg lengths of poses, shape (..., 3); see `Task.to_actuators`."""
+        refuse = within_limits and errors == "raise"
+        legs = self._robot.inverse_kinematics(x, errors="raise" if refuse else "mask")
+        if not within_limits:
+            return np.asarray(legs.length)
+        return np.where(legs.reachable[..., None], legs.length, np.nan)
+
+    def configuration(
+        self,
+        x: ArrayLike,
+        near: ArrayLike | None = None,
+        *,
+        within_limits: bool = True,
+        errors: Errors = "raise",
+    ) -> Array:
+        """Return configurations of poses, shape (..., 13); see `Task.configuration`."""
+        if not within_limits:
+            return super().configuration(x, near, within_limits=False, errors=errors)
+        still = np.zeros(self.size)
+        return self.state(x, still, still, errors=errors).q
+
+    def to_task(
+        self,
+        a: ArrayLike,
+        near: ArrayLike | None = None,
+        *,
+        within_limits: bool = True,
+        errors: Errors = "raise",
+    ) -> Array:
+        """Return poses of leg lengths, shape (..., 3); see `Task.to_task`."""
+        start = self.home if near is None else self.at(near)
+        found = self._robot.forward_kinematics(self._rows(a, 3, "a"), start, errors=errors)
+        pose = np.ma.filled(found, np.nan)
+        reached = np.isfinite(pose).all(axis=-1, keepdims=True)
+        if not within_limits:
+            return pose
+        whole = np.where(reached, pose, self.home)
+        within = self._robot.inverse_kinematics(whole, errors=errors).reachable
+        return np.where(reached & within[..., None], pose, np.nan)
+
+    def jacobian(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
+        """Return K = d(lengths)/d(pose), shape (..., 3, 3)."""
+        return leg_jacobians(self._robot.parameters, self.at(q)).length_jacobian
+
+    def bias(self, q: ArrayLike, rate: ArrayLike, *, errors: Errors = "raise") -> Array:
+        """Return K' pose', shape (..., 3)."""
+        pose, rate_ = self.at(q), self._rows(rate, self.size, "rate")
+        change = leg_jacobian_rates(self._robot.parameters, pose, rate_).length_jacobian
+        return np.asarray((change @ rate_[..., None])[..., 0])
+
+    def state(
+        self,
+        x: ArrayLike,
+        rate: ArrayLike,
+        acceleration: ArrayLike,
+        near: ArrayLike | None = None,
+        *,
+        within_limits: bool = True,
+        errors: Errors = "raise",
+    ) -> TaskState:
+        """Return q, v and a of motions of the pose; see `Task.state`."""
+        if not within_limits:
+            return super().state(x, rate, acceleration, near, within_limits=False, errors=errors)
+        return TaskState(*self._robot.state(x, rate, acceleration, errors=errors))
+
+    def motion(
+        self, q: ArrayLike, rate: ArrayLike, acceleration: ArrayLike, *, errors: Errors = "raise"
+    ) -> TaskState:
+        """Return q, v and a at configurations; see `Task.motion`."""
+        return self.state(self.at(q), rate, acceleration, errors=errors)
+
+    def singularities(self, q: ArrayLike) -> SingularityMeasures:
+        """Return how far configurations are from singularities, in closed form."""
+        return singularity_measures(self._robot.parameters, self.at(q), errors="mask")
