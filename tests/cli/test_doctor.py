@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+from rps_pin.cli import doctor as module
 from rps_pin.cli.doctor import _BROWSERS, PARTS, _browser, _cache, _compilers, _unmet
 from rps_pin.viewer.files.browser import BROWSERS
 from tests import processes
@@ -134,8 +135,8 @@ def test_compilers_and_what_they_made(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setenv("RPS_PIN_CACHE", str(tmp_path / "gcc" / "cache"))
     assert _cache().trouble.endswith("gcc/cache cannot be written to: set RPS_PIN_CACHE")
     monkeypatch.setitem(sys.modules, "filelock", None)
-    for module in ("cache", "compilers"):
-        monkeypatch.delitem(sys.modules, f"rps_pin.codegen.build.{module}", raising=False)
+    for part in ("cache", "compilers"):
+        monkeypatch.delitem(sys.modules, f"rps_pin.codegen.build.{part}", raising=False)
     monkeypatch.delitem(sys.modules, "rps_pin.codegen.build", raising=False)
     for finding in (_compilers(), _cache()):
         assert finding.trouble == "not looked for: pip install 'rps-pin[compile]'"
@@ -176,3 +177,17 @@ def test_it_asks_for_what_the_package_needs() -> None:
     for extra, ones in project["optional-dependencies"].items():
         listed = {part.name for part in PARTS if part.extra == extra}
         assert listed == {Requirement(one).name for one in ones} - {"rps-pin"}, extra
+
+
+def test_paths_steer_no_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("RPS_PIN_CACHE", str(tmp_path / "\x1b]0;title\x07red\u202egpj"))
+    monkeypatch.setattr(module, "diagnose", lambda: [_cache(), _cache()._replace(trouble="\x1b")])
+    assert module.doctor() == 0
+    said = capsys.readouterr().out
+    assert r"\x1b]0;title\x07red\u202egpj" in said
+    assert said.isascii()
+    assert said.replace("\n", "").isprintable()
+    assert module.doctor(as_json=True) == 0
+    assert json.loads(capsys.readouterr().out)["found"][0]["purpose"].endswith("gpj")

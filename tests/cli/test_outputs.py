@@ -10,6 +10,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from rps_pin.files import write_text
 from tests.cli.commands import rps_pin
@@ -32,6 +33,12 @@ FILES = {
     "convert": (["convert", "four_bar", "--to", "urdf", "-o"], ".", "four_bar.yaml"),
     "mjcf": (["convert", "four_bar", "--to", "mjcf", "-o"], ".", "four_bar.xml"),
 }
+
+
+@pytest.fixture(autouse=True)
+def _quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave figures empty: other tests look at them, and drawing takes most of the time."""
+    monkeypatch.setattr(Figure, "savefig", lambda _, path, **options: path.write_text("<svg/>"))
 
 
 @pytest.mark.parametrize(("words", "value", "file"), FILES.values(), ids=FILES)

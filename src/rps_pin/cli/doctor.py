@@ -18,6 +18,8 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+from rps_pin.plain_text import plain
+
 OLDEST_PYTHON = (3, 11)
 _EXTRA = "pip install 'rps-pin[{}]'"
 #: Programs that take the viewer's pictures; `RPS_PIN_CHROMIUM` comes first.
@@ -105,9 +107,9 @@ def doctor(as_json: bool = False) -> int:
         return int(failed)
     for one in findings:
         mark = "ok" if not one.trouble else "MISSING" if one.needed else "-"
-        print(f"{mark:8}{one.name:17}{one.found or 'no':18} {one.purpose}")
+        print(plain(f"{mark:8}{one.name:17}{one.found or 'no':18} {one.purpose}"))
         if one.trouble:
-            print(f"{'':8}{one.trouble}")
+            print(plain(f"{'':8}{one.trouble}"))
     print("something is missing: see above" if failed else "all that is needed is here")
     return int(failed)
 

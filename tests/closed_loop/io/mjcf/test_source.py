@@ -351,3 +351,24 @@ def test_a_fifo_is_refused_not_waited_for(asset: str | None, tmp_path: Path) -> 
     )
     with pytest.raises(MechanismError, match=r"m\.xml, line 1: .*f' is not a regular file"):
         parts_from_mjcf(tmp_path / "m.xml")
+
+
+def test_attached_files_of_other_suffixes(tmp_path: Path) -> None:
+    """MuJoCo takes those that end in .xml; it found no decoder for the others."""
+    main = """<mujoco><asset><model name="leg" file="{}"/></asset><worldbody>
+        <body name="b"><joint name="other"/><geom size="1"/></body>
+        <attach model="leg" body="b" prefix="left_"/></worldbody></mujoco>"""
+    path = written(tmp_path, main=main.format("leg.xml"), leg=mujoco_file(BODY))
+    right = parts_from_mjcf(path)
+    assert "left_j" in right.model.names
+    for suffix in (".mjcf", ".XML", ""):
+        leg = (tmp_path / "leg.xml").with_suffix(suffix)
+        leg.write_text(mujoco_file(BODY))
+        for name in ("main.xml", "main.mjcf"):
+            (tmp_path / name).write_text(main.format(leg.name))
+            assert parts_from_mjcf(tmp_path / name).model == right.model
+        (tmp_path / "scene.xml").write_text('<mujoco><include file="main.xml"/></mujoco>')
+        assert parts_from_mjcf(tmp_path / "scene.xml").model == right.model
+        leg.write_text(mujoco_file("\n\n\n" + BODY.replace('"j"', f'"j" {BAD}')))
+        with pytest.raises(MechanismError, match=rf"leg.*, line 4: joint 'left_j' has {WHY}"):
+            parts_from_mjcf(tmp_path / "main.xml")

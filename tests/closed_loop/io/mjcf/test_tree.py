@@ -239,7 +239,7 @@ NOT_FINITE = {
     "site": BODY.replace("</body>", SITE),
     **{
         word: BODY.replace("<joint", f'<joint {word}="inf"')
-        for word in ("armature", "damping", "frictionloss", "stiffness")
+        for word in ("armature", "damping", "frictionloss", "stiffness", "ref", "springref")
     },
     "gravity": f"{BODY}</worldbody><option gravity='0 0 nan'/><worldbody>",
     "torquescale": BODY

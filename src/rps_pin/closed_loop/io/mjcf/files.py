@@ -56,6 +56,8 @@ class MjcfFiles:
         Of the model.
     folder : Path
         Of the main file.
+    has_other_suffixes : bool
+        Whether it attaches files that do not end in ``.xml``, which MuJoCo takes of `text` only.
 
     Raises
     ------
@@ -74,6 +76,7 @@ class MjcfFiles:
             refuse_other_formats(text, origin, "MJCF")
             raise MechanismError(f"{origin} is not a valid MJCF: it is not XML")
         self.name = str(root.get("model", ""))
+        self.has_other_suffixes = False
         self.folder = path.parent if path else Path()
         self._places: list[Place] = []
         self._attached: list[Place] = []
@@ -86,6 +89,9 @@ class MjcfFiles:
                 self._lines[-1] += f"</{place.xml.tag}>"
                 continue
             self._places.append(place)
+            if model and model.suffix != ".xml" and _is_mjcf(model):
+                place.xml.set("content_type", "text/xml")
+                self.has_other_suffixes = True
             self._lines.append(_start_tag(place.xml, model))
             models += [(model, (*chain, model))] if model else []
         while models:
@@ -225,6 +231,11 @@ def _content(path: Path) -> str:
     if b"\0" in content[:4]:
         raise MechanismError(f"the MJCF {path} is in UTF-16 or UTF-32; MuJoCo reads UTF-8 alone")
     return content.decode("utf-8", "replace")
+
+
+def _is_mjcf(path: Path) -> bool:
+    root = _root(_content(path), str(path))
+    return root is not None and root.tag == "mujoco"
 
 
 def _root(text: str, origin: str) -> Any:

@@ -74,6 +74,11 @@ def _numbers(source: MjcfSource) -> Iterator[tuple[str, int, str, Array]]:
     for name in _OF_VELOCITIES:
         for velocity, one in enumerate(getattr(m, f"dof_{name}")):
             yield "joints", int(m.dof_jntid[velocity]), name, np.atleast_1d(one)
+    coordinates = {"ref": m.qpos0, "springref": m.qpos_spring}
+    for joint, first in enumerate(m.jnt_qposadr):
+        end = m.jnt_qposadr[joint + 1] if joint + 1 < m.njnt else m.nq
+        for name, array in coordinates.items():
+            yield "joints", joint, name, array[first:end]
     for tendon, (first, count) in enumerate(zip(m.tendon_adr, m.tendon_num, strict=True)):
         yield "tendons", tendon, "coef", m.wrap_prm[first : first + count]
 

@@ -108,6 +108,8 @@ class MjcfSource:
     def _parsed(self) -> Any:
         """Return MuJoCo's specification; it takes names that end in .xml, so others get that."""
         spec = self.mujoco.MjSpec
+        if self._files.has_other_suffixes:
+            return self._parsed_in_one_text()
         if self._path is not None and self._path.suffix == ".xml":
             return spec.from_file(str(self._path))
         if self._path is None:
@@ -138,6 +140,9 @@ class MjcfSource:
     @cached_property
     def _in_one_text(self) -> Any:
         """The specification of all files in one text, which has lines of included files too."""
+        return self._parsed_in_one_text()
+
+    def _parsed_in_one_text(self) -> Any:
         spec = self.mujoco.MjSpec.from_string(self._files.text)
         spec.modelfiledir = str(self._files.folder)
         return spec
