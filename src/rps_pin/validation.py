@@ -160,7 +160,7 @@ def fixed_array(
     shape
         Its dimensions; None where any length will do.
     """
-    sizes = ", ".join("n" if size is None else str(size) for size in shape)
+    sizes = ", ".join("nmkl"[i] if size is None else str(size) for i, size in enumerate(shape))
     wanted = f"({sizes}{',' if len(shape) == 1 else ''}){meaning and f': {meaning}'}"
     array = numbers(value, name, f"numbers of shape {wanted}")
     parts = () if isinstance(value, np.ndarray) else np.asarray(value, dtype=object).flat

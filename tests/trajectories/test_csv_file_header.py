@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from rps_pin import InputError, RPSRobot, helix
 from rps_pin.rps.dynamics.motion_csv import motion_columns
 from rps_pin.rps.dynamics.motion_run import run_motion
-from rps_pin.trajectories.csv_file import IGNORED, READ, read_csv
+from rps_pin.trajectories.csv_columns import OF_RPS
+from rps_pin.trajectories.csv_file import read_csv
 from tests.each import each
 from tests.trajectories.csv_files import QUANTITIES, SI, good_lines, refuse, save, swings
 
@@ -21,8 +22,8 @@ def test_every_column_that_is_written_is_known() -> None:
     robot = RPSRobot.from_preset("sokolov")
     run = run_motion(robot, helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4), 5.0)
     names = set(motion_columns(run))
-    assert names <= {*READ, *IGNORED}
-    assert {name for name in names if name not in READ} == IGNORED
+    assert names <= {*OF_RPS.read, *OF_RPS.ignored}
+    assert {name for name in names if name not in OF_RPS.read} == OF_RPS.ignored
 
 
 UNITS = {

@@ -72,7 +72,11 @@ def test_things_that_are_no_parameters_are_refused(bad: object) -> None:
     ("bad", "message"),
     [
         ([[0.2, 0.1, 0.0]], r"poses has shape \(1, 3\); two poses or more are needed"),
-        ([[0.2, 0.1], [0.2, 0.0]], r"poses has shape \(2, 2\); it must be \(n, 3\): z, tilt_x, t"),
+        (
+            [[[0.2, 0.1]]],
+            r"poses has shape \(1, 1, 2\); it must be \(n, m\): coordinates, as z, ti",
+        ),
+        ([[], []], r"poses has shape \(2, 0\); poses have a coordinate or more"),
         ([0.2, 0.1, 0.0], r"poses has shape \(3,\)"),
         ([[0.2, 0.1, 0.0], [0.2, 0.1]], "poses = .*: it must be numbers"),
         ([[0.2, 0.1, 0.0], [np.nan, 0.1, 0.0]], r"entry \(1, 0\) is nan"),

@@ -141,7 +141,8 @@ def test_repr_tells_the_ends_and_the_law() -> None:
     ("change", "message"),
     [
         ({"end": START}, "start and end are the same pose"),
-        ({"start": [0.2, 0.1]}, r"start has shape \(2,\)"),
+        ({"start": [0.2, 0.1]}, r"end has shape \(3,\); it must be \(2,\)"),
+        ({"start": [[0.2, 0.1]]}, r"start has shape \(1, 2\)"),
         ({"end": [0.2, np.nan, 0.1]}, "end is not finite"),
         ({"end": [START, END]}, "end has shape"),
         ({"profile": "cubic"}, "must be 'quintic' or 'trapezoidal' or 's-curve'"),

@@ -246,7 +246,9 @@ TIMES = np.arange(8.0)
     ("arguments", "message"),
     [
         ((TIMES[:7], POSES), "7 times for 8 poses"),
-        ((TIMES, POSES[:, :2]), "poses has shape"),
+        ((TIMES, POSES[:, :0]), "poses has shape"),
+        ((TIMES, POSES[:, 0]), "poses has shape"),
+        ((TIMES, POSES[:, :2], POSES), "rates has shape"),
         ((-TIMES, POSES), "times must increase"),
         ((np.r_[TIMES[:7], np.nan], POSES), "times is not finite"),
         ((TIMES, POSES, None, POSES), "accelerations are given without rates"),

@@ -231,7 +231,7 @@ def test_bad_figures_are_refused(change: dict[str, Any], message: str) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"middle": [1.0, 2.0]}, r"middle has shape \(2,\); it must be \(3,\)"),
+        ({"middle": [1.0, 2.0]}, r"size has shape \(3,\); it must be \(2,\)"),
         ({"size": [1.0, np.nan, 1.0]}, "size is not finite"),
         ({"frequency": "abc"}, "frequency = 'abc'"),
         ({"phase": 1.0}, r"phase has shape \(\)"),

@@ -19,15 +19,13 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.closed_loop.constraints.rotation_vector import MOST_TURN
 from rps_pin.codegen.engine.batches import Errors
 from rps_pin.errors import InputError, MechanismError, RPSPinError, few
 from rps_pin.numerics.linear_algebra import null_space, rank, singular_values
 from rps_pin.task.coordinates import of_frame, of_joints
 from rps_pin.task.engine import PinocchioEngine
 from rps_pin.validation import numbers, positive_number
-
-#: Rotation vectors reach less than a whole turn, where they have no rates; rad.
-MOST_TURN = 2 * np.pi - 0.05
 
 
 class TaskState(NamedTuple):
@@ -105,6 +103,11 @@ class TaskMaps:
     def size(self) -> int:
         """Number of coordinates, m."""
         return len(self.coordinates)
+
+    @property
+    def scale(self) -> Array:
+        """What a unit of each coordinate counts for as a length, shape (m,): 1, or m/rad."""
+        return 1 / self._units
 
     @property
     def home(self) -> Array:

@@ -1,13 +1,16 @@
 """Trajectories of poses with exact first and second derivatives.
 
-Each has a ``duration`` and a ``sample(t)``. They are made by `helix`, `point_to_point`, `spline`,
-`circle`, `lissajous` and `read_csv`, or of a curve and a law of time. Whether a robot can follow
-one, how fast, and with which forces: see `rps_pin.rps`.
+Each has a ``duration`` and a ``sample(t)``. They are made by `point_to_point`, `spline`, `read_csv`
+and `pose_path` for the coordinates of any task, and by `helix`, `circle` and `lissajous` for the
+3-RPS, or of a curve and a law of time. Whether a mechanism can follow one, how fast, and with which
+forces: see `rps_pin.task` and `rps_pin.rps`.
 """
 
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.curve import Curve, CurveSample, LawSample, TimedCurve, TimeLaw
 from rps_pin.trajectories.helix import HelixCurve, HelixPath, helix
+from rps_pin.trajectories.orientation.pose_path import PoseCurve, PosePath, pose_path
+from rps_pin.trajectories.orientation.rotation_curve import RotationCurve
 from rps_pin.trajectories.path import PathSample, Trajectory, end_states
 from rps_pin.trajectories.point_to_point import LineCurve, point_to_point
 from rps_pin.trajectories.sampled_path import SampledPath
@@ -25,7 +28,10 @@ __all__ = [
     "LawSample",
     "LineCurve",
     "PathSample",
+    "PoseCurve",
+    "PosePath",
     "QuinticLaw",
+    "RotationCurve",
     "SCurveLaw",
     "SampledPath",
     "TimeLaw",
@@ -38,6 +44,7 @@ __all__ = [
     "helix",
     "lissajous",
     "point_to_point",
+    "pose_path",
     "read_csv",
     "spline",
 ]

@@ -6,6 +6,8 @@ The header names quantities with their units, as `rps_pin.rps.dynamics.motion_cs
     0.00,0.223,0.0,5.0
     0.01,0.223,0.1,5.0
 
+and of a task its coordinates, as ``x_mm,z_mm,ry_deg`` or ``ankle_pitch_deg``; see `csv_columns`.
+
 Lines that are blank or begin with ``#`` are skipped. Commas, semicolons or tabs separate cells,
 whichever the header uses; numbers are written with a decimal point. Times may begin anywhere (the
 first counts as 0) and steps may differ.
@@ -19,7 +21,6 @@ import os
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import BinaryIO
 
 import numpy as np
@@ -27,6 +28,7 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 from rps_pin.files import opened
+from rps_pin.trajectories.csv_columns import OF_RPS, Columns, HasCoordinates, is_number
 from rps_pin.trajectories.derivative_check import disagreement
 from rps_pin.trajectories.sampled_path import FEWEST_POSES, Ends, SampledPath
 from rps_pin.validation import positive_number
@@ -39,35 +41,16 @@ SLOWEST, SOME_ROWS = 1.0, 10
 MOST_LINES = 2_000_000
 LONGEST_LINE = 100_000
 
-COORDINATES = ("z", "tilt_x", "tilt_y")
-RATES = tuple(f"{name}_rate" for name in COORDINATES)
-ACCELERATIONS = tuple(f"{name}_acceleration" for name in COORDINATES)
-
-_LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-_ANGLES = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180}
-#: The units of each quantity, and their values in SI.
-UNITS = {"time": {"s": 1.0, "ms": 1e-3, "us": 1e-6}} | {
-    name + suffix: {unit + over: si for unit, si in (_LENGTHS if name == "z" else _ANGLES).items()}
-    for suffix, over in (("", ""), ("_rate", "_per_s"), ("_acceleration", "_per_s2"))
-    for name in COORDINATES
-}
-#: Quantity and unit of every column that is read, by its name.
-READ = {f"{quantity}_{unit}": (quantity, unit) for quantity in UNITS for unit in UNITS[quantity]}
-#: Other columns that `rps_pin.rps.dynamics.motion_csv` writes; they follow from the motion.
-IGNORED = {"x_m", "y_m"} | {
-    name.format(leg)
-    for name in ("length_{}_m", "speed_{}_m_per_s", "leg_acceleration_{}_m_per_s2", "force_{}_N")
-    for leg in (1, 2, 3)
-}
-#: Largest values: two turns of tilt are one too many, and no robot of this kind is so high (m).
-_LARGEST = {"z": 100.0, "tilt_x": 2 * math.pi, "tilt_y": 2 * math.pi}
-_INSTEAD = {"z": "millimetres? Then name the column z_mm", "tilt": "degrees? Then name it {}_deg"}
 _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _POINT = "; numbers are written with a point, 0.5 and not 0,5"
 
 
 def read_csv(
-    path: str | os.PathLike[str], *, max_step: float | None = None, ends: Ends | None = None
+    path: str | os.PathLike[str],
+    task: HasCoordinates | None = None,
+    *,
+    max_step: float | None = None,
+    ends: Ends | None = None,
 ) -> SampledPath:
     """Read a trajectory from a CSV file.
 
@@ -76,6 +59,9 @@ def read_csv(
     (``z_acceleration_m_per_s2``, ...). Other units by their names: s, ms, us; m, mm, um; rad, mrad,
     urad, deg. The other columns that `rps-pin` writes with a motion (``length_1_m``, ``force_1_N``,
     ...) are not used; any other column is refused, as it may be misspelt.
+
+    With a task, its coordinates take the place of ``z``, ``tilt_x`` and ``tilt_y``, in any order in
+    the file: ``x_m``, ``rx_rad``, ``ankle_pitch_deg``. The poses have the task's order.
 
     With poses alone the motion starts and ends at rest, unless `ends` says otherwise. With rates it
     has the first and the last rate at its ends; the others are only compared with the poses. With
@@ -87,6 +73,9 @@ def read_csv(
     path
         The file: UTF-8, a header, cells separated by commas, semicolons or tabs (whichever the
         header uses), numbers with a decimal point.
+    task
+        Whose coordinates the columns are: a `Task`, or anything with ``coordinates`` and
+        ``angular``. Left out: the 3-RPS, with z, tilt_x and tilt_y.
     max_step
         Longest step that is not a gap, s; ten times the median step if left out.
     ends
@@ -98,28 +87,29 @@ def read_csv(
         With the file and the line: if a cell is empty, missing, too many, or not a finite number;
         if times do not increase, leave a gap, or seem to be in milliseconds (without rates,
         `SOME_ROWS` or more in steps of `SLOWEST` or more; `max_step` allows them); if a value
-        cannot be in its unit (a tilt beyond 2 pi rad, a height beyond 100 m); if rates or
-        accelerations are not, even roughly, the derivatives of the poses; if a column is unknown,
-        without unit, there twice or missing; if there are fewer rows than 2 (with free ends 6); or
-        if it is not such a file.
+        cannot be in its unit (a tilt or a rotation vector beyond 2 pi rad, a length beyond 100 m);
+        if rates or accelerations are not, even roughly, the derivatives of the poses; if a column
+        is unknown, without unit, there twice or missing; if there are fewer rows than 2 (with free
+        ends 6); or if it is not such a file.
     """
     if max_step is not None:
         positive_number(max_step, "max_step", "seconds")
+    columns = OF_RPS if task is None else Columns.of_task(task)
     with opened(path, "trajectory file") as file:
-        table = _table(_lines(file, os.fspath(path)), os.fspath(path))
+        table = _table(_lines(file, os.fspath(path)), os.fspath(path), columns)
     _refuse_few(table, FEWEST_POSES if ends == "free" else 2)
     _refuse_times(table, max_step)
     _refuse_implausible(table)
     _refuse_wrong_derivatives(table)
-    if max_step is None and RATES[0] not in table.positions:
+    if max_step is None and columns.rates[0] not in table.positions:
         _refuse_slow_times(table)
-    columns = [
+    series = [
         np.stack([table.si(name) for name in names], axis=-1)
-        for names in (COORDINATES, RATES, ACCELERATIONS)
+        for names in (columns.coordinates, columns.rates, columns.accelerations)
         if names[0] in table.positions
     ]
     try:
-        return SampledPath(table.si("time"), *columns, ends=ends)
+        return SampledPath(table.si("time"), *series, ends=ends)
     except InputError as error:
         raise InputError(f"{table.origin}: {error}") from None
 
@@ -141,6 +131,8 @@ class _Table:
     """The line of the header, and of each row, from 1."""
     origin: str
     """The file, for messages."""
+    columns: Columns
+    """What is read."""
 
     def place(self, row: int) -> str:
         """Return ``"FILE, line N"`` of a row; of the header for -1."""
@@ -152,7 +144,7 @@ class _Table:
 
     def factor(self, quantity: str) -> float:
         """Return the value of a quantity's unit in SI."""
-        return UNITS[quantity][READ[self.name(quantity)][1]]
+        return self.columns.units[quantity][self.columns.read[self.name(quantity)][1]]
 
     def written(self, quantity: str) -> Array:
         """Return the values of a quantity in its unit in the file."""
@@ -183,7 +175,7 @@ def _lines(file: BinaryIO, origin: str) -> Iterator[tuple[int, str]]:
             yield number, line
 
 
-def _table(lines: Iterator[tuple[int, str]], origin: str) -> _Table:
+def _table(lines: Iterator[tuple[int, str]], origin: str, columns: Columns) -> _Table:
     number, header = next(lines, (0, ""))
     if not number:
         raise InputError(f"{origin} is empty: its first line must name the columns")
@@ -193,7 +185,7 @@ def _table(lines: Iterator[tuple[int, str]], origin: str) -> _Table:
             marks = " and ".join(_DELIMITERS[mark] for mark in used)
             raise InputError(f"{marks} in the header; one of them may separate the cells")
         names = [cell.strip() for cell in _cells(header, used[0])]
-        positions = _columns(names)
+        positions = columns.positions(names)
     except InputError as error:
         raise InputError(f"{origin}, line {number}: {error}") from None
     numbers, values = array("q", [number]), array("d")
@@ -203,7 +195,8 @@ def _table(lines: Iterator[tuple[int, str]], origin: str) -> _Table:
         except InputError as error:
             raise InputError(f"{origin}, line {number}: {error}") from None
         numbers.append(number)
-    return _Table(names, positions, np.array(values).reshape(-1, len(names)), numbers, origin)
+    rows = np.array(values).reshape(-1, len(names))
+    return _Table(names, positions, rows, numbers, origin, columns)
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
@@ -219,7 +212,7 @@ def _row(line: str, delimiter: str, names: Sequence[str]) -> list[float]:
     """Return the numbers of a line."""
     cells = _cells(line, delimiter)
     if len(cells) != len(names):
-        comma = delimiter == "," and len(cells) > len(names) and all(map(_is_number, cells))
+        comma = delimiter == "," and len(cells) > len(names) and all(map(is_number, cells))
         raise InputError(
             f"{len(cells)} cell{'s' if cells[1:] else ''}, where the header names {len(names)} "
             f"columns{_POINT if comma else ''}"
@@ -237,83 +230,10 @@ def _fault(name: str, cell: str) -> str:
     """Return what is wrong with a cell; empty if it is a finite number."""
     if not cell.strip():
         return f"{name} is empty: every sample needs all values"
-    if not _is_number(cell):
+    if not is_number(cell):
         point = _POINT if "," in cell else ""
         return f"{name} = {shown(cell.strip())}: it must be a number{point}"
     return "" if math.isfinite(float(cell)) else f"{name} = {float(cell)}: it must be finite"
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return "_" not in cell
-
-
-# The header ---------------------------------------------------------------------------------------
-
-
-def _columns(header: Sequence[str]) -> dict[str, int]:
-    """Return the positions of the columns that are read, by quantity."""
-    if all(_is_number(name) for name in header):
-        raise InputError("numbers, where the header must name the columns")
-    found: dict[str, int] = {}
-    for position, name in enumerate(header):
-        if name in header[:position]:
-            raise InputError(f"column {name!r} is there twice")
-        if name in IGNORED:
-            continue
-        if name not in READ:
-            raise InputError(_unknown(name, position))
-        quantity, _ = READ[name]
-        if quantity in found:
-            raise InputError(
-                f"columns {header[found[quantity]]!r} and {name!r} both hold {quantity}; one may"
-            )
-        found[quantity] = position
-    needed = ["time", *COORDINATES]
-    for more in (ACCELERATIONS, RATES):
-        if len(needed) > 4 or any(quantity in found for quantity in more):
-            needed.extend(more)
-    absent = [_names(quantity) for quantity in needed if quantity not in found]
-    missing = [f"{first} (or {', '.join(others)})" for first, *others in absent]
-    if missing:
-        raise InputError(
-            f"column{'s' if missing[1:] else ''} {', '.join(missing)} missing; the header has "
-            f"{', '.join(header)}. Cells are separated by commas, semicolons or tabs; rates and "
-            "accelerations are optional, accelerations only with rates, and each for z, tilt_x "
-            "and tilt_y"
-        )
-    return found
-
-
-def _unknown(name: str, position: int) -> str:
-    """Return what is wrong with a name, and what it could be."""
-    if not name:
-        return f"column {position + 1} has no name"
-    if name in UNITS:
-        return f"column {name!r} has no unit: it can be {', '.join(_names(name))}"
-    # Of the same unit: z_cm is not a misspelt z_m.
-    like = [known for known, (_, unit) in READ.items() if name.lower().endswith(f"_{unit}")]
-    near = get_close_matches(name.lower(), like, n=1, cutoff=0.85)
-    if near:
-        return f"column {shown(name)} is not known; did you mean {near[0]!r}?"
-    for quantity in sorted(UNITS, key=len, reverse=True):
-        if name.startswith(f"{quantity}_"):
-            unit = name.removeprefix(f"{quantity}_")
-            return (
-                f"column {shown(name)}: {shown(unit)} is not a unit of {quantity}; it can be "
-                f"{', '.join(_names(quantity))}"
-            )
-    return (
-        f"column {shown(name)} is not known. Those that are read are quantity_unit, with the "
-        f"quantities {', '.join(UNITS)}: time_s, z_mm, tilt_x_rate_deg_per_s and the like"
-    )
-
-
-def _names(quantity: str) -> list[str]:
-    return [f"{quantity}_{unit}" for unit in UNITS[quantity]]
 
 
 # The motion ---------------------------------------------------------------------------------------
@@ -366,22 +286,26 @@ def _refuse_slow_times(table: _Table) -> None:
 
 def _refuse_implausible(table: _Table) -> None:
     """Refuse values that are so large that their unit must be another."""
-    for quantity, largest in _LARGEST.items():
+    for quantity, (largest, unit, instead) in table.columns.largest.items():
         beyond = np.abs(table.si(quantity)) > largest
         if beyond.any():
             row = int(np.argmax(beyond))
-            hint = f"; is it in {_INSTEAD[quantity[:4]].format(quantity)}"
+            hint = f"; is it in {instead}"
             raise InputError(
                 f"{table.place(row)}: {table.name(quantity)} = {table.written(quantity)[row]:.9g}: "
-                f"it cannot be beyond {largest:.4g} {'m' if quantity == 'z' else 'rad'}"
+                f"it cannot be beyond {largest:.4g} {unit}"
                 f"{hint if table.factor(quantity) == 1.0 else ''}"
             )
 
 
 def _refuse_wrong_derivatives(table: _Table) -> None:
     """Refuse rates that are not the poses' derivatives, and accelerations not the rates'."""
-    pairs = zip(COORDINATES + RATES, RATES + ACCELERATIONS, strict=True)
-    for quantity, derivative in pairs:
+    x, rates, accelerations = (
+        table.columns.coordinates,
+        table.columns.rates,
+        table.columns.accelerations,
+    )
+    for quantity, derivative in zip(x + rates, rates + accelerations, strict=True):
         if derivative not in table.positions:
             continue
         found = disagreement(table.si("time"), table.si(quantity), table.si(derivative))

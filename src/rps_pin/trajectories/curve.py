@@ -16,14 +16,14 @@ from rps_pin.trajectories.path import PathSample, checked_times
 
 
 class CurveSample(NamedTuple):
-    """A curve at given parameters u; poses are ``(z, tilt_x, tilt_y)`` in m and rad."""
+    """A curve at given parameters u; poses of m coordinates, m and rad."""
 
     pose: Array
-    """Shape (..., 3)."""
+    """Shape (..., m)."""
     first: Array
-    """First derivative by u, shape (..., 3)."""
+    """First derivative by u, shape (..., m)."""
     second: Array
-    """Second derivative by u, shape (..., 3)."""
+    """Second derivative by u, shape (..., m)."""
 
 
 class Curve(Protocol):

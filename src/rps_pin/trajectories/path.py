@@ -1,4 +1,7 @@
-"""Trajectories: the protocol, samples of one, and the checks of times, parameters and poses."""
+"""Trajectories: the protocol, samples of one, and the checks of times, parameters and poses.
+
+A pose has m coordinates: ``(z, tilt_x, tilt_y)`` of the 3-RPS, or those of a task, m or rad each.
+"""
 
 from __future__ import annotations
 
@@ -8,25 +11,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, shown
 from rps_pin.validation import fixed_array, numbers
 
-POSE = "z, tilt_x, tilt_y"
+POSE = "coordinates, as z, tilt_x, tilt_y"
 
 
 class PathSample(NamedTuple):
-    """A trajectory at given times; poses are ``(z, tilt_x, tilt_y)`` in m and rad."""
+    """A trajectory at given times; poses of m coordinates, m and rad."""
 
     pose: Array
-    """Shape (..., 3)."""
+    """Shape (..., m)."""
     rate: Array
-    """First time derivative, shape (..., 3)."""
+    """First time derivative, shape (..., m)."""
     acceleration: Array
-    """Second time derivative, shape (..., 3)."""
+    """Second time derivative, shape (..., m)."""
 
 
 class Trajectory(Protocol):
-    """A motion of the platform from time 0 to `duration`."""
+    """A motion of the platform, or of a task's coordinates, from time 0 to `duration`."""
 
     @property
     def duration(self) -> float:
@@ -92,8 +95,10 @@ def _within(values: Array, end: float, message: str) -> Array:
 
 
 def checked_poses(value: ArrayLike, name: str) -> Array:
-    """Return two or more poses, shape (n, 3), m and rad, read-only."""
-    poses = fixed_array(value, name, (None, 3), POSE)
+    """Return two or more poses, shape (n, m), m and rad, read-only."""
+    poses = fixed_array(value, name, (None, None), POSE)
+    if not poses.shape[1]:
+        raise InputError(f"{name} has shape {poses.shape}; poses have a coordinate or more")
     if len(poses) < 2:
         raise InputError(f"{name} has shape {poses.shape}; two poses or more are needed")
     return poses
@@ -111,3 +116,22 @@ def times_from_zero(value: ArrayLike, count: int) -> Array:
         raise InputError(f"times must increase: {given[i]:.9g} s, then {given[i + 1]:.9g} s")
     times.setflags(write=False)
     return times
+
+
+def length_scale(scale: ArrayLike | None, size: int, tilt_scale: float) -> Array:
+    """Return what a unit of each coordinate counts for as a length, shape (size,).
+
+    Parameters
+    ----------
+    scale
+        Positive, shape (size,), m/rad for angles and 1 for lengths. Left out: 1 for each; but three
+        coordinates are (z, tilt_x, tilt_y), whose tilts count for `tilt_scale`.
+    tilt_scale
+        m/rad.
+    """
+    if scale is None:
+        return np.array([1.0, tilt_scale, tilt_scale]) if size == 3 else np.ones(size)
+    found = fixed_array(scale, "scale", (size,), "a length for a unit of each coordinate")
+    if not (found > 0).all():
+        raise InputError(f"scale = {shown(scale)}: it must be positive")
+    return found

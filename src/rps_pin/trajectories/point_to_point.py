@@ -20,15 +20,15 @@ class LineCurve:
 
     Attributes
     ----------
-    start, end : (3,) arrays
-        (z, tilt_x, tilt_y), m and rad; read-only.
+    start, end : (m,) arrays
+        Poses: (z, tilt_x, tilt_y), or a task's coordinates, m and rad; read-only.
     """
 
     length = 1.0
 
     def __init__(self, start: ArrayLike, end: ArrayLike) -> None:
-        self.start = fixed_array(start, "start", (3,), POSE)
-        self.end = fixed_array(end, "end", (3,), POSE)
+        self.start = fixed_array(start, "start", (None,), POSE)
+        self.end = fixed_array(end, "end", self.start.shape, POSE)
         if (self.start == self.end).all():
             raise InputError(f"start and end are the same pose, {tuple(self.start.tolist())}")
 
@@ -58,14 +58,14 @@ def point_to_point(
     Parameters
     ----------
     start, end
-        (z, tilt_x, tilt_y), shape (3,), m and rad.
+        (z, tilt_x, tilt_y), or a task's coordinates, shape (m,), m and rad.
     profile
         ``"quintic"``, ``"trapezoidal"`` (speed) or ``"s-curve"``; see `time_laws`.
     duration
         In s. If left out, the shortest within the limits below.
     max_rate, max_acceleration, max_jerk
-        Of z (m/s, ...) and of the tilts (rad/s, ...): shape (3,), or one number for all. A
-        trapezoidal profile needs the acceleration's and takes no jerk, an S-curve needs the jerk's.
+        Of each coordinate (m/s or rad/s, ...): shape (m,), or one number for all. A trapezoidal
+        profile needs the acceleration's and takes no jerk, an S-curve needs the jerk's.
 
     Raises
     ------
@@ -88,10 +88,11 @@ def point_to_point(
 
 def _along(limit: ArrayLike, change: Array, name: str) -> float:
     """Return the limit of u for limits of coordinates that change by `change` from 0 to 1."""
-    given = numbers(limit, name, "a number, or three")
-    if given.shape not in ((), (3,)):
-        raise InputError(f"{name} = {shown(limit)}: it must be a number, or three")
-    limits = np.broadcast_to(given, (3,))
+    count = "three" if change.size == 3 else str(change.size)
+    given = numbers(limit, name, f"a number, or {count}")
+    if given.shape not in ((), change.shape):
+        raise InputError(f"{name} = {shown(limit)}: it must be a number, or {count}")
+    limits = np.broadcast_to(given, change.shape)
     if not (limits > 0).all():
         raise InputError(f"{name} = {shown(limit)}: it must be positive")
     moving = change > 0

@@ -5,8 +5,9 @@ path,
 
     sqrt(dz^2 + L^2 (dtilt_x^2 + dtilt_y^2)),    L = `tilt_scale`, m/rad,
 
-it has one. The curve is the quintic spline (not-a-knot) through points of the path at equal
-distances. Their number is doubled until the curve is within `ON_PATH` of the path.
+or of other coordinates x_i sqrt(sum_i (s_i dx_i)^2) with s = `scale`, it has one. The
+curve is the quintic spline (not-a-knot) through points of the path at equal distances. Their number
+is doubled until the curve is within `ON_PATH` of the path.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from scipy.interpolate import make_interp_spline
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample
-from rps_pin.trajectories.path import Trajectory, checked_parameters
+from rps_pin.trajectories.path import Trajectory, checked_parameters, length_scale
 
 #: Number of pieces: at first, and at most (or four to a step between times).
 PIECES, MOST_PIECES = 400, 25_600
@@ -39,8 +40,8 @@ class ResampledCurve:
         The motion.
     times
         Increasing, from 0 to its duration, shape (n,), s: between two of them it is smooth.
-    tilt_scale
-        L, m/rad.
+    tilt_scale, scale
+        L (m/rad), or s, shape (m,); see `length_scale`.
 
     Attributes
     ----------
@@ -54,10 +55,16 @@ class ResampledCurve:
     """
 
     def __init__(
-        self, trajectory: Trajectory, times: Array, *, tilt_scale: float = TILT_SCALE
+        self,
+        trajectory: Trajectory,
+        times: Array,
+        *,
+        tilt_scale: float = TILT_SCALE,
+        scale: ArrayLike | None = None,
     ) -> None:
         self._trajectory = trajectory
-        self._scale = np.array([1.0, tilt_scale, tilt_scale])
+        size = trajectory.sample(0.0).pose.size
+        self._scale = length_scale(scale, size, tilt_scale)
         samples = max(_SAMPLES, 16 * PIECES // (len(times) - 1))
         fine = np.linspace(times[:-1], times[1:], samples, endpoint=False, axis=-1)
         t = np.append(fine.ravel(), times[-1])

@@ -51,9 +51,10 @@ class SampledPath:
     times
         Increasing, shape (n,), s; the first counts as 0.
     poses
-        (z, tilt_x, tilt_y), shape (n, 3), m and rad; 2 or more, 6 with free ends.
+        (z, tilt_x, tilt_y), or a task's coordinates, shape (n, m), m and rad; 2 or more, 6 with
+        free ends.
     rates, accelerations
-        Their time derivatives, shape (n, 3). Rates alone are used at the two ends only.
+        Their time derivatives, shape (n, m). Rates alone are used at the two ends only.
     ends
         What is assumed at both ends of the spline: ``"at rest"``, ``"measured"`` (the rates given)
         or ``"free"``. If left out, ``"measured"`` with rates and ``"at rest"`` without. Samples
@@ -63,8 +64,8 @@ class SampledPath:
     ----------
     times : (n,) array
         From 0, s. All arrays are read-only.
-    poses : (n, 3) array
-    rates, accelerations : (n, 3) arrays or None
+    poses : (n, m) array
+    rates, accelerations : (n, m) arrays or None
     starts, ends : str
         How the motion starts and ends, for reports: ``"at rest"``, ``"with the measured rate"``,
         ``"with the rate of the fitted spline"``.
@@ -150,15 +151,16 @@ def _said(assumed: str, rates: Array | None, sample: int) -> str:
 
 
 def _spline(times: Array, poses: Array, assumed: str, rates: Array | None) -> tuple[Array, BSpline]:
-    """Return where each step counts from (n - 1, 3), and the spline of the motion from there."""
+    """Return where each step counts from (n - 1, m), and the spline of the motion from there."""
     if assumed == "free" and len(times) < FEWEST_POSES:
         raise InputError(
             f"{len(times)} samples; {FEWEST_POSES} or more are needed for a spline with free ends"
         )
-    rest = [(1, np.zeros(3)), (2, np.zeros(3))]
+    still = np.zeros(poses.shape[1])
+    rest = [(1, still), (2, still)]
     conditions: Any = None if assumed == "free" else (rest, rest)
     if assumed == "measured" and rates is not None:
-        conditions = tuple([(1, rate), (3, np.zeros(3))] for rate in rates[[0, -1]])
+        conditions = tuple([(1, rate), (3, still)] for rate in rates[[0, -1]])
     motion = poses - poses[0]
     try:
         spline: BSpline = make_interp_spline(times, motion, k=5, bc_type=conditions)
@@ -175,7 +177,7 @@ def _spline(times: Array, poses: Array, assumed: str, rates: Array | None) -> tu
 
 
 def _hermite(times: Array, x: Array, v: Array, a: Array) -> tuple[Array, BPoly]:
-    """Return where each step counts from (n - 1, 3), and the polynomials of the motion from there.
+    """Return where each step counts from (n - 1, m), and the polynomials of the motion from there.
 
     With c_k the Bernstein coefficients of a step of length h, the derivatives at its beginning are
     5 (c_1 - c_0) / h and 20 (c_2 - 2 c_1 + c_0) / h^2, and at its end likewise.

@@ -5,7 +5,9 @@ With times, x(t) is the quintic spline of `sampled_path`.
 Without times, x(u) is the natural cubic spline over the chord length u, two continuous derivatives,
 and u(t) is a law of time. Heights and tilts have different units: a chord's length is
 
-    sqrt(dz^2 + L^2 (dtilt_x^2 + dtilt_y^2)),    L = `tilt_scale`, m/rad.
+    sqrt(dz^2 + L^2 (dtilt_x^2 + dtilt_y^2)),    L = `tilt_scale`, m/rad,
+
+or of other coordinates x_i sqrt(sum_i (s_i dx_i)^2), s = `scale`.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from rps_pin.errors import InputError
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
-from rps_pin.trajectories.path import Trajectory, checked_parameters, checked_poses
+from rps_pin.trajectories.path import Trajectory, checked_parameters, checked_poses, length_scale
 from rps_pin.trajectories.resampled import TILT_SCALE
 from rps_pin.trajectories.sampled_path import SampledPath
 from rps_pin.trajectories.time_laws import Profile, time_law
@@ -29,13 +31,14 @@ class ChordSpline:
     Parameters
     ----------
     poses
-        Shape (n, 3), m and rad; no two neighbours alike.
-    tilt_scale
-        L, m/rad; positive.
+        Shape (n, m), m and rad; no two neighbours alike.
+    tilt_scale, scale
+        L (m/rad), or s, shape (m,), positive. Without s, coordinates count in their units, but
+        three of them are (z, tilt_x, tilt_y). Of a task: its ``scale``.
 
     Attributes
     ----------
-    poses : (n, 3) array
+    poses : (n, m) array
         As given, read-only.
     knots : (n,) array
         The parameters u at which the poses are met, read-only, m.
@@ -48,10 +51,17 @@ class ChordSpline:
         If poses are not finite, of another shape, or neighbours are the same.
     """
 
-    def __init__(self, poses: ArrayLike, *, tilt_scale: float = TILT_SCALE) -> None:
+    def __init__(
+        self,
+        poses: ArrayLike,
+        *,
+        tilt_scale: float = TILT_SCALE,
+        scale: ArrayLike | None = None,
+    ) -> None:
         self.poses = checked_poses(poses, "poses")
-        scale = np.array([1.0, *2 * [positive_number(tilt_scale, "tilt_scale")]])
-        chords = np.linalg.norm(np.diff(self.poses, axis=0) * scale, axis=-1)
+        tilts = positive_number(tilt_scale, "tilt_scale")
+        lengths = length_scale(scale, self.poses.shape[1], tilts)
+        chords = np.linalg.norm(np.diff(self.poses, axis=0) * lengths, axis=-1)
         self.knots = np.concatenate([[0.0], np.cumsum(chords)])
         self.knots.setflags(write=False)
         rising = np.diff(self.knots) > 0
@@ -84,19 +94,20 @@ def spline(
     duration: float | None = None,
     profile: Profile = "s-curve",
     tilt_scale: float = TILT_SCALE,
+    scale: ArrayLike | None = None,
 ) -> Trajectory:
     """Return a smooth motion through poses, from rest to rest.
 
     Parameters
     ----------
     poses
-        (z, tilt_x, tilt_y) each, shape (n, 3), n of 2 or more, m and rad.
+        (z, tilt_x, tilt_y), or a task's coordinates, shape (n, m), n of 2 or more, m and rad.
     times
         When each is met, increasing, shape (n,), s; the motion begins at the first. The result is
         then a `TimedSpline`.
-    duration, profile, tilt_scale
-        Without times: the duration (s), the law of time, and the L above (m/rad). The result is a
-        `TimedCurve` of a `ChordSpline`, which can be scaled in time.
+    duration, profile, tilt_scale, scale
+        Without times: the duration (s), the law of time, and the L above (m/rad) or s; see
+        `ChordSpline`. The result is a `TimedCurve` of one, which can be scaled in time.
 
     Raises
     ------
@@ -109,5 +120,5 @@ def spline(
         raise InputError(f"give the poses' times, or a duration for all: {given}")
     if times is not None:
         return TimedSpline(times, poses)
-    curve = ChordSpline(poses, tilt_scale=tilt_scale)
+    curve = ChordSpline(poses, tilt_scale=tilt_scale, scale=scale)
     return TimedCurve(curve, time_law(curve.length, profile, duration=duration))

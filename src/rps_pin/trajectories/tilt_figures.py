@@ -26,9 +26,9 @@ class HarmonicCurve:
     Parameters
     ----------
     middle, size
-        Of (z, tilt_x, tilt_y), shape (3,), m and rad.
+        Of (z, tilt_x, tilt_y), or a task's coordinates, shape (m,), m and rad.
     frequency, phase
-        Periods in a turn of u, and angles at u = 0 (rad), shape (3,).
+        Periods in a turn of u, and angles at u = 0 (rad), shape (m,).
     length
         Where u ends, rad; positive.
 
@@ -42,10 +42,11 @@ class HarmonicCurve:
         self, middle: ArrayLike, size: ArrayLike, frequency: ArrayLike, phase: ArrayLike,
         length: float,
     ) -> None:  # fmt: skip
-        self._middle = fixed_array(middle, "middle", (3,), POSE)
-        self._size = fixed_array(size, "size", (3,), POSE)
-        self._frequency = fixed_array(frequency, "frequency", (3,), POSE)
-        self._phase = fixed_array(phase, "phase", (3,), POSE)
+        self._middle = fixed_array(middle, "middle", (None,), POSE)
+        shape = self._middle.shape
+        self._size = fixed_array(size, "size", shape, POSE)
+        self._frequency = fixed_array(frequency, "frequency", shape, POSE)
+        self._phase = fixed_array(phase, "phase", shape, POSE)
         self.length = positive_number(length, "length")
 
     def __repr__(self) -> str:

@@ -23,6 +23,9 @@ from rps_pin.arrays import Array
 
 skew = pin.skew
 
+#: Coordinates that are rotation vectors stay below a whole turn, where they have no rates; rad.
+MOST_TURN = 2 * math.pi - 0.05
+
 #: beta(t) = sum_k 2 zeta(2 k) t^(k - 1) / (2 pi)^(2 k), k = 1, 2, ..., for t below `_SERIES`, where
 #: the closed form loses digits.
 _SERIES, _TERMS = 4.0, 20
@@ -78,6 +81,24 @@ def rate_matrix(r: Array) -> Array:
     """Return A(r), shape (3, 3)."""
     turn = skew(r)
     return np.asarray(np.eye(3) - turn / 2 + beta(float(r @ r))[0] * turn @ turn)
+
+
+def vector_rates(r: Array, w: Array, dw: Array) -> tuple[Array, Array]:
+    """Return r' and r'' of rotation vectors, angular velocities and accelerations (..., 3) each."""
+    values = np.array([beta(t)[:2] for t in (r * r).sum(axis=-1).flat])
+    value, first = np.moveaxis(values.reshape(*r.shape[:-1], 2), -1, 0)[..., None]
+
+    def across(along: Array) -> tuple[Array, Array]:
+        once = np.cross(r, along)
+        return once, np.cross(r, once)
+
+    once, twice = across(w)
+    rate = w - once / 2 + value * twice
+    of_dw, again = across(dw)
+    both = np.cross(rate, once) + np.cross(r, np.cross(rate, w))
+    inner = (r * rate).sum(axis=-1, keepdims=True)
+    change = -np.cross(rate, w) / 2 + value * both + 2 * first * inner * twice
+    return rate, dw - of_dw / 2 + value * again + change
 
 
 def rate_slope(r: Array, along: Array) -> Array:
