@@ -25,8 +25,8 @@ app = typer.Typer(name="rps-pin", cls=LazyGroup, no_args_is_help=True, **SETTING
 _ROBOT, _MOTION, _ANY, _MORE = "The 3-RPS", "Its motion", "Any mechanism", "More"
 for _panel, _name, _line in (
     (_ROBOT, "view", "Show a pose or a motion in the browser."),
-    (_ROBOT, "ik", "Leg lengths of a pose, and the robot's limits."),
-    (_ROBOT, "fk", "Poses of leg lengths: all assembly modes, or one."),
+    (_ROBOT, "ik", "Leg lengths of a pose, and limits; of any task too."),
+    (_ROBOT, "fk", "Poses of leg lengths: all modes, or one; any task."),
     (_ROBOT, "workspace", "Its workspace, with the paper's figures."),
     (_ROBOT, "urdf", "Its URDF."),
     (_MOTION, "helix", "Actuator forces along the paper's helix."),

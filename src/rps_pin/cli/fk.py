@@ -2,29 +2,41 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from rps_pin.cli import console as common
+from rps_pin.cli import mechanism_options as options
+from rps_pin.cli import task_options as tasks
 from rps_pin.cli.printing import say
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
 
 _HEADERS = ("", "z (m)", "tilt_x (rad)", "tilt_y (rad)", "leg angles (degrees)", "mirror")
+_TASK_ONLY = "--at, --degrees, --ignore-limits"
 #: In place of the tilts of an assembly mode without a pose.
 _HALF_TURN = ("half", "turn")
 
 
 def fk_command(
     lengths: Annotated[
-        common.Three, typer.Option(metavar="D1 D2 D3", help="The three leg lengths, m.")
-    ],
+        common.Three | None,
+        typer.Option(metavar="D1 D2 D3", help="The three leg lengths of a 3-RPS, m."),
+    ] = None,
     near: Annotated[
         common.Three | None,
         common.pose_option("Only the pose that is reached from this one (m, rad, rad)."),
     ] = None,
     robot: common.RobotOption = "sokolov",
+    mechanism: tasks.MechanismOption = None,
+    at: Annotated[
+        options.JointValues,
+        options.joint_values("An actuator's position, m or rad; default: the home's."),
+    ] = None,
+    degrees: tasks.DegreesOption = False,
+    ignore_limits: options.IgnoreLimitsOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
     """Compute the poses of given leg lengths: every assembly mode, or the one near a known pose.
@@ -34,6 +46,9 @@ def fk_command(
     that pose: the result is the pose that a moving robot reaches. A path that meets a singularity
     is an error.
 
+    With **--mechanism**, compute the coordinates of the mechanism's task at positions of its
+    actuators, continued from its home; `rps-pin assembly-modes` searches all modes.
+
     Exit status: 0 found; 1 not found (the error says why); 2 wrong usage.
 
     Examples:
@@ -41,7 +56,19 @@ def fk_command(
     - `rps-pin fk --lengths 0.46 0.46 0.46` all solutions
 
     - `rps-pin fk --lengths 0.45 0.47 0.46 --near 0.4 0 0` the one near the level pose
+
+    - `rps-pin fk --mechanism delta --at arm_1_joint=0.4`
     """
+    if mechanism is not None:
+        if lengths is not None or near is not None:
+            option = "--lengths" if lengths is not None else "--near"
+            raise typer.BadParameter("a mechanism's actuators are given by --at", param_hint=option)
+        _of_task(mechanism, at, degrees, ignore_limits, as_json)
+        return
+    if at or degrees or ignore_limits:
+        raise typer.BadParameter("these options need a --mechanism", param_hint=_TASK_ONLY)
+    if lengths is None:
+        raise typer.BadParameter("give leg lengths, or a --mechanism", param_hint="--lengths")
     machine = common.load_robot(robot)
     common.doubt_lengths("--lengths", "leg lengths", lengths)
     low, high = machine.parameters.leg_length_limits
@@ -67,6 +94,18 @@ def fk_command(
         f"z = {z:.9g} m, tilt = ({tilt_x:.9g}, {tilt_y:.9g}) rad; "
         f"centre at x = {x:.6g} mm, y = {y:.6g} mm"
     )
+
+
+def _of_task(
+    file: Path, at: list[str] | None, degrees: bool, ignore_limits: bool, as_json: bool
+) -> None:
+    task = tasks.load_task(file, ignore_limits)
+    names, angular = tasks.of_actuators(task)
+    home = task.mechanism.home
+    a = tasks.given(at, "--at", names, angular, task.to_actuators(task.home, home), degrees)
+    q = task.mechanism.complete(a)
+    x = task.at(q)
+    tasks.print_answer(task, x, a, q, first="task", degrees=degrees, as_json=as_json)
 
 
 def _plain(modes: AssemblyModes) -> list[dict[str, Any]]:

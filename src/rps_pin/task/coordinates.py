@@ -30,8 +30,8 @@ from rps_pin.closed_loop.constraints.frame_coordinates import (
 )
 from rps_pin.errors import MechanismError
 
-#: Name of the closure, and of the joints that hold coordinates.
-_CLOSURE = "task"
+#: Joints that hold coordinates are called ``task:x``.
+_PREFIX = "task"
 
 
 class Extended(NamedTuple):
@@ -102,7 +102,7 @@ def of_frame(
     model = pin.Model(mechanism.model)
     joints = tuple(_hold(model, name) for name in ordered)
     closure = FrameCoordinates(
-        reference, frame, name=_free(mechanism), placement_b=placement, coordinates=ordered,
+        reference, frame, name=_free(mechanism, frame), placement_b=placement, coordinates=ordered,
         joints=joints,
     )  # fmt: skip
     extended = ClosedLoopModel(
@@ -131,10 +131,10 @@ def of_frame(
     )
 
 
-def _free(mechanism: ClosedLoopModel) -> str:
+def _free(mechanism: ClosedLoopModel, frame: str) -> str:
     """Return a name that no closure has."""
     names = {closure.name for closure in mechanism.closures}
-    name = _CLOSURE
+    name = f"coordinates of {frame}"
     while name in names:
         name += "_"
     return name
@@ -147,7 +147,7 @@ def _hold(model: pin.Model, coordinate: str) -> str:
         *(pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ),
         *(pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ),
     )
-    name = f"{_CLOSURE}:{coordinate}"
+    name = f"{_PREFIX}:{coordinate}"
     while model.existJointName(name):
         name += "_"
     free = np.full(1, np.inf)

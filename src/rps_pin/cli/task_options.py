@@ -1,0 +1,168 @@
+"""Options and output of commands for any mechanism with a task: coordinates by name, angles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from rps_pin.arrays import Array
+from rps_pin.cli import console as common
+from rps_pin.cli import mechanism_options as options
+from rps_pin.cli.completion import mechanism_names, names_or_files
+from rps_pin.errors import InputError
+
+if TYPE_CHECKING:
+    from rps_pin.task import Task
+
+#: Values below this are printed as zero.
+_ZERO = 1e-12
+
+MechanismOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--mechanism",
+        "-m",
+        metavar="FILE|NAME",
+        help="In place of a 3-RPS, a mechanism with a task: its description (**.yaml**), or the "
+        "name of one that comes with the package, such as **stewart**.",
+        autocompletion=names_or_files(mechanism_names),
+    ),
+]
+DegreesOption = Annotated[
+    bool,
+    typer.Option("--degrees", help="Angles of a mechanism are given and printed in degrees."),
+]
+
+
+def load_task(file: Path, ignore_limits: bool = False) -> Task:
+    """Return the task of a mechanism's file.
+
+    Raises
+    ------
+    MechanismError
+        If it has none.
+    """
+    mechanism, _ = options.load_mechanism(file, ignore_limits)
+    task: Task = mechanism.task
+    return task
+
+
+def given(
+    pairs: Sequence[str] | None,
+    option: str,
+    names: Sequence[str],
+    angular: Sequence[bool],
+    otherwise: Array,
+    degrees: bool,
+) -> Array:
+    """Return values of options like ``--at z=0.6``, by name; those left out are kept.
+
+    Raises
+    ------
+    InputError
+        If there is no such name, or a value is no number.
+    """
+    values = otherwise.copy()
+    for name, value in options.by_joint(pairs or (), option).items():
+        if name not in names:
+            raise InputError(f"{option}: no {name!r}; there are: {', '.join(names)}")
+        index = list(names).index(name)
+        values[index] = math.radians(value) if degrees and angular[index] else value
+    return values
+
+
+def of_actuators(task: Task) -> tuple[tuple[str, ...], tuple[bool, ...]]:
+    """Return the names of the actuators, and which are angles."""
+    mechanism = task.mechanism
+    angular = mechanism.angular_velocities[mechanism.actuated_indices]
+    return mechanism.actuated, tuple(bool(one) for one in angular)
+
+
+def in_unit(value: float, angular: bool, degrees: bool) -> float:
+    """Return a value in the unit that is printed; rounding errors are zero."""
+    value = 0.0 if abs(value) < _ZERO else float(value)
+    return math.degrees(value) if angular and degrees else value
+
+
+def unit_of(angular: bool, degrees: bool) -> str:
+    """Return that unit."""
+    return ("deg" if degrees else "rad") if angular else "m"
+
+
+def table(
+    names: Sequence[str],
+    values: Array,
+    angular: Sequence[bool],
+    degrees: bool,
+    limits: tuple[Array, Array] | None = None,
+) -> Any:
+    """Return a table of values by name."""
+    rows = []
+    for i, (name, value, turns) in enumerate(zip(names, values, angular, strict=True)):
+        cells = [name, f"{in_unit(value, turns, degrees):.6g}"]
+        if limits is not None:
+            ends = (in_unit(end[i], turns, degrees) for end in limits)
+            cells.append(" to ".join(f"{end:.4g}" for end in ends))
+        rows.append((*cells, unit_of(turns, degrees)))
+    headers = ("", "value", *(("limits",) if limits is not None else ()), "unit")
+    return common.table_of(rows, *headers, right=slice(1, 2))
+
+
+def limits_of(task: Task) -> tuple[Array, Array]:
+    """Return the actuators' position limits, shape (na,) each."""
+    model = task.mechanism.model
+    joints = [model.joints[model.getJointId(name)] for name in task.mechanism.actuated]
+    at = [joint.idx_q for joint in joints]
+    return model.lowerPositionLimit[at], model.upperPositionLimit[at]
+
+
+def measures(task: Task, q: Array) -> dict[str, float | None]:
+    """Return the singularity measures of a configuration; None where one does not exist."""
+    found = task.singularities(q)._asdict()
+    return {name: float(value) if np.isfinite(value) else None for name, value in found.items()}
+
+
+def in_words(found: dict[str, float | None]) -> str:
+    """Return the measures in one line."""
+    shown = {name: value for name, value in found.items() if name != "determinant"}
+    parts = [
+        f"{name} {'-' if value is None else format(value, '.4g')}" for name, value in shown.items()
+    ]
+    return f"distance to singularities (0 at one): {', '.join(parts)}"
+
+
+def print_answer(
+    task: Task, x: Array, a: Array, q: Array, *, first: str, degrees: bool, as_json: bool
+) -> None:
+    """Print a pose: the task's coordinates and the actuators' positions, asked for or found."""
+    names, angular = of_actuators(task)
+    found = measures(task, q)
+    if as_json:
+        sides = {
+            "task": (task.coordinates, task.angular, x),
+            "actuators": (names, angular, a),
+        }
+        answer: dict[str, Any] = {"mechanism": task.mechanism.name}
+        for side, (of_side, turns, values) in sides.items():
+            answer[side] = {
+                name: in_unit(value, is_angle, degrees)
+                for name, is_angle, value in zip(of_side, turns, values, strict=True)
+            }
+        answer["units"] = {"length": "m", "angle": unit_of(True, degrees)}
+        common.print_json(answer | {"singularities": found, "configuration": q.tolist()})
+        return
+    console = common.text_console()
+    tables = {
+        "task": table(task.coordinates, x, task.angular, degrees),
+        "actuators": table(names, a, angular, degrees, limits_of(task)),
+    }
+    other = "actuators" if first == "task" else "task"
+    for name in (first, other):
+        console.print(f"{name}:")
+        console.print(tables[name])
+    console.print(in_words(found))

@@ -1,0 +1,75 @@
+"""`rps-pin ik` and `fk` of any mechanism with a task."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from rps_pin import ClosedLoopModel
+from tests.cli.commands import rps_pin
+from tests.worst import worst
+
+
+def answer(*words: str) -> dict:
+    return json.loads(rps_pin(*words, "--json").stdout)
+
+
+def test_positions_go_there_and_back() -> None:
+    there = answer("ik", "--mechanism", "stewart", "--at", "z=0.64", "--at", "rx=0.1")
+    task = ClosedLoopModel.load("urdf/stewart.yaml").task
+    x = task.home
+    x[[2, 3]] = 0.64, 0.1
+    assert worst(np.array(list(there["actuators"].values())) - task.to_actuators(x)) < 1e-12
+    given = [f"--at={name}={value!r}" for name, value in there["actuators"].items()]
+    back = answer("fk", "--mechanism", "stewart", *given)
+    assert list(back["task"]) == ["x", "y", "z", "rx", "ry", "rz"]
+    assert worst(np.array(list(back["task"].values())) - x) < 1e-11
+    assert back["units"] == {"length": "m", "angle": "rad"}
+
+
+def test_degrees_are_those_of_angles_alone() -> None:
+    there = answer("ik", "-m", "stewart", "--at", "rx=10", "--at", "x=0.01", "--degrees")
+    same = answer("ik", "-m", "stewart", "--at", f"rx={math.radians(10)!r}", "--at", "x=0.01")
+    assert (
+        worst([there["actuators"]["leg_1_rod_joint"] - same["actuators"]["leg_1_rod_joint"]])
+        < 1e-12
+    )
+    assert there["task"]["rx"] == pytest.approx(10)
+    assert there["task"]["x"] == pytest.approx(0.01)
+    of_arms = answer("fk", "-m", "delta", "--at", "arm_1_joint=20", "--degrees")
+    assert of_arms["actuators"]["arm_1_joint"] == pytest.approx(20)
+    assert of_arms["units"]["angle"] == "deg"
+
+
+def test_tables_name_units_and_limits() -> None:
+    told = rps_pin("ik", "-m", "stewart", "--degrees").stdout
+    for word in ("leg_1_rod_joint", "0.45 to 0.95", "deg", "type_ii"):
+        assert word in told
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (("ik", "-m", "delta", "--at", "z=-0.1"), 1, "'coordinates of platform' stays open by"),
+        (("ik", "-m", "delta", "--at", "rx=0.1"), 1, "--at: no 'rx'; there are: x, y, z"),
+        (("ik", "-m", "delta", "--at", "z"), 1, "it must be JOINT=NUMBER"),
+        (("ik", "-m", "delta", "--at", "z=nan"), 1, ""),
+        (("fk", "-m", "delta", "--at", "elbow=1"), 1, "no 'elbow'; there are: arm_1_joint"),
+        (("fk", "-m", "delta", "--at", "arm_1_joint=2"), 1, "'arm_1_joint' at 2 (-1.2 to 1.5)"),
+        (("ik", "-m", "gripper"), 1, "gripper has no task"),
+        (("ik", "-m", "nothing"), 1, "is not a file or a mechanism of the package"),
+        (("ik",), 2, "give a pose, or a --mechanism"),
+        (("fk",), 2, "give leg lengths, or a --mechanism"),
+        (("ik", "--at", "z=1"), 2, "these options need a"),
+        (("ik", "-m", "delta", "--pose", "1", "0", "0"), 2, "are given by --at"),
+        (("fk", "-m", "delta", "--near", "1", "0", "0"), 2, "are given by --at"),
+    ],
+)
+def test_what_does_not_fit_is_refused(words, status, message) -> None:
+    done = rps_pin(*words)
+    assert done.returncode == status
+    assert message in " ".join((done.stdout + done.stderr).split())
+    assert "Traceback" not in done.stderr
