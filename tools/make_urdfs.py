@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from urdf_linkages import LINKAGES
+from urdf_parallel import PARALLEL
 from urdf_text import ALONG_X, ALONG_Y, ORIGIN, TURN, Numbers, joint, link, polar, robot, shape, tip
 
 FOLDER = Path(__file__).resolve().parents[1] / "urdf"
@@ -57,6 +58,9 @@ def four_bar() -> str:
     )
 
 
+FIVE_BAR_EFFORT, FIVE_BAR_SPEED = 40.0, 15.0
+
+
 def five_bar() -> str:
     """Return a five-bar, both of its base joints driven, with no two bars alike."""
     return robot(
@@ -66,9 +70,16 @@ def five_bar() -> str:
         bar("left_arm", 0.42, 0.8, (0.2, 0.0, -0.02), (0.003, 0.025, 0.024), "steel"),
         bar("right", 0.28, 1.1, (0.12, 0.0, 0.02), (0.005, 0.03, 0.028), "red"),
         bar("right_arm", 0.45, 0.7, (0.21, 0.0, 0.015), (0.002, 0.015, 0.014), "blue"),
-        joint("revolute", "base", "left"),
+        joint("revolute", "base", "left", effort=FIVE_BAR_EFFORT, speed=FIVE_BAR_SPEED),
         joint("revolute", "left", "left_arm", (0.3, 0.0, 0.0)),
-        joint("revolute", "base", "right", (0.4, 0.0, 0.0)),
+        joint(
+            "revolute",
+            "base",
+            "right",
+            (0.4, 0.0, 0.0),
+            effort=FIVE_BAR_EFFORT,
+            speed=FIVE_BAR_SPEED,
+        ),
         joint("revolute", "right", "right_arm", (0.28, 0.0, 0.0)),
         tip("left_arm", "left_tip", (0.42, 0.0, 0.0)),
         tip("right_arm", "right_tip", (0.45, 0.0, 0.0)),
@@ -116,7 +127,15 @@ def delta_arm(i: int) -> str:
     )
     place, turn = polar(DELTA_BASE, angle), (0.0, 0.0, angle)
     return body + joint(
-        "revolute", "base", name, place, turn, (0.0, 1.0, 0.0), DELTA_ARM_LIMITS, effort=60.0
+        "revolute",
+        "base",
+        name,
+        place,
+        turn,
+        (0.0, 1.0, 0.0),
+        DELTA_ARM_LIMITS,
+        effort=60.0,
+        speed=15.0,
     )
 
 
@@ -247,6 +266,7 @@ def stewart_leg(leg: int) -> str:
                 axis=(0.0, 0.0, 1.0),
                 limits=STEWART_STROKE,
                 effort=2000.0,
+                speed=1.0,
             ),
             tip(rod, f"leg_{leg}_ball", ORIGIN),
         ]
@@ -284,6 +304,7 @@ FILES = {
     "delta_rods": delta_rods,
     "stewart": stewart,
     **LINKAGES,
+    **PARALLEL,
 }
 
 

@@ -100,7 +100,15 @@ def ankle() -> str:
         length = ANKLE_RODS[side]
         parts += [
             rod(crank, (-ANKLE_CRANK, 0.0, 0.0), 0.08, colour="red"),
-            joint("revolute", "shin", crank, (0.0, y, ANKLE_HEIGHTS[side]), axis=Y, effort=40.0),
+            joint(
+                "revolute",
+                "shin",
+                crank,
+                (0.0, y, ANKLE_HEIGHTS[side]),
+                axis=Y,
+                effort=40.0,
+                speed=20.0,
+            ),
             tip(crank, f"{crank}_tip", (-ANKLE_CRANK, 0.0, 0.0)),
             link(
                 f"{bar}_cross",
@@ -302,7 +310,15 @@ def rrs() -> str:
         parts += [
             rod(arm, (RRS_PROXIMAL, 0.0, 0.0), 0.4, 0.015, "red"),
             rod(shank, (RRS_DISTAL, 0.0, 0.0), 0.3, 0.01),
-            joint("revolute", "base", arm, polar(RRS_BASE, angle), (0.0, 0.0, angle), effort=30.0),
+            joint(
+                "revolute",
+                "base",
+                arm,
+                polar(RRS_BASE, angle),
+                (0.0, 0.0, angle),
+                effort=30.0,
+                speed=10.0,
+            ),
             joint("revolute", arm, shank, (RRS_PROXIMAL, 0.0, 0.0)),
             tip(shank, f"{shank}_ball", (RRS_DISTAL, 0.0, 0.0)),
             tip("platform", f"platform_ball_{i}", polar(RRS_PLATFORM, angle)),
@@ -323,7 +339,7 @@ def minitaur_leg() -> str:
         parts += [
             rod(upper, (MINITAUR_UPPER, 0.0, 0.0), 0.12, 0.01, "red"),
             rod(lower, (MINITAUR_LOWER + extra, 0.0, 0.0), 0.1, 0.008),
-            joint("revolute", "hip", upper, effort=10.0),
+            joint("revolute", "hip", upper, effort=10.0, speed=40.0),
             joint("revolute", upper, lower, (MINITAUR_UPPER, 0.0, 0.0)),
             tip(lower, f"{lower}_tip", (MINITAUR_LOWER, 0.0, 0.0)),
         ]

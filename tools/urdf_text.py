@@ -93,6 +93,7 @@ def joint(
     axis: Numbers = PLANE_AXIS,
     limits: tuple[float, float] = (-TURN, TURN),
     effort: float = UNLIMITED,
+    speed: float = UNLIMITED,
 ) -> str:
     """Return the joint that carries a link; its name is the link's with ``_joint`` after it."""
     moving = ""
@@ -100,7 +101,7 @@ def joint(
         moving = (
             f'    <axis xyz="{text(axis)}"/>\n'
             f'    <limit lower="{text(limits[:1])}" upper="{text(limits[1:])}" '
-            f'effort="{text([effort])}" velocity="{text([UNLIMITED])}"/>\n'
+            f'effort="{text([effort])}" velocity="{text([speed])}"/>\n'
         )
     return (
         f'  <joint name="{child}_joint" type="{kind}">\n    <parent link="{parent}"/>\n'

@@ -12,6 +12,7 @@ a line that meets the unit circle twice; the elbow is the outer one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -43,11 +44,10 @@ def arm(i: int, position: Jet) -> tuple[Jet, Jet]:
     """The direction u = (x, z) of arm i, and its angle down from the horizontal."""
     local = position.map(lambda p: TURNS[i].T @ p).shift([PLATFORM - BASE, 0, 0])
     b, y = local.map(lambda p: p[[0, 2]]), local.map(lambda p: p[1])
-    square = jets.dot(b, b)
-    along = (square + jets.scaled(y, y)).shift(ARM**2 - ROD**2).map(lambda x: x / (2 * ARM))
-    across = jets.root(jets.minus(square, jets.scaled(along, along)))
+    square = jets.dot(b, b) + jets.scaled(y, y)
+    along = square.shift(ARM**2 - ROD**2).map(lambda x: x / (2 * ARM))
     # b points down, so that a quarter turn from x towards z of it points outwards.
-    u = jets.over(jets.scaled(along, b) + jets.scaled(across, jets.turned(b)), square)
+    u = jets.meeting(b, along, 1)
     return u, jets.angle_of(u).map(np.negative)
 
 
@@ -76,6 +76,11 @@ def platform_position(arms: ArrayLike) -> Array:
         T @ [BASE - PLATFORM + ARM * np.cos(t), 0, -ARM * np.sin(t)]
         for T, t in zip(TURNS, np.asarray(arms, dtype=float), strict=True)
     ]
+    return min(meeting_of_spheres(centres, ROD), key=lambda point: float(point[2]))
+
+
+def meeting_of_spheres(centres: Sequence[Array], radius: float) -> Array:
+    """The two points (2, 3) at one distance from three."""
     x = centres[1] - centres[0]
     width = np.linalg.norm(x)
     x = x / width
@@ -84,12 +89,11 @@ def platform_position(arms: ArrayLike) -> Array:
     y = out - i * x
     j = np.linalg.norm(y)
     y = y / j
-    z = np.cross(x, y)
     along = width / 2
     across = (i**2 + j**2 - 2 * i * along) / (2 * j)
-    height = np.sqrt(ROD**2 - along**2 - across**2)
-    down = -np.sign(z[2]) * z
-    return centres[0] + along * x + across * y + height * down
+    height = np.sqrt(radius**2 - along**2 - across**2)
+    foot = centres[0] + along * x + across * y
+    return foot + np.outer([height, -height], np.cross(x, y))
 
 
 def rod_frame(i: int, sign: float, position: Jet) -> tuple[Jet, Jet, Jet, Jet]:
@@ -161,11 +165,8 @@ def torques(
     p: Array, v: Array, a: Array, *, rods: bool = False, gravity: Array = virtual_power.EARTH
 ) -> Array:
     """Arm torques: the forces in P, through angle' = G P', tau = G^-T f."""
-    forces = virtual_power.generalised_forces(
-        bodies_with_rods if rods else bodies, p, v, a, gravity
-    )
-    gain = np.column_stack([angles(Jet(p, unit, np.zeros(3))).first for unit in np.eye(3)])
-    return np.linalg.solve(gain.T, forces)
+    moving = bodies_with_rods if rods else bodies
+    return virtual_power.drive_forces(moving, angles, p, v, a, gravity)
 
 
 @cache

@@ -66,6 +66,21 @@ def direction(angle: Jet) -> Jet:
     return Jet(u, angle.first * t, angle.second * t - angle.first**2 * u)
 
 
+def meeting(w: Jet, c: Jet, side: float) -> Jet:
+    """The unit plane vector u with u . w = c, ahead of w (side 1) or behind it (-1).
+
+    With w = (a, b) and u = (cos t, sin t) that is a cos t + b sin t = c.
+    """
+    square = dot(w, w)
+    across = root(minus(square, scaled(c, c))).map(lambda x: side * x)
+    return over(scaled(c, w) + scaled(across, turned(w)), square)
+
+
+def relative(u: Jet, to: Jet) -> Jet:
+    """The angle from a unit plane vector to another."""
+    return angle_of(stacked(dot(u, to), dot(turned(u), to)))
+
+
 def stacked(*parts: Jet) -> Jet:
     """Several as one, along a new first axis."""
     return Jet(

@@ -243,7 +243,7 @@ def _rotation_vector(pose: Array) -> Array:
     return np.stack([pose[..., 1], pose[..., 2], np.zeros_like(pose[..., 0])], axis=-1)
 
 
-def _rotation(w: Jet) -> Jet:
+def rotation_of(w: Jet) -> Jet:
     """R = I + a W + b W W (Rodrigues)."""
     skew = w.map(_skew)
     squared_angle = bilinear(_dot, w, w).map(lambda x: x[..., None, None])
@@ -270,7 +270,7 @@ def motion(
 ) -> Motion:
     """Jets along pose + rate t + acceleration t^2 / 2; complex-safe."""
     curve = Jet(*(x + 0.0 for x in np.broadcast_arrays(pose, rate, acceleration)))
-    rotation = _rotation(curve.map(_rotation_vector))
+    rotation = rotation_of(curve.map(_rotation_vector))
     arms = rotation.map(lambda x: _arms(x, robot.platform_radius))
     height = curve.map(lambda x: x[..., 0])
     position = Jet(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tests.reference import delta, five_bar, four_bar, jets, slider_crank, stewart, virtual_power
 from tests.reference.mujoco_loops import MujocoLoops
 from tests.reference.newton_euler import Jet
+from tests.reference.parallel import ankle, linear_delta, planar_rrr, rotary_stewart, rrs
 
 Array = NDArray[np.float64]
 
@@ -34,6 +35,17 @@ def crank_state(rng: np.random.Generator) -> tuple[Array, Array, Array]:
         rng.normal(scale=5.0, size=1),
         rng.normal(scale=30.0, size=1),
     )
+
+
+def near(home: list[float], reach: float) -> Callable[[np.random.Generator], tuple[Array, ...]]:
+    """States about a home."""
+    size = len(home)
+
+    def state(rng: np.random.Generator) -> tuple[Array, Array, Array]:
+        at = np.array(home) + rng.uniform(-reach, reach, size=size)
+        return at, rng.normal(scale=5 * reach, size=size), rng.normal(scale=50 * reach, size=size)
+
+    return state
 
 
 def test_four_bar_by_lagrange_and_by_one_generalised_inertia() -> None:
@@ -149,10 +161,15 @@ def test_stewart_by_newton_euler_virtual_power_and_mujoco() -> None:
         (slider_crank.bodies, crank_state),
         (delta.bodies, delta_state),
         (delta.bodies_with_rods, delta_state),
+        (rotary_stewart.bodies, near([0, 0, 0.22, 0, 0, 0], 0.02)),
+        (linear_delta.bodies, near([0, 0, 0.11], 0.04)),
+        (planar_rrr.bodies, near([0, 0, 0], 0.04)),
+        (rrs.bodies, near([0.23, 0, 0], 0.03)),
+        (ankle.bodies, near([0, 0], 0.2)),
     ],
 )
 def test_power_in_is_the_rate_of_energy(
-    bodies: virtual_power.Bodies, state: Callable[..., tuple[Array, Array, Array]]
+    bodies: virtual_power.Bodies, state: Callable[..., tuple[Array, ...]]
 ) -> None:
     """tau . v = dE/dt, by central difference along the curve."""
     rng, h = np.random.default_rng(6), 1e-4

@@ -85,6 +85,25 @@ def generalised_forces(
     return tau
 
 
+def drive_forces(
+    bodies: Bodies,
+    drives: Callable[[Jet], Jet],
+    q: Array,
+    v: Array,
+    a: Array,
+    gravity: Array = EARTH,
+) -> Array:
+    """Those of drives whose positions depend on q, G^-T of the forces in q, G = d(drives)/dq."""
+    forces = generalised_forces(bodies, q, v, a, gravity)
+    return np.linalg.solve(gain(drives, q).T, forces)
+
+
+def gain(drives: Callable[[Jet], Jet], q: Array) -> Array:
+    """G = d(drives)/dq, from unit rates."""
+    still = np.zeros(len(q))
+    return np.column_stack([drives(Jet(q, unit, still)).first for unit in np.eye(len(q))])
+
+
 def energy(bodies: Bodies, q: Array, v: Array, gravity: Array = EARTH) -> float:
     """Kinetic and potential energy."""
     return sum(one.energy(gravity) for one in bodies(Jet(q, v, np.zeros(len(q)))))

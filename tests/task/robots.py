@@ -13,7 +13,8 @@ from rps_pin.task import Task
 
 NAMES = (
     *("ankle", "cassie_leg", "delta", "delta_rods", "differential", "five_bar", "four_bar"),
-    *("minitaur_leg", "rps", "rrs", "slider_crank", "stewart", "sokolov", "micro"),
+    *("linear_delta", "minitaur_leg", "planar_rrr", "rotary_stewart", "rps", "rrs"),
+    *("slider_crank", "stewart", "sokolov", "micro"),
 )
 
 #: Those whose generated code the tests build.

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from rps_pin import RPSRobot
 from rps_pin.task import Task
 from tests.reference import delta, jets, stewart
+from tests.reference.parallel import linear_delta, planar_rrr
 from tests.task.robots import compiled, poses, task
 from tests.worst import worst
 
@@ -91,3 +92,27 @@ def test_the_robot_is_a_task_whose_closed_forms_are_the_generic_numbers() -> Non
         ]
         for found, expected in pairs:
             assert worst(found - expected) < 1e-9 * worst(expected, 1)
+
+
+def test_planar_three_rrr_has_its_six_assembly_modes() -> None:
+    """The roots of a polynomial of degree six; some arms have six real ones, others two."""
+    one = task("planar_rrr")
+    for arms, count in (([-2.18, 2.93, 2.42], 6), ([-2.7, 2.1, -2.7], 6), ([1.7, 1.9, 1.8], 2)):
+        exact = planar_rrr.poses(np.array(arms))
+        found = one.at(one.mechanism.assembly_modes(arms).q)
+        assert len(found) == len(exact) == count
+        apart = np.linalg.norm(found[:, None] - exact, axis=2)
+        assert worst(apart.min(axis=0), apart.min(axis=1)) < 1e-9
+
+
+def test_linear_delta_has_its_two_assembly_modes() -> None:
+    """Those where three spheres meet: of all that a free platform has, two are only moved."""
+    one, carriages = task("linear_delta"), [0.3, 0.32, 0.29]
+    modes = one.mechanism.assembly_modes(carriages).q
+    turned = np.array([one.mechanism.frame_placement(q, "platform")[:3, :3] for q in modes])
+    moved = np.abs(turned - np.eye(3)).max(axis=(1, 2)) < 1e-9
+    found, exact = one.at(modes[moved]), linear_delta.platform_positions(np.array(carriages))
+    assert len(found) == 2
+    apart = np.linalg.norm(found[:, None] - exact, axis=2)
+    assert worst(apart.min(axis=0), apart.min(axis=1)) < 1e-12
+    assert worst(one.to_task(carriages) - exact[np.argmin(exact[:, 2])]) < 1e-12  # from home

@@ -21,6 +21,8 @@ SIZES = {
     "differential": (2, 2, 2),
     "gripper": (12, 6, 3),
     "minitaur_leg": (5, 2, 2),
+    "planar_rrr": (6, 4, 3),
+    "rotary_stewart": (18, 18, 6),
     "rrs": (9, 9, 3),
 }
 """Rows, rank, mobility: two of cassie_leg's motions are the idle spins of its rods."""
@@ -46,7 +48,9 @@ def test_masses_forces_closures_and_accelerations(name: str) -> None:
 
 
 @both_engines
-@pytest.mark.parametrize("name", ["ankle", "differential", "minitaur_leg", "rrs", "cassie_leg"])
+@pytest.mark.parametrize(
+    "name", ["ankle", "differential", "minitaur_leg", "rotary_stewart", "rrs", "cassie_leg"]
+)
 def test_holding_torques(name: str, engine: str) -> None:
     """S' tau + J' lambda = forces at rest, J and forces of MuJoCo: one tau, and exactly."""
     mechanism, rng = loaded(name), np.random.default_rng(3)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel
 from tests.proofs.common import loaded
+from tests.reference import jets
+from tests.reference.parallel import ankle
 from tests.worst import worst
 
 Array = NDArray[np.float64]
@@ -53,13 +55,7 @@ def coordinate(mechanism: ClosedLoopModel, q: Array, name: str) -> float:
 
 def ankle_cranks(pitch: float, roll: float) -> Array:
     """The cranks' angles of a foot's pose: the inverse kinematics of a 2-RSU."""
-    foot = about("y", pitch) @ about("x", roll)
-    angles = []
-    for y, height, length in ((0.035, 0.13, 0.12), (-0.035, 0.21, 0.2)):
-        ball = foot @ [-0.045, y, 0.005]
-        centre, arm = np.array([0.0, y, height]), np.array([-0.04, 0.0, 0.0])
-        angles.append(angle_at_distance(centre, arm, ball, length, 0.0))
-    return np.array(angles)
+    return ankle.drives(jets.constant([pitch, roll])).value
 
 
 def test_ankle_cranks() -> None:

@@ -1,0 +1,1 @@
+"""Parallel robots of urdf/ in closed form: inverse kinematics, bodies, direct kinematics."""

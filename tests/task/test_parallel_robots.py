@@ -1,0 +1,126 @@
+"""Parallel robots of urdf/ against their closed forms: positions, speeds, forces, dynamics.
+
+The closed forms (tests/reference/parallel) know nothing of trees and closures: inverse kinematics
+leg by leg, its derivatives along a curve, and d'Alembert's principle with the bodies' motions.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from rps_pin.codegen.build import tcc
+from tests.proofs import common
+from tests.reference import jets
+from tests.reference.newton_euler import Jet
+from tests.reference.parallel import linear_delta, planar_rrr, rotary_stewart
+from tests.reference.parallel.robots import ROBOTS
+from tests.task.robots import poses, task
+from tests.worst import worst
+
+EACH = pytest.mark.parametrize("name", ROBOTS)
+OF_FRAMES = pytest.mark.parametrize("name", [name for name in ROBOTS if name != "ankle"])
+
+
+@cache
+def quick(name: str):
+    """In generated code; built fast, and not made for speed."""
+    return task(name).compile(compiler="tcc" if tcc.is_here() else "auto")
+
+
+@pytest.mark.parametrize("make", [task, quick], ids=["pinocchio", "generated"])
+@EACH
+def test_positions_and_their_derivatives_are_those_of_the_closed_form(make, name) -> None:
+    one, robot, (x, q) = make(name), ROBOTS[name], poses(name)
+    rng = np.random.default_rng(1)
+    rate = rng.normal(size=x.shape)
+    a = one.to_actuators(x)
+    K, bias = one.jacobian(q), one.bias(q, rate)
+    for k, pose in enumerate(x):
+        closed_form = robot.drives(Jet(pose, rate[k], np.zeros(pose.size)))
+        gain = robot.gain(pose)
+        assert worst(a[k] - closed_form.value) < 1e-12
+        assert worst(K[k] - gain) < 1e-11 * worst(gain)
+        size = worst(closed_form.second, 1.0)
+        assert worst(bias[k] - closed_form.second) < 1e-10 * size
+    assert worst(one.to_task(a) - x) < 1e-12
+
+
+@EACH
+def test_states_and_dynamics_are_those_of_the_bodies_motions(name) -> None:
+    """All joints' motions, and the drives' forces by virtual power, at speed."""
+    one, robot, (x, q) = task(name), ROBOTS[name], poses(name)
+    m, rng = one.mechanism, np.random.default_rng(2)
+    for pose, near in zip(x, q, strict=True):
+        rate, acceleration = rng.normal(size=pose.size), 10 * rng.normal(size=pose.size)
+        rate[~np.array(one.angular)] *= one.characteristic_length
+        curve = Jet(pose, rate, acceleration)
+        found = one.state(pose, rate, acceleration, near=near)
+        free = ("platform_joint", *robot.output(curve)) if robot.free else None
+        wanted = common.state(m, robot.joints(curve), free)
+        for part, expected in zip(found, wanted, strict=True):
+            assert worst(part - expected) < 1e-9 * worst(expected, 1.0)
+        forces = robot.forces(pose, rate, acceleration)
+        tau = m.inverse_dynamics(*found).tau
+        assert worst(tau - forces) < 1e-9 * worst(forces)
+        back = m.forward_dynamics(found.q, found.v, forces)
+        assert worst(back - found.a) < 1e-7 * worst(found.a)
+
+
+@OF_FRAMES
+def test_forces_do_the_work_of_a_wrench_on_the_closed_form_s_motion(name) -> None:
+    one, robot, (x, q) = task(name), ROBOTS[name], poses(name)
+    rng = np.random.default_rng(3)
+    for pose, each in zip(x, q, strict=True):
+        wrench = rng.normal(size=6)
+        tau = one.wrench_to_actuators(each, wrench)
+        work = robot.twists(pose).T @ wrench
+        assert worst(robot.gain(pose).T @ tau - work) < 1e-10 * worst(work)
+
+
+@pytest.mark.parametrize("name", ["rotary_stewart", "linear_delta", "planar_rrr"])
+def test_statics_are_those_of_forces_along_the_rods(name) -> None:
+    """By the balance of the platform alone: no speed appears."""
+    one, (x, q) = task(name), poses(name)
+    statics, kept = {
+        "rotary_stewart": (rotary_stewart.static_torques, [0, 1, 2, 3, 4, 5]),
+        "linear_delta": (linear_delta.static_forces, [0, 1, 2]),
+        "planar_rrr": (planar_rrr.static_torques, [0, 1, 5]),
+    }[name]
+    rng = np.random.default_rng(4)
+    for pose, each in zip(x, q, strict=True):
+        wrench = np.zeros(6)
+        wrench[kept] = rng.normal(size=len(kept))
+        wanted = statics(pose, wrench[kept])
+        assert worst(one.wrench_to_actuators(each, wrench) - wanted) < 1e-10 * worst(wanted)
+
+
+@EACH
+def test_the_last_pose_leads_to_the_next_at_1_khz(name) -> None:
+    """Positions of a fast motion's closed form, followed for a fifth of a second by the drives."""
+    one, robot = quick(name), ROBOTS[name]
+    centre, _ = poses(name)
+    reach = (centre[0] - one.home) / 1.5
+    time = np.arange(200) / 1000
+    swing = np.sin(np.outer(40 * time, np.linspace(0.8, 1.2, one.size)))
+    path = one.home + reach * swing
+    q = one.mechanism.home
+    for x in path:
+        found = one.to_task(robot.drives(jets.constant(x)).value, near=q)
+        assert worst(found - x) < 1e-11
+        q = one.configuration(found, near=q)
+
+
+@EACH
+def test_actuators_have_limits(name) -> None:
+    one = task(name)
+    model, at = one.mechanism.model, one.mechanism.actuated_indices
+    for limit in (model.effortLimit, model.velocityLimit):
+        assert (limit[at] > 0).all()
+        assert (limit[at] < 1e5).all()
+    q = one.mechanism.home
+    for polytope in (one.force_polytope(q), one.speed_polytope(q)):
+        assert polytope.contains(np.zeros(one.size))
+        assert 0 < polytope.ball().radius < 1e4
