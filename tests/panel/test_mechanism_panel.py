@@ -18,7 +18,7 @@ NAMES = ["four_bar", "five_bar", "slider_crank", "delta", "stewart", "rps"]
 def test_joints_go_where_the_sliders_say_and_the_loops_close(name: str) -> None:
     mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
     panel = MechanismPanel(mechanism)
-    rng, (sliders,) = np.random.default_rng(1), panel.groups.values()
+    rng, sliders = np.random.default_rng(1), panel.groups["joints"]
     home = panel.values()
     for _ in range(5):
         wanted = home + rng.uniform(-0.01, 0.01, home.size)
@@ -34,9 +34,9 @@ def test_joints_go_where_the_sliders_say_and_the_loops_close(name: str) -> None:
 
 
 def test_units_are_the_joints() -> None:
-    (sliders,) = MechanismPanel(ClosedLoopModel.load(URDF / "stewart.yaml")).groups.values()
+    sliders = MechanismPanel(ClosedLoopModel.load(URDF / "stewart.yaml")).groups["joints"]
     assert all(slider.name.endswith("(mm)") and slider.scale == 1e3 for slider in sliders)
-    (sliders,) = MechanismPanel(ClosedLoopModel.load(URDF / "four_bar.yaml")).groups.values()
+    sliders = MechanismPanel(ClosedLoopModel.load(URDF / "four_bar.yaml")).groups["joints"]
     assert sliders[0].name == "crank_joint (degrees)"
     assert sliders[0].scale == pytest.approx(180 / np.pi)
 
@@ -80,3 +80,36 @@ def test_an_actuator_that_is_too_weak_to_hold_it_is_said() -> None:
     assert abs(needed) > 1e-3
     (words,) = panel.trouble
     assert words == f"joint 'crank_joint' would need {needed:.6g} N m (-0.001 to 0.001)"
+
+
+@pytest.mark.parametrize("name", ["stewart", "delta", "ankle", "five_bar"])
+def test_the_task_goes_where_its_sliders_say_and_both_groups_follow_each_other(name: str) -> None:
+    mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
+    panel, task, rng = MechanismPanel(mechanism), mechanism.task, np.random.default_rng(2)
+    assert list(panel.groups) == ["task", "joints"]
+    home = panel.values("task")
+    for _ in range(5):
+        wanted = home + rng.uniform(-0.02, 0.02, home.size)
+        assert panel.move("task", wanted), panel.trouble
+        np.testing.assert_array_equal(panel.values("task"), wanted)
+        lengths = task.to_actuators(wanted, panel.configuration)
+        np.testing.assert_allclose(panel.values("joints"), lengths, rtol=0, atol=1e-11)
+        assert mechanism.loop_gap(panel.configuration) < 1e-9
+        assert panel.move("joints", panel.values("joints") + 0.005)
+        np.testing.assert_allclose(panel.values("task"), task.at(panel.configuration), atol=1e-12)
+    rows = dict(panel.readings())
+    for coordinate, turns in zip(task.coordinates, task.angular, strict=True):
+        assert rows[coordinate].endswith("degrees" if turns else "mm")
+    assert float(rows["distance to type II"].split()[0]) > 0
+
+
+def test_a_pose_that_is_not_reached_is_said_and_the_last_stays() -> None:
+    panel = MechanismPanel(ClosedLoopModel.load(URDF / "delta.yaml"))
+    before = panel.configuration.copy()
+    assert not panel.move("task", panel.values("task") + np.array([0.25, 0.0, 0.25]))
+    assert panel.trouble[-1].startswith("not followed: ")
+    np.testing.assert_array_equal(panel.configuration, before)
+
+
+def test_a_mechanism_without_a_task_has_sliders_of_its_joints_alone() -> None:
+    assert list(MechanismPanel(ClosedLoopModel.load(URDF / "gripper.yaml")).groups) == ["joints"]

@@ -4,8 +4,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from rps_pin import ClosedLoopModel
 from rps_pin.errors import InputError
+from rps_pin.trajectories import point_to_point
 from rps_pin.viewer import Motion
+from rps_pin.viewer.displayed_mechanism import displayed, motion_of
+from rps_pin.viewer.layers.trail import _default_frame
 from rps_pin.viewer.scene.keyframes import continuous_quaternions
 from tests.viewer.robots import joint
 
@@ -71,3 +75,20 @@ def test_quaternions_do_not_jump_through_a_whole_turn():
     quaternions = continuous_quaternions(rotations)
     expected = np.stack([np.sin(angles / 2), 0 * angles, 0 * angles, np.cos(angles / 2)], axis=1)
     np.testing.assert_allclose(quaternions, expected, atol=1e-12)
+
+
+def test_a_trajectory_of_a_task_is_followed_from_home() -> None:
+    mechanism = ClosedLoopModel.load("urdf/stewart.yaml")
+    task = mechanism.task
+    end = task.home + np.array([0.02, 0.01, 0.02, 0.1, 0.0, 0.05])
+    path = point_to_point(task.home, end, duration=0.5)
+    subject = displayed(mechanism)
+    motion = motion_of(subject, path)
+    assert np.abs(task.at(motion.configurations[-1]) - end).max() < 1e-12
+    assert motion.times[-1] == path.duration
+
+
+def test_the_trail_is_that_of_the_tasks_frame() -> None:
+    mechanism = ClosedLoopModel.load("urdf/delta.yaml")
+    assert _default_frame(displayed(mechanism)) == "platform"
+    assert _default_frame(displayed(ClosedLoopModel.load("urdf/ankle.yaml"))) == "left_rod_tip"

@@ -545,6 +545,11 @@ class ClosedLoopModel:
                 ) from None
         return self._home.copy()
 
+    @property
+    def has_task(self) -> bool:
+        """Whether its description, or the constructor, says what it is for; see `task`."""
+        return self._task is not None
+
     @cached_property
     def task(self) -> Any:
         """What the mechanism is for, as its description says; see `rps_pin.task.Task`.

@@ -1,4 +1,4 @@
-"""Panel of any mechanism: sliders of its actuated joints."""
+"""Panel of any mechanism: sliders of its actuated joints, and of its task's coordinates."""
 
 from __future__ import annotations
 
@@ -15,14 +15,19 @@ from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.panel.panel import Slider, quantity, slider_values
+from rps_pin.task import Task
 
 _MM, _DEGREE = 1e3, 180.0 / math.pi
+#: Sliders of a task's angles reach so far to both sides, rad; those of lengths reach the
+#: characteristic length.
+_TURN = math.pi / 3
 
 
 class MechanismPanel:
-    """Sliders of a mechanism's actuated joints, in one group, ``"joints"``.
+    """Sliders of a mechanism's actuated joints, ``"joints"``, and of its task, ``"task"``.
 
-    The loops are closed for the joints' coordinates, starting from the last configuration. Joints
+    The second group is there if the mechanism has a task. The loops are closed for the joints' or
+    the task's coordinates, in the assembly mode of the last configuration. Joints
     beyond their limits and actuators that would need more than their effort are listed in
     `trouble`. Where the loops cannot be closed the last configuration stays; `trouble` says why.
 
@@ -65,16 +70,26 @@ class MechanismPanel:
             for joint in self._joints
         ]
         self.groups = {"joints": tuple(map(self._slider, range(len(self._joints))))}
+        self._task: Task | None = mechanism.task if mechanism.has_task else None
+        if self._task is not None:
+            self._x: Array = self._task.at(self._q)
+            sliders = tuple(map(self._task_slider, range(self._task.size)))
+            self.groups = {"task": sliders, **self.groups}
         self._take(self._q)
 
     def values(self, group: str = "joints") -> Array:
-        """Return the actuated joints' coordinates, rad or m."""
+        """Return the coordinates of the actuated joints, or of the task, rad or m."""
+        if group == "task" and self._task is not None:
+            return self._x.copy()
         return np.array([self._q[joint.idx_q] for joint in self._joints])
 
     def move(self, group: str, values: Any) -> bool:
-        """Close the loops for the joints' coordinates; return whether they close."""
+        """Close the loops for the joints' or the task's coordinates; return whether they close."""
         try:
             asked = slider_values(self.groups, group, values)
+            if group == "task" and self._task is not None:
+                self._take(self._task.configuration(asked, self._q, within_limits=False), asked)
+                return True
             wanted = dict(zip(self.mechanism.actuated, asked.tolist(), strict=True))
             closed = self.mechanism.complete(wanted, self._q, within_limits=False)
         except RPSPinError as error:
@@ -84,11 +99,14 @@ class MechanismPanel:
         return True
 
     def readings(self) -> list[tuple[str, str]]:
-        """Return the joints, the forces that hold the weight, the conditioning and the loop gap."""
+        """Return coordinates, the forces that hold the weight, conditioning and the loop gap."""
         names, units = self.mechanism.actuated, self._units
         rows = [
-            (name, quantity(value, scale, unit))
-            for name, value, (scale, unit, _) in zip(names, self.values(), units, strict=True)
+            *self._of_task(),
+            *(
+                (name, quantity(value, scale, unit))
+                for name, value, (scale, unit, _) in zip(names, self.values(), units, strict=True)
+            ),
         ]
         if isinstance(self._held, str):
             rows.append(("holds", self._held))
@@ -112,16 +130,42 @@ class MechanismPanel:
         """Return its visual geometry."""
         return skeleton(self.mechanism) if self._visual is None else self._visual
 
-    def _take(self, q: Array) -> None:
-        """Go to a closed configuration."""
+    def _take(self, q: Array, x: Array | None = None) -> None:
+        """Go to a closed configuration, whose task coordinates may be known."""
         still = np.zeros(self.mechanism.model.nv)
         self._q = q
+        if self._task is not None:
+            self._x = self._task.at(q, near=self._x) if x is None else x.copy()
         self._held: Array | str
         try:
             self._held = self.mechanism.inverse_dynamics(q, still, still).tau
         except RPSPinError as error:
             self._held = str(error)
         self.trouble = self._beyond()
+
+    def _of_task(self) -> list[tuple[str, str]]:
+        """Return the task's coordinates, and how far it is from singularities."""
+        if self._task is None:
+            return []
+        rows = [
+            (name, quantity(value, *((_DEGREE, "degrees") if turns else (_MM, "mm"))))
+            for name, value, turns in zip(
+                self._task.coordinates, self._x, self._task.angular, strict=True
+            )
+        ]
+        found = self._task.singularities(self._q)
+        for kind, distance in (("I", found.type_i), ("II", found.type_ii)):
+            rows.append((f"distance to type {kind}", f"{float(distance):.4f} (0 singular)"))
+        return rows
+
+    def _task_slider(self, number: int) -> Slider:
+        task = self._task
+        assert task is not None
+        name, here, turns = task.coordinates[number], float(self._x[number]), task.angular[number]
+        scale, unit = (_DEGREE, "degrees") if turns else (_MM, "mm")
+        reach = _TURN if turns else task.characteristic_length
+        low, high = here - reach, here + reach
+        return Slider(f"{name} ({unit})", scale * low, scale * high, scale * reach / 500, scale)
 
     def _beyond(self) -> list[str]:
         """Return a sentence for each limit that is broken."""

@@ -100,6 +100,11 @@ class TaskMaps:
         return f"{type(self).__name__}({of}{', '.join(self.coordinates)}; {self.mechanism!r})"
 
     @property
+    def frame(self) -> str | None:
+        """Name of the output frame; None for a task of joints."""
+        return self._x.frame
+
+    @property
     def size(self) -> int:
         """Number of coordinates, m."""
         return len(self.coordinates)

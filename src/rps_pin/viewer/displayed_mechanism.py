@@ -76,8 +76,9 @@ def motion_of(subject: DisplayedMechanism, given: Any = None) -> Motion:
     subject
         The mechanism.
     given
-        A `Motion`, a `Simulation`, a `MotionRun` or a trajectory of a 3-RPS; or one pose (3,) of a
-        3-RPS, or one configuration (nq,). Default: the mechanism's home.
+        A `Motion`, a `Simulation`, a `MotionRun`, or a trajectory of the pose or of the mechanism's
+        task; or one pose (3,) of a 3-RPS, or one configuration (nq,). Default: the mechanism's
+        home.
 
     Raises
     ------
@@ -93,7 +94,7 @@ def motion_of(subject: DisplayedMechanism, given: Any = None) -> Motion:
         states, reactions = (given.q, given.v, given.a), given.constraint_forces
         return Motion(model, given.time, *states, forces=given.tau, constraint_forces=reactions)
     if robot is None:
-        return Motion(model, [0.0], _one(subject.mechanism.home if given is None else given, model))
+        return _of_mechanism(subject.mechanism, given)
     if isinstance(given, MotionRun):
         states = given.configuration, given.generalised_velocity, given.generalised_acceleration
         reactions = given.reaction.reshape(len(given.time), -1)
@@ -104,6 +105,17 @@ def motion_of(subject: DisplayedMechanism, given: Any = None) -> Motion:
     if given is None:
         raise InputError("a 3-RPS is shown at a pose (z, tilt_x, tilt_y), or along a trajectory")
     return Motion(model, [0.0], configuration_of(subject, given)[None])
+
+
+def _of_mechanism(mechanism: ClosedLoopModel, given: Any) -> Motion:
+    """Return the motion of a trajectory of the mechanism's task from its home, or of one pose."""
+    model = mechanism.model
+    if not (hasattr(given, "sample") and hasattr(given, "duration")):
+        return Motion(model, [0.0], _one(mechanism.home if given is None else given, model))
+    times = sample_times(given.duration, _SAMPLE_RATE)
+    x, rate, acceleration = given.sample(times)
+    q = mechanism.task.follow(x)
+    return Motion(model, times, *mechanism.task.motion(q, rate, acceleration))
 
 
 def configuration_of(subject: DisplayedMechanism, given: Any) -> Array:

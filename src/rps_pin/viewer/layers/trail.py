@@ -33,7 +33,7 @@ class Trail(RobotSizedLayer):
     Parameters
     ----------
     frame
-        A frame of the model. Default: a 3-RPS's platform; else frame a of the first closure.
+        A frame of the model. Default: that of the task; else frame a of the first closure.
     factor
         Magnification, at least 1. Default: the largest round number that keeps the trail within
         the robot.
@@ -83,6 +83,9 @@ class Trail(RobotSizedLayer):
 def _default_frame(subject: DisplayedMechanism) -> str:
     if subject.robot is not None:
         return "platform"
+    mechanism = subject.mechanism
+    if mechanism.has_task and mechanism.task.frame is not None:
+        return str(mechanism.task.frame)
     closed = [one for one in subject.mechanism.closures if isinstance(one, LoopClosure)]
     if not closed:
         raise InputError("layer 'trail': give the frame, Trail(frame=...)")
