@@ -14,14 +14,36 @@ from rps_pin.rps.kinematics.tracking import Triple
 Numbers = ArrayLike | None
 
 
+#: What has no order, or is text; and what Python would turn into a number nevertheless.
+_NO_ROWS = (str, bytes, bytearray, set, frozenset, dict)
+_NO_NUMBERS = (
+    str,
+    bytes,
+    bytearray,
+    bool,
+    np.bool_,
+    np.timedelta64,
+    np.ndarray,
+    type(np.ma.masked),
+)
+
+
 def three_floats(values: Numbers) -> Triple | None:
-    """Return three finite floats, or None if the argument is anything else."""
+    """Return three finite floats, or None if the argument is anything else.
+
+    What is a number is decided as in `rps_pin.validation`: text, truth values, times, complex
+    numbers, objects and masked entries are none.
+    """
     try:
-        three: Any = values.tolist() if isinstance(values, np.ndarray) else values
+        three: Any = values
+        if isinstance(values, np.ndarray):
+            three = values.tolist() if values.dtype.kind in "fiu" else None
+        elif isinstance(values, _NO_ROWS):
+            return None
         a, b, c = three
         if not type(a) is type(b) is type(c) is float:
-            a, b, c = float(a), float(b), float(c)
-    except (TypeError, ValueError, OverflowError):
+            a, b, c = _number(a), _number(b), _number(c)
+    except Exception:  # of whatever object
         return None
     return (a, b, c) if math.isfinite(a + b + c) else None
 
@@ -29,6 +51,13 @@ def three_floats(values: Numbers) -> Triple | None:
 def elapsed_time(value: Any) -> float:
     """Return a time as a float, or NaN if the argument is anything else."""
     try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
+        return value if type(value) is float else _number(value)
+    except Exception:  # of whatever object
         return math.nan
+
+
+def _number(value: Any) -> float:
+    """Return a real number as a float; TypeError if it is none."""
+    if isinstance(value, _NO_NUMBERS):
+        raise TypeError
+    return float(value)

@@ -385,7 +385,7 @@ class RealTimeRobot(DeepCopied):
         ):
             try:
                 guard.busy = True
-                number = dynamics.forces(*fast.motion(), acceleration)
+                number = dynamics.forces_at(*fast.motion(), acceleration)
                 if number != NOT_REGULAR:
                     return self._forces_computed(number)
             finally:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy import ndarray
 
 from rps_pin.arrays import Array
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, three_floats
@@ -68,7 +69,8 @@ class _MachineCode(DeepCopied):
         """Take the places of the arrays in memory."""
         self._form = form_of(self._name)
         pointers = [one.ctypes.data for one in self._answers]
-        self._out = (ctypes.c_void_p * len(pointers))(*pointers)
+        self._pointers = (ctypes.c_void_p * len(pointers))(*pointers)
+        self._out = ctypes.c_void_p(ctypes.addressof(self._pointers))  # faster than the array
         self._x = ctypes.c_void_p(self._array.ctypes.data)
         doubles, (n, m, _) = self._array.data, [layout.size for layout in self._form[:3]]
         self._numbers, self._memory = doubles[:n], doubles[n : n + m]
@@ -77,7 +79,7 @@ class _MachineCode(DeepCopied):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the places in memory: a copy has arrays of its own, and the same code."""
-        left_out = ("_form", "_out", "_x", "_numbers", "_memory", "_reading", "_tick")
+        left_out = ("_form", "_pointers", "_out", "_x", "_numbers", "_memory", "_reading", "_tick")
         return {name: value for name, value in self.__dict__.items() if name not in left_out}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -94,28 +96,32 @@ class _MachineCode(DeepCopied):
 
     def _motion_read(self, places: tuple[slice, ...], motion: Any) -> bool:
         """Put pose, rate and acceleration of any type into the reading."""
-        reading = self._reading
         try:
             pose, rate, acceleration = motion
-            reading[places[0]] = pose
-            reading[places[1]] = rate
-            reading[places[2]] = acceleration
-        except (TypeError, ValueError):
+        except Exception:  # of whatever object
+            return False
+        if pose.__class__ is rate.__class__ is acceleration.__class__ is ndarray:
+            reading = self._reading
             try:
-                pose, rate, acceleration = motion
+                reading[places[0]] = pose
+                reading[places[1]] = rate
+                reading[places[2]] = acceleration
             except (TypeError, ValueError):
-                return False
-            values = zip(places, (pose, rate, acceleration), strict=True)
-            return all(self._converted(place, value) for place, value in values)
-        return True
+                pass
+            else:
+                return True
+        values = zip(places, (pose, rate, acceleration), strict=True)
+        return all(self._converted(place, value) for place, value in values)
 
     def _read(self, place: slice, values: Numbers) -> bool:
         """Put three numbers of any type into the reading."""
-        try:
-            self._reading[place] = values
-        except (TypeError, ValueError):
-            return self._converted(place, values)
-        return True
+        if values.__class__ is ndarray:
+            try:
+                self._reading[place] = values
+            except (TypeError, ValueError):
+                return self._converted(place, values)
+            return True
+        return self._converted(place, values)
 
     def _converted(self, place: slice, values: Numbers) -> bool:
         three = three_floats(values)
@@ -191,11 +197,14 @@ class GeneratedTick(_MachineCode):
     def estimate(self, length: Numbers, speed: Numbers, dt: float | None) -> int:
         """Compute a regular tick of `RealTimeRobot`: its `Status`, or `NOT_REGULAR`."""
         reading = self._reading
-        try:
-            reading[_LENGTH] = length
-        except (TypeError, ValueError):
-            if not self._converted(_LENGTH, length):
-                return NOT_REGULAR
+        if length.__class__ is ndarray:  # no subclass: it may have masked entries
+            try:
+                reading[_LENGTH] = length
+            except (TypeError, ValueError):
+                if not self._converted(_LENGTH, length):
+                    return NOT_REGULAR
+        elif not self._converted(_LENGTH, length):
+            return NOT_REGULAR
         if speed is None:
             reading[_MEASURED] = 0.0
         elif self._read(_SPEED, speed):
@@ -230,6 +239,15 @@ class GeneratedDynamics(_MachineCode):
         """Compute forces and reactions of a motion: the `Status`, or `NOT_REGULAR`."""
         if not self._motion_read(_MOTION, (pose, rate, acceleration)):
             return NOT_REGULAR
+        return self._forces()
+
+    def forces_at(self, pose: memoryview, rate: memoryview, acceleration: Numbers) -> int:
+        """Compute the same at the pose and rate that `GeneratedTick.motion` returns."""
+        self._reading[_MOTION[0]] = pose
+        self._reading[_MOTION[1]] = rate
+        return self._forces() if self._read(_MOTION[2], acceleration) else NOT_REGULAR
+
+    def _forces(self) -> int:
         number: int = self._tick(self._x, self._out)
         return number
 

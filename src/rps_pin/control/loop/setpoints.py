@@ -98,7 +98,7 @@ class Setpoints:
         self._refused = None
         try:
             pose, rate, acceleration = target
-        except (TypeError, ValueError):
+        except Exception:  # of whatever object
             return None
         x, dx, ddx = three_floats(pose), three_floats(rate), three_floats(acceleration)
         if x is None or dx is None or ddx is None:
