@@ -40,8 +40,9 @@ def state_at(mechanism: ClosedLoopModel, q: Array, seed: int = 0) -> State:
 def pivots(matrix: Array, order: Array) -> Array:
     """The pivots of an LU elimination whose rows are in a fixed order."""
     left = matrix[order]
-    for k in range(len(left) - 1):
-        left[k + 1 :] -= np.outer(left[k + 1 :, k] / left[k, k], left[k])
+    with np.errstate(divide="ignore", invalid="ignore"):  # one that vanishes exactly
+        for k in range(len(left) - 1):
+            left[k + 1 :] -= np.outer(left[k + 1 :, k] / left[k, k], left[k])
     return np.diag(left)
 
 

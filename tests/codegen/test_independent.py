@@ -40,7 +40,7 @@ def chosen(mechanism: ClosedLoopModel, home: Array | None = None) -> Partition:
     assert partition.rank == partition.dependent.size
     assert partition.redundant_rows == mechanism.constraint_size - partition.rank
     for q, jacobian in zip(*samples, strict=True):
-        assert system.equations.largest_gap(system.equations.gaps(q)) <= closed_gap(system)
+        assert system.equations.largest_gap(system.equations.gaps(q)) <= closed_gap(system, q)
         assert np.array_equal(jacobian, system.scaled(mechanism.jacobian(q)))
         values = np.linalg.svd(jacobian[:, partition.dependent], compute_uv=False)
         condition = values[0] / values[-1] if values.size else 1.0

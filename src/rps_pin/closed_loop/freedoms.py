@@ -189,7 +189,8 @@ def _sorted(system: ConstraintSystem, links: list[_Link], motions: Array) -> Ope
     length = system.equations.length
     if motions.shape[1] > 1:  # those that move points least, their links' sizes considered, first
         rows = [
-            link.points.reshape(-1, link.turn.shape[1]) * max(length / max(link.size, _STANDS), 1.0)
+            link.points.reshape(-1, link.turn.shape[1])
+            * max(length / max(link.size, _STANDS * length), 1.0)
             for link in links
         ]
         motions = motions @ np.linalg.svd(np.concatenate(rows) @ motions)[2].T[:, ::-1]
@@ -213,6 +214,7 @@ def _is_idle(system: ConstraintSystem, links: list[_Link], motion: Array) -> boo
 def _freedom(system: ConstraintSystem, links: list[_Link], motions: Array) -> Freedom:
     """Return a freedom of motions."""
     names, joints = list(system.model.names)[1:], list(system.model.joints)[1:]
+    length = system.equations.length
     turning = [
         name
         for name, joint in zip(names, joints, strict=True)
@@ -221,7 +223,8 @@ def _freedom(system: ConstraintSystem, links: list[_Link], motions: Array) -> Fr
     moving = [
         _name(system.model, index)
         for index, link in enumerate(links, start=1)
-        if max(np.abs(link.turn @ motions).max(), np.abs(link.points @ motions).max()) > _STANDS
+        if max(length * np.abs(link.turn @ motions).max(), np.abs(link.points @ motions).max())
+        > _STANDS
     ]
     return Freedom(motions.shape[1], tuple(turning), tuple(moving))
 

@@ -15,6 +15,9 @@ from rps_pin.closed_loop.freedoms import Rest, in_words, of_actuators, open_moti
 from rps_pin.errors import ClosureError, SingularityError
 from rps_pin.numerics import linear_algebra
 
+#: Speed at which a given velocity opens loops at least, over its own, where it counts as opening.
+_LITTLE = 1e-3
+
 
 def allowed_motions(system: ConstraintSystem, jacobian: Array) -> Array:
     """Return N, shape (nv, m), a basis of the null space of J, orthonormal in one unit."""
@@ -131,19 +134,27 @@ def acceleration(
     jacobian = system.equations.jacobian(q)
     opening = float(np.abs(system.row_scale * (jacobian @ v)).max(initial=0.0))
     speed = float(np.abs(v / system.column_scale).max(initial=0.0))
-    if opening > system.rule.consistent * max(speed, 1.0):
+    if opening > system.rule.consistent * max(speed, system.equations.speed):
         raise ClosureError(
             f"v opens the loops at {opening:.3g} m/s; complete it with velocity() first", opening
         )
-    return _completed(system, q, jacobian, given, accelerations, bias)
+    turning = speed**2 / system.equations.length  # what the terms of J' v are of the size of
+    return _completed(system, q, jacobian, given, accelerations, bias, turning)
 
 
 def _completed(
-    system: ConstraintSystem, q: Array, jacobian: Array, given: Indices, values: Array, bias: Array
+    system: ConstraintSystem,
+    q: Array,
+    jacobian: Array,
+    given: Indices,
+    values: Array,
+    bias: Array,
+    turning: float = 0.0,
 ) -> Array:
     """Return x with x_g given and J x + bias = 0 for the rest: J_r x_r = -J_g x_g - bias.
 
-    Of least norm in one unit where idle freedoms are left open.
+    Of least norm in one unit where idle freedoms are left open. The bias has rounding errors of
+    terms of the size of `turning`.
     """
     full = np.empty(system.model.nv)
     full[given] = values
@@ -158,10 +169,11 @@ def _completed(
     scaled = factors.least_norm(right)
     opening = float(np.abs(system.scaled(jacobian)[:, rest] @ scaled - right).max(initial=0.0))
     size = float(np.abs(right).max(initial=0.0))
-    speed = 0.0  # of a rounded file: nearly redundant rows give little of what is asked for
-    if system.rule.rank is not None:
-        speed = float(np.abs(values / system.column_scale[given]).max(initial=0.0))
-    if opening > system.rule.consistent * max(size, speed, 1e-3):
+    # What is asked for may move the loops little: a part of it counts; or all, in a rounded file,
+    # where nearly redundant rows give little.
+    share = _LITTLE if system.rule.rank is None else 1.0
+    asked = share * float(np.abs(values / system.column_scale[given]).max(initial=0.0))
+    if opening > system.rule.consistent * max(size, asked, _LITTLE * turning):
         raise ClosureError(
             f"no motion of the mechanism has these {given.size} actuated values: "
             f"the loops would open at a rate of {opening:.3g} (asked for: {size:.3g})",

@@ -93,7 +93,8 @@ class ClosedLoopModel:
     characteristic_length
         Length (m) that makes angles and lengths comparable: in condition numbers, and in the norm
         that `close` makes small. Left out, it is the longest lever of a closure, that is, the
-        distance of a closed frame from the joint that carries it (1 m if all are zero).
+        distance of a closed frame from the joint that carries it; if all are zero, the longest of
+        a link, to its centre of mass or a joint that it carries (1 m if these are zero too).
     max_condition
         `SingularityError` is raised where the condition number exceeds this.
     accuracy
@@ -1429,7 +1430,7 @@ class ClosedLoopModel:
 
     def _closed(self, q: Array) -> Array:
         """Return q if it is closed, or else a closed configuration near it."""
-        return q if self.loop_gap(q) <= closed_gap(self.system) else close(self.system, q)
+        return q if self.loop_gap(q) <= closed_gap(self.system, q) else close(self.system, q)
 
     def _rank_rule(self, system: ConstraintSystem, guesses: Sequence[Array]) -> RankRule | None:
         """Return the rule of rank, found near home or else near the guesses."""

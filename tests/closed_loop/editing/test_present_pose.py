@@ -133,7 +133,7 @@ def test_other_closures_and_actuators_keep_all_the_rest() -> None:
 
 def test_the_length_that_compares_angles_follows_new_closures_unless_given() -> None:
     free = FOUR_BAR.mechanism().without_closures([FOUR_BAR.mechanism().closures[0].name])
-    assert free.characteristic_length == 1.0  # no lever
+    assert free.characteristic_length == 0.5  # no lever of a closure: the longest of a link
     levers = free.with_closures(FOUR_BAR.mechanism().closures)
     assert levers.characteristic_length == FOUR_BAR.mechanism().characteristic_length
 

@@ -125,7 +125,7 @@ JUDGING = (
 )
 #: Of numbers that only compare.
 COMPARING = {
-    *(limits.within, forces.is_regular),
+    *(limits.within, limits.length_within, forces.is_regular),
     *(continuation.solve_step, continuation.follow_legs, continuation.newton_and_chord),
     *(continuation.refined, continuation.after_step, continuation.step_end),
     continuation.to_be_trusted,
@@ -251,3 +251,11 @@ def test_limits_are_kept_to_rounding() -> None:
     inside = [False, True, True, True, True, False]
     assert limits.within(values, 0.1, 0.2).tolist() == inside
     assert [limits.within(value, 0.1, 0.2) for value in values.tolist()] == inside
+    for unit in (1.0, 1e-9, 1e9):  # lengths relative to their limits
+        found = limits.length_within(
+            unit * np.array([0.1, 0.1, 0.2, 0.2, 0.2]) * _AROUND, 0.1 * unit, 0.2 * unit
+        )
+        assert found.tolist() == [False, True, True, True, False]
+
+
+_AROUND = np.array([1 - 2e-12, 1 - 5e-13, 1.0, 1 + 5e-13, 1 + 2e-12])

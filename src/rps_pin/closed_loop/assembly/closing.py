@@ -2,11 +2,11 @@
 
 The gaps e(q) are brought to zero by the Levenberg-Marquardt method on the configuration manifold,
 
-    dq = - J' (J J' + mu I)^-1 e,
+    dq = - J' (J J' + mu I)^-1 e,   mu = (c |e| / L)^2,
 
-in coordinates scaled to one unit. mu falls to zero as the loops close: the last steps are Newton's,
-of least norm, and the result is closed to rounding. Joints that a step would drive through a limit
-are held there, and the step is computed again without them.
+in coordinates scaled to one unit, L the characteristic length. mu falls to zero as the loops close:
+the last steps are Newton's, of least norm, and the result is closed to rounding. Joints that a step
+would drive through a limit are held there, and the step is computed again without them.
 
 In a rounded file (see `RankRule`) that is done with U_1' e and U_1' J, and what remains of the
 gaps outside U_1 is accepted up to the file's accuracy.
@@ -24,11 +24,13 @@ from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError
 from rps_pin.numerics.linear_algebra import rank
 
-#: A loop counts as closed below this gap, in characteristic lengths or in m, whichever is more.
+#: A loop counts as closed below this gap, in characteristic lengths, in lengths of the way to it
+#: along the links, or in displacements of slides and free-flyers, whichever is more.
 CLOSED = 1e-12
 
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e8
+#: In characteristic lengths.
 _SMALLEST_STEP = 1e-15
 #: Tolerance of the rank: lower than elsewhere, as mu keeps steps along small values short.
 _ROUNDING = 1e-12
@@ -60,7 +62,7 @@ def close(
         gap = equations.largest_gap(equations.gaps(q))
         if gap < best_gap:
             best, best_gap = q, gap
-        spread = np.pi * (attempt + 1) / max(restarts, 1)
+        spread = np.pi * equations.length * (attempt + 1) / max(restarts, 1)
         away = spread * rng.normal(size=model.nv) * system.column_scale
         start = pin.integrate(model, guess, np.where(held, 0.0, away))
         start = limits.clip(start) if within_limits else start
@@ -74,19 +76,19 @@ def close(
     )
 
 
-def closed_gap(system: ConstraintSystem) -> float:
+def closed_gap(system: ConstraintSystem, q: Array) -> float:
     """Return the gap below which a configuration counts as closed, m."""
-    return CLOSED * max(system.equations.length, 1.0)
+    return CLOSED * max(system.equations.reach, system.displacement(q))
 
 
 def is_closed(system: ConstraintSystem, q: Array) -> bool:
     """Return whether the loops are closed at q, as far as the file's accuracy lets them."""
     equations, rule = system.equations, system.rule
     gaps = equations.gaps(q)
-    largest = equations.largest_gap(gaps)
-    if rule.rank is None or largest <= closed_gap(system):
-        return largest <= closed_gap(system)
-    return largest <= rule.gap and independent_gap(system, q, gaps) <= closed_gap(system)
+    largest, closed = equations.largest_gap(gaps), closed_gap(system, q)
+    if rule.rank is None or largest <= closed:
+        return largest <= closed
+    return largest <= rule.gap and independent_gap(system, q, gaps) <= closed
 
 
 def independent_gap(system: ConstraintSystem, q: Array, gaps: Array) -> float:
@@ -124,7 +126,8 @@ def close_gaps(
         The best configuration met, shape (nq,), whether its loops are closed or not.
     """
     equations, limits, rule = system.equations, system.limits, system.rule
-    tolerance, rows = CLOSED * equations.length, None
+    length, rows = equations.length, None
+    tolerance = CLOSED * length
     q, error, damping = guess, system.row_scale * equations.gaps(guess), _FIRST_DAMPING
     for _ in range(iterations):
         jacobian, still = system.scaled(equations.jacobian(q)), held.copy()
@@ -134,7 +137,7 @@ def close_gaps(
         size = float(np.linalg.norm(error))
         factors = _factors(jacobian, still)
         while True:
-            step = _damped_step(factors, error, damping * size)
+            step = _damped_step(factors, error, damping * size / length)
             step[still] = 0.0
             if within_limits and (blocked := limits.blocked(q, step) & ~still).any():
                 still |= blocked
@@ -147,7 +150,7 @@ def close_gaps(
                 candidate_error = rows @ candidate_error
             if np.linalg.norm(candidate_error) < size:
                 break
-            if size <= tolerance or np.linalg.norm(step) < _SMALLEST_STEP:
+            if size <= tolerance or np.linalg.norm(step) < _SMALLEST_STEP * length:
                 return q
             damping = 10 * max(damping, 1e-6)
             if damping > _LARGEST_DAMPING:

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array, Indices
+from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop.assembly.approach import approached
 from rps_pin.closed_loop.assembly.closing import close, is_closed
 from rps_pin.closed_loop.assembly.continuation import Followed, Path, coordinates_of
@@ -16,9 +16,9 @@ from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError, InputError, SingularityError
 from rps_pin.validation import numbers, real_vector
 
-#: How far outside a limit rounding error may leave a joint, rad or m.
+#: How far outside a limit rounding error may leave a joint, rad or characteristic lengths.
 AT_LIMIT = 1e-9
-#: Values this near to those of the guess are its own, rad or m.
+#: Values this near to those of the guess are its own, rad or characteristic lengths.
 _SAME = 1e-13
 #: The last correction of an overdetermined configuration, characteristic lengths.
 _NEAR = 1e-3
@@ -46,7 +46,8 @@ def complete(
     start = _closed_start(system, guess, within_limits)
     if start is not guess:
         target = with_values(system, start, named)
-    if np.abs(pin.difference(system.model, start, target)).max(initial=0.0) <= _SAME:
+    moved = np.abs(pin.difference(system.model, start, target) / system.column_scale)
+    if moved.max(initial=0.0) <= _SAME * system.equations.length:
         return target
     found = Path(system, given, start, target).follow()
     q = found.q
@@ -83,6 +84,12 @@ def with_values(system: ConstraintSystem, q: Array, values: Mapping[str, ArrayLi
     return system.normalised(changed, "q_guess")
 
 
+def beyond_limits(system: ConstraintSystem, q: Array) -> Bools:
+    """Return which limited coordinates are outside by more than rounding error, shape (n,)."""
+    slack = AT_LIMIT * system.equations.length * system.column_scale[system.limits.v]
+    return system.limits.beyond(q, slack)
+
+
 # The ends of the path -----------------------------------------------------------------------------
 
 
@@ -106,7 +113,7 @@ def _within_limits(system: ConstraintSystem, q: Array, given: Mapping[str, Array
     """Return the configuration within the joint limits: angles may be turned by whole turns."""
     limits = system.limits
     x = q[limits.q]
-    out = limits.beyond(q, AT_LIMIT)
+    out = beyond_limits(system, q)
     out &= np.array([name not in given for name in limits.names], dtype=bool)
     if not out.any():
         return q

@@ -128,7 +128,7 @@ class Path:
         self._rate = pin.difference(system.model, start, target)[given]
         self._scale, self._length = system.column_scale, system.equations.length
         rule = system.rule
-        self._closed_gap = 10 * closed_gap(system) + rule.gap
+        self._closed_gap = 10 * closed_gap(system, start) + rule.gap
         self._no_rank = max(_NO_RANK, rule.tolerance)
         self._inconsistent = max(_INCONSISTENT, rule.consistent)
         self._of_given = coordinates_of(system.model, given)

@@ -36,10 +36,10 @@ class JointLimits:
         clipped[self.q] = np.clip(q[self.q], self.lower, self.upper)
         return clipped
 
-    def beyond(self, q: Array, slack: float = 0.0) -> Bools:
+    def beyond(self, q: Array, slack: float | Array = 0.0) -> Bools:
         """Return which coordinates are outside their limits by more than a slack, shape (..., n).
 
-        Of configurations of shape (..., nq).
+        Of configurations of shape (..., nq); the slack is one number or of shape (n,).
         """
         x = q[..., self.q]
         return np.asarray((x < self.lower - slack) | (x > self.upper + slack))

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop.assembly.closing import close_gaps, is_closed
 from rps_pin.closed_loop.assembly.completion import (
-    AT_LIMIT,
+    beyond_limits,
     by_name,
     refuse_values_outside,
     with_values,
@@ -253,7 +253,7 @@ class _Search:
         if not self._within_limits:
             return False
         within = self._same.within_a_turn(q, self._held)
-        return bool(self._system.limits.beyond(within, AT_LIMIT).any())
+        return bool(beyond_limits(self._system, within).any())
 
     def _known(self, places: Array, near: float) -> int | None:
         """Return which mode found so far is at these places."""

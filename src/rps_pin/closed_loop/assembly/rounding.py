@@ -25,7 +25,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array, Bools
-from rps_pin.closed_loop.assembly.closing import CLOSED, close, close_gaps, is_closed
+from rps_pin.closed_loop.assembly.closing import close, close_gaps, closed_gap, is_closed
 from rps_pin.closed_loop.constraints.rank_rule import EXACT, RankRule, Rounding, largest
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.regular import around, values_at
@@ -113,7 +113,7 @@ def _rule(
 ) -> RankRule | None:
     """Return the rule that follows from closed configurations about q; None if they do not tell."""
     bound = trial.rule.tolerance
-    closed = CLOSED * max(system.equations.length, 1.0)
+    closed = closed_gap(system, q)
     trial.rescale(system.row_scale, system.column_scale)
     _equalise(trial, q)
     if _is_exact(trial, q, closed):
@@ -179,7 +179,8 @@ def _closed(trial: ConstraintSystem, guess: Array) -> Array | None:
         q = close_gaps(trial, start, free, within_limits=False, iterations=60)
         if is_closed(trial, q):
             return q
-        away = (attempt + 1) * rng.normal(size=model.nv) * trial.column_scale
+        spread = (attempt + 1) * trial.equations.length
+        away = spread * rng.normal(size=model.nv) * trial.column_scale
         start = pin.integrate(model, guess, away)
     return None
 
@@ -280,7 +281,7 @@ def _rounding(system: ConstraintSystem, q: Array, spectrum: _Spectrum, gap: floa
     left, _, _ = full_svd(system.scaled(equations.jacobian(q)))
     open_by = np.abs(system.row_scale * equations.gaps(q))
     of_rows = np.linalg.norm(left[:, spectrum.rank :], axis=1)
-    if gap > CLOSED * max(equations.length, 1.0):
+    if gap > closed_gap(system, q):
         of_rows = of_rows * (open_by > _PART * open_by.max()) if not spectrum.dropped else of_rows
     parts = [
         float(np.linalg.norm(of_rows[equations.rows(closure.name)]))
@@ -300,7 +301,7 @@ def _not_parallel(
 ) -> tuple[tuple[str, float], ...]:
     """Return hinges in closures whose axes are nearly, not quite, parallel to most others."""
     model, equations = system.model, system.equations
-    jacobian = equations.jacobian(q)
+    jacobian = system.scaled(equations.jacobian(q))
     rows = [equations.rows(name) for name in names]
     moving = np.zeros(model.nv, dtype=bool)
     for one in rows:

@@ -114,8 +114,9 @@ class Sameness:
             turned = about.copy()
             turned[i] += 2 * np.pi
             change = np.abs(self.places(turned) - places).max(initial=0.0)
-            opened = np.abs(system.equations.gaps(turned) - gaps).max(initial=0.0)
-            turning[k] = change <= _TURNED and opened <= _TURNED
+            opened = np.abs(system.row_scale * (system.equations.gaps(turned) - gaps))
+            closed = opened.max(initial=0.0) <= _TURNED * system.equations.length
+            turning[k] = change <= _TURNED and closed
         return turning
 
 

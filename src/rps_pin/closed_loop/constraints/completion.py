@@ -29,7 +29,7 @@ from scipy.linalg.blas import dgemv, dnrm2, dsyrk
 from scipy.linalg.lapack import dposv
 
 from rps_pin.arrays import Array, Indices
-from rps_pin.closed_loop.constraints.factorisation import HUGE, Factors, PassiveFactorisation
+from rps_pin.closed_loop.constraints.factorisation import Factors, PassiveFactorisation
 from rps_pin.closed_loop.constraints.least_squares import PassiveLeastSquares
 from rps_pin.numerics.linear_algebra import Decomposition, rank, singular_values
 
@@ -169,7 +169,10 @@ class CompletedFactorisation:
         # The passive rows first: they are the residual, the actuated ones tau.
         error = dgemv(-1.0, jacobian.T, multipliers, 1.0, rest).take(self._order)
         tau, residual = error[self._passive_size :], dnrm2(error, self._passive_size)
-        if not (residual < math.inf and dnrm2(multipliers) <= HUGE * dnrm2(force)):
+        if not (
+            residual < math.inf
+            and dnrm2(multipliers) <= self._factorisation.huge_force * dnrm2(force)
+        ):
             return None
         if lacking is not None and not dnrm2(lacking) > self._enough * dnrm2(force):
             counts = self._counts(jacobian, force, tau, lacking)
@@ -188,7 +191,7 @@ class CompletedFactorisation:
         tau = lacking.take(self._actuated)
         lacking[self._actuated] = 0.0
         size, whole = dnrm2(lacking), dnrm2(force)
-        if not (size < math.inf and dnrm2(multipliers) <= HUGE * whole):
+        if not (size < math.inf and dnrm2(multipliers) <= self._factorisation.huge_force * whole):
             return None
         counts = size > self._enough * whole or self._counts(jacobian, force, tau, lacking)
         if counts is None:

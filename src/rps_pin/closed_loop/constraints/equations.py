@@ -102,6 +102,11 @@ class ClosureEquations:
         Number of rows, nc.
     length : float
         The characteristic length, m.
+    reach : float
+        Longest way along the links from the world to a closed frame, joints at zero, and at least
+        the length, m: of its size are the numbers whose rounding errors gaps have.
+    speed : float
+        Characteristic speed, of a fall by half the length, m/s; 0 without gravity.
     row_scale, column_scale : (nc,) and (nv,) arrays
         ``row_scale[:, None] * J * column_scale`` has entries of one unit: angular rows count with
         the length as their lever, angular velocities are those of a point at that lever.
@@ -164,7 +169,11 @@ class ClosureEquations:
         self.plain = 0 < len(of_frames) == len(self.closures)
         self.plain = self.plain and all(frames.in_world for frames in self.closed_frames)
         self.length = self._length(characteristic_length)
+        self.reach = self._reach()
+        self.speed = math.sqrt(float(np.linalg.norm(model.gravity.linear)) * self.length)
         self.angular_velocities = angular = self._is_angular()
+        #: Coordinates that are displacements: of slides, and of free-flyers.
+        self.displacements = self._displacements()
         self.column_scale = np.where(angular, 1 / self.length, 1.0)
         self.angular_rows = np.zeros(self.size, dtype=bool)
         for frames in self.closed_frames:
@@ -442,7 +451,11 @@ class ClosureEquations:
         return (rate @ turn.T).ravel(), (change @ turn.T).ravel()
 
     def _length(self, given: float | None) -> float:
-        """Return the given length, or the longest lever of a closure, or 1 m if there is none."""
+        """Return the given length, or the longest lever of a closure or, without one, of a link.
+
+        A link's levers are the way to its centre of mass, and to the joints that it carries. 1 m
+        if there is none either.
+        """
         if given is not None:
             return positive_number(given, "characteristic_length", "m")
         levers = [
@@ -451,7 +464,23 @@ class ClosureEquations:
             for frame in (frames.a, frames.b)
             if frame.joint != 0  # the world is no lever
         ]
+        if not any(levers):
+            levers = [float(np.linalg.norm(at.translation)) for at in self.model.jointPlacements]
+            levers += [float(np.linalg.norm(inertia.lever)) for inertia in self.model.inertias]
         return max(levers, default=0.0) or 1.0
+
+    def _reach(self) -> float:
+        """Return the longest way from the world to a closed frame, at least the length, m."""
+        model, ways = self.model, [0.0]
+        for index in range(1, model.njoints):
+            step = float(np.linalg.norm(model.jointPlacements[index].translation))
+            ways.append(ways[model.parents[index]] + step)
+        ends = [
+            ways[frame.joint] + float(np.linalg.norm(frame.placement.translation))
+            for frames in self.closed_frames
+            for frame in (frames.a, frames.b)
+        ]
+        return max([self.length, *ends])
 
     def _is_angular(self) -> Bools:
         """Return which velocity components are angular: they move joint frames by turning them."""
@@ -465,6 +494,14 @@ class ClosureEquations:
             subspace = local.reshape(6, self.model.nv)[:, columns]
             angular[columns] = np.abs(subspace[3:]).max(axis=0) > 1e-12
         return angular
+
+    def _displacements(self) -> Indices:
+        found: list[int] = []
+        for joint in list(self.model.joints)[1:]:
+            of_joint = self.angular_velocities[joint.idx_v : joint.idx_v + joint.nv]
+            if joint.nq == joint.nv or not of_joint.all():  # the shifts come first
+                found += (joint.idx_q + np.flatnonzero(~of_joint)).tolist()
+        return np.array(found, dtype=np.intp)
 
 
 def _has_joints(frames: ClosedFrames) -> bool:

@@ -72,6 +72,12 @@ class PassiveFactorisation:
         #: Scaling of J_p to one unit, shapes (nc, 1) and (np,), and tolerance of its rank.
         self.scales = Scales(rows[:, None], columns[passive], rule.tolerance)
         self._rows = rows[:, None]
+        # Largest entries on both sides are those of these scales.
+        self._huge = self.huge_force = HUGE
+        if passive.size and rows.size:
+            self._huge *= float(columns[passive].max() * rows.min())
+            #: `HUGE` of lambda by f, as that of x_p by b.
+            self.huge_force *= float(columns.min() * rows.max())
         # eigenpy takes a vector of one number for a matrix: one row is not counted as square.
         self._rounded = rule.rank is not None
         self._tall = self._rounded or rows.size != passive.size
@@ -156,7 +162,7 @@ class PassiveFactorisation:
         # the solution does.
         well = self._lu.rcond() > self._harmless_rcond and (
             not right.size  # of no columns BLAS has no sum
-            or dasum(solved.ravel("K")) <= HUGE * (1.0 + dasum(right.ravel("K")))
+            or dasum(solved.ravel("K")) <= self._huge * dasum(right.ravel("K"))
         )
         return solved if well else None
 

@@ -55,7 +55,7 @@ class Rounding:
         text = f"closure{'s' if len(self.closures) > 1 else ''} {names} (" + (
             values if self.dropped else f"open by {self.gap:.2g} m"
         )
-        text += f", open by {self.gap:.2g} m)" if self.dropped and self.gap > 1e-12 else ")"
+        text += f", open by {self.gap:.2g} m)" if self.dropped and self.gap else ")"
         if self.axes:
             each = ", ".join(f"{name} by {angle:.2g} rad" for name, angle in self.axes)
             text += f"; not parallel to the other axes: {each}"

@@ -106,6 +106,9 @@ class ConstraintSystem:
         self.identity = np.eye(self.actuated.size)
         self.row_scale, self.column_scale = equations.row_scale, equations.column_scale
         self._scale = self.row_scale[:, None] * self.column_scale
+        scale = self.column_scale[self.actuated]
+        #: Scaling of the actuated velocities to one unit, (na,); None where they have one.
+        self.actuated_scale: Array | None = scale if scale.size and np.ptp(scale) else None
         self.max_condition = max_condition
         self._rule, self._attempts = rule, 0
         #: Finds out the rule, from a system and configurations to start from; None if it cannot.
@@ -192,6 +195,10 @@ class ConstraintSystem:
         """Return q, v and a as finite arrays of the right shapes."""
         nv = self.model.nv
         return real_vector(q, self.model.nq, "q"), real_vector(v, nv, "v"), real_vector(a, nv, "a")
+
+    def displacement(self, q: Array) -> float:
+        """Return the largest displacement of a slide or free-flyer along an axis, m."""
+        return max(map(abs, q.take(self.equations.displacements).tolist()), default=0.0)
 
     def normalised(self, q: ArrayLike, name: str) -> Array:
         """Return a checked configuration with quaternions of unit length."""

@@ -62,6 +62,8 @@ def forward_dynamics(
         a_0 = np.zeros(system.model.nv)
         a_0[system.passive] = -solved[:, -1]
         basis = actuated_basis(system, solved[:, :-1])
+        if system.actuated_scale is not None:  # the pivots of the mass matrix are compared
+            basis *= system.actuated_scale
     return reduced_acceleration(system, (q, v), tau, wrenches, basis, a_0)[0]
 
 
@@ -86,7 +88,7 @@ def reduced_acceleration(
     tau, wrenches
         Actuator forces (na,), and external wrenches.
     basis, a_0
-        T (nv, m) and a_0 (nv,).
+        T (nv, m), its columns of one unit, and a_0 (nv,).
     """
     q, v = state
     force, resisting = -pin.rnea(system.model, system.data, q, v, a_0), None
@@ -131,7 +133,7 @@ def _refuse_massless(system: ConstraintSystem, basis: Array, mass: Array) -> NoR
     """Raise `SingularityError` with the joints of the motions T w that have no inertia."""
     inertias, motions = np.linalg.eigh(mass)
     count = max(1, int((inertias <= _MASSLESS * inertias[-1]).sum()))
-    moved = np.abs(basis @ motions[:, :count]).max(axis=1)
+    moved = np.abs(basis @ motions[:, :count]).max(axis=1) / system.column_scale
     model = system.model
     names = [
         model.names[index]

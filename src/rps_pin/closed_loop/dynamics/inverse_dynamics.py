@@ -25,7 +25,7 @@ from scipy.linalg.blas import dgemv, dnrm2
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.constraints.completion import PassiveVelocities
-from rps_pin.closed_loop.constraints.factorisation import HUGE, Scales
+from rps_pin.closed_loop.constraints.factorisation import Scales
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.dynamics.generalised_forces import required_force, resisting_force
@@ -184,7 +184,10 @@ def inverse_dynamics(
     residual = dnrm2(rest, size)
     # The estimate of the condition does not see a pivot that is exactly zero, nor a matrix of
     # rounding errors.
-    if not (residual < _INFINITY and dnrm2(multipliers) <= HUGE * dnrm2(force)):
+    if not (
+        residual < _INFINITY
+        and dnrm2(multipliers) <= system.factorisation.huge_force * dnrm2(force)
+    ):
         system.state(q, v, a)
         return _of_any_actuators(system, q, jacobian, force)
     scales = system.factorisation.scales

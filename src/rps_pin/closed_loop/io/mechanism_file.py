@@ -379,7 +379,7 @@ def _standing(
         return fixed, home
     system = ConstraintSystem(model, [*own, *fixed], ())
     q = system.normalised(pin.neutral(model) if home is None else home, "home")
-    if system.equations.largest_gap(system.equations.gaps(q)) > closed_gap(system):
+    if system.equations.largest_gap(system.equations.gaps(q)) > closed_gap(system, q):
         q = close(system, q)
     closures: list[Closure] = []
     for one in given:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -25,7 +26,7 @@ Acceleration = Callable[[float, Array, Array], Array]
 RK4_WEIGHTS = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 #: Of the work among the entries of an adaptive step.
 _SCALE = 1e-100
-#: Motions and speeds of an adaptive step that are none: it is too long.
+#: Motions and speeds of an adaptive step, in their sizes, that are none: it is too long.
 _FAR = 1e12
 
 
@@ -88,13 +89,22 @@ class AdaptiveStepper:
     model
         Its configuration manifold.
     tolerance
-        Relative and absolute error of a step, in u and v.
+        Relative error of a step, and absolute error in units of `sizes`.
     first_step
         Length of the first step that is tried, s.
+    sizes
+        Of the entries of u and of v, (2 nv,): m or rad, and per s. One if left out.
     """
 
-    def __init__(self, model: pin.Model, tolerance: float, first_step: float) -> None:
+    def __init__(
+        self,
+        model: pin.Model,
+        tolerance: float,
+        first_step: float,
+        sizes: Array | None = None,
+    ) -> None:
         self._model, self._tolerance, self._next = model, tolerance, first_step
+        self._sizes = np.ones(2 * model.nv) if sizes is None else sizes
         joints = list(model.joints)[1:]
         self._flat = all(joint.nv in (joint.nq, 1) for joint in joints)
         self.work: Callable[[float], float] = lambda time: 0.0
@@ -119,12 +129,13 @@ class AdaptiveStepper:
         """
         model, nv = self._model, self._model.nv
         start, v_start = state
+        far = _FAR * self._sizes
         met: list[SingularityError] = []
 
         def slope(time: float, y: Array) -> Array:
             u, v = y[:nv], y[nv:-1]
             rate = np.full(y.size, np.nan)
-            if not np.abs(y).max() < _FAR:
+            if not (np.abs(y[:-1]) < far).all():
                 return rate
             rate[:nv], rate[nv:-1] = v, acceleration(time, pin.integrate(model, start, u), v)
             rate[-1] = _SCALE * power()
@@ -148,13 +159,14 @@ class AdaptiveStepper:
         # The work is scaled so that its error counts for nothing; DOP853 takes the root mean square
         # of all errors, which one more entry does not change then.
         tolerance = self._tolerance * math.sqrt(2 * nv / (2 * nv + 1))
+        absolute: Any = tolerance * np.append(self._sizes, 1.0)
         solver = DOP853(
             tried,
             t,
             np.concatenate([np.zeros(nv), v_start, [0.0]]),
             until,
             rtol=tolerance,
-            atol=tolerance,
+            atol=absolute,
             first_step=min(self._next, until - t),
         )
         message = solver.step()

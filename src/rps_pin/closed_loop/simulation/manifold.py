@@ -216,7 +216,7 @@ class ClosedManifold:
         """
         if self._rank == 0:
             return q, v, self.gap(q)
-        size = closed_gap(self._system)
+        size = closed_gap(self._system, q)
         before = np.inf
         for _ in range(_NEWTON_STEPS):
             jacobian, gaps = self._evaluate(q)

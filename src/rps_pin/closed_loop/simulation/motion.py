@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.assembly.closing import independent_gap
+from rps_pin.closed_loop.assembly.closing import CLOSED, closed_gap, independent_gap
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.damped import Damping, stiff_damping
@@ -24,7 +24,8 @@ State = tuple[Array, Array]
 Controller = Callable[[float, Array, Array], ArrayLike]
 WrenchesInTime = Callable[[float, Array, Array], Wrenches]
 
-#: Gap of an initial configuration, m, and opening rate per speed, above which it is refused.
+#: Gap of an initial configuration, relative to what its rounding error is relative to, and opening
+#: rate per speed, above which it is refused.
 OPEN = 1e-9
 _OPENING = 1e-8
 
@@ -123,16 +124,17 @@ def closed_start(system: ConstraintSystem, q: ArrayLike, v: ArrayLike | None) ->
     gap = equations.largest_gap(gaps)
     if gap <= system.settle_rule(q_).gap:
         gap = independent_gap(system, q_, gaps)
-    if not gap <= OPEN * max(1.0, equations.length):
+    if not gap <= OPEN / CLOSED * closed_gap(system, q_):
         raise ClosureError(
             f"the loops are open by {gap:.3g} m at the start; close them with close() first", gap
         )
-    opening = float(np.abs(equations.jacobian(q_) @ v_).max(initial=0.0))
+    rates = system.row_scale * (equations.jacobian(q_) @ v_)
+    opening = float(np.abs(rates).max(initial=0.0))
     accepted = max(_OPENING, system.rule.consistent)
-    if opening > accepted * max(1.0, float(np.abs(v_).max(initial=0.0))):
+    speed = float(np.abs(v_ / system.column_scale).max(initial=0.0))
+    if opening > accepted * max(speed, equations.speed):
         raise ClosureError(
-            f"v opens the loops at {opening:.3g} m/s (or rad/s) at the start; make it with "
-            "velocity() first",
+            f"v opens the loops at {opening:.3g} m/s at the start; make it with velocity() first",
             opening,
         )
     q_, v_, _ = ClosedManifold(system, q_).project(q_, v_)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.constraints.system import Mechanism
+from rps_pin.closed_loop.constraints.system import ConstraintSystem, Mechanism
 from rps_pin.closed_loop.dynamics.generalised_forces import energy
 from rps_pin.closed_loop.dynamics.inverse_dynamics import constraint_forces
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
@@ -92,7 +92,9 @@ def simulate(
     closing
         ``"projection"`` keeps the loops closed to 1e-12 m; ``"baumgarte"`` stabilises them.
     tolerance
-        Relative and absolute error per step of ``"adaptive"``.
+        Relative and absolute error per step of ``"adaptive"``; the absolute one in rad and
+        characteristic lengths L, and in these by the time of a fall by L / 2 (the duration, where
+        gravity is zero).
     baumgarte_gain
         alpha, 1/s; positive. More is not better: the correction of the gaps within a step grows
         with alpha^2, and fixed steps are unstable for alpha * step above about 2.
@@ -131,7 +133,8 @@ def simulate(
     motion = Motion(system, start, drive, baumgarte_gain if closing == "baumgarte" else 0.0)
     advance = fixed_steps(motion)
     if method == "adaptive":
-        stepper = integrators.AdaptiveStepper(system.model, tolerance, min(step, duration))
+        sizes = state_sizes(system, duration)
+        stepper = integrators.AdaptiveStepper(system.model, tolerance, min(step, duration), sizes)
         advance = _Adaptive(motion, stepper, start, None if controller else duration)
     recorder = Recorder(system.model, system.actuated)
     time, shown, work = 0.0, 0.0, 0.0
@@ -169,6 +172,14 @@ def simulate(
     if progress and shown < 1:
         progress(1.0)
     return recorder.simulation()
+
+
+def state_sizes(system: ConstraintSystem, duration: float) -> Array:
+    """Return what errors of q and v are absolute by, (2 nv,): m or rad, and per s."""
+    equations = system.equations
+    rate = equations.speed / equations.length or 1 / duration
+    sizes = equations.length * system.column_scale
+    return np.concatenate([sizes, rate * sizes])
 
 
 # From one time to the next ------------------------------------------------------------------------

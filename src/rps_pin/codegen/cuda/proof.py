@@ -9,7 +9,7 @@ import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.codegen.cuda.device import DeviceFunction
-from rps_pin.codegen.engine.proof import ACCEPTED, STEP, Proof, Sample
+from rps_pin.codegen.engine.proof import ACCEPTED, Proof, Sample
 from rps_pin.codegen.expressions.routines import BLOCK
 from rps_pin.errors import CompileError
 
@@ -20,7 +20,7 @@ _UNITS = 450.0
 _MAY_FLAG = {"float64": 1e3, "float32": 1e2}
 #: Results smaller than this much of a function's largest number are left of sums that cancel.
 _CANCELLED = {"float64": 1e-3, "float32": 1e-1}
-#: Numbers below this count as rounding errors of zero, in SI units.
+#: Numbers below this count as rounding errors of zero, in units of the mechanism (`Proof.unit`).
 _ZERO = 1e-6
 
 
@@ -40,7 +40,7 @@ def differences(proof: Proof, function: DeviceFunction, to_host: Callable[[Any],
         If it is above what is `accepted`, or the function flags a state that is regular.
     """
     name, dtype = function.name, str(function.dtype)
-    given = [_arguments(function, sample) for sample in proof.samples]
+    given = [_arguments(function, sample, proof.step) for sample in proof.samples]
     outputs, flags = function([np.array(one) for one in zip(*given, strict=True)])
     results, status = [to_host(one) for one in outputs], to_host(flags)
     worst, compared = 0.0, 0
@@ -73,7 +73,8 @@ def _least(
 ) -> float:
     """Return the size below which a result is rounding errors of larger numbers that cancel."""
     sizes = [np.abs(one).max(initial=0.0) for one in expected if one is not None]
-    least = max(_ZERO, _CANCELLED[str(function.dtype)] * float(np.max(sizes, initial=0.0)))
+    unit = _ZERO * proof.unit(function.name, sample)
+    least = max(unit, _CANCELLED[str(function.dtype)] * float(np.max(sizes, initial=0.0)))
     if function.dtype == np.float32 and function.name == "forward_dynamics":
         # Actuator forces may hold the weight: then a is what is left of two large accelerations.
         falling = sample._replace(tau=np.zeros_like(sample.tau))
@@ -97,10 +98,10 @@ def _difference(what: str, found: Array, wanted: Any, least: float, most: float)
     return relative
 
 
-def _arguments(function: DeviceFunction, sample: Sample) -> list[Any]:
+def _arguments(function: DeviceFunction, sample: Sample, step: float) -> list[Any]:
     values: dict[str, Any] = sample._asdict()
     many = function.name == "motion"
-    values |= {"h": STEP / BLOCK if many else STEP, "count": BLOCK}
+    values |= {"h": step / BLOCK if many else step, "count": BLOCK}
     return [values[name] for name, _ in function.inputs]
 
 

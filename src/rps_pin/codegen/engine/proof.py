@@ -39,10 +39,10 @@ _BY_INERTIA = frozenset(("forward_dynamics", "forward_dynamics_derivatives", "st
 _ACCEPTED_AT_MOST = 1e-7
 #: And of derivatives: so many times the rounding unit times the square of the condition of J_d.
 _OF_SLOPES = 10.0
-#: A weight below this is no measure of wrenches, N.
+#: A weight below this is no measure of wrenches, in forces of the motion.
 _WEIGHTLESS = 1e-6
-#: Results that are all below this may be zero: differences are relative to this then. SI units, of
-#: forces and inertias for a mechanism whose mass matrix has entries up to 1.
+#: Results that are all below this may be zero: differences are relative to this then. In units of
+#: the mechanism; see `Proof`.
 _ZERO = 1e-3
 #: Functions whose results are proportional to the masses.
 _OF_MASS = frozenset(
@@ -62,9 +62,9 @@ _CANCELLED = 1e-3
 #: Derivatives by parameters are compared with differences of order 4 instead.
 _OF_DIFFERENCES, _DIFFERENCE = 1e-7, 1e-4
 _STENCIL = ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12))
-#: Of a proof's steps in time, those of a call together, s, and of Newton's guesses, rad or
-#: characteristic lengths.
-STEP, _AWAY = 1e-5, 1e-3
+#: Speeds of a proof's states, over that of a fall; its steps in time, those of a call together, in
+#: the time in which these speeds pass one rad; and Newton's guesses, rad or characteristic lengths.
+_SPEED, _STEP, _AWAY = 0.3, 1e-5, 1e-3
 #: Condition number of J_d up to which Newton's method contracts from such guesses; beside a
 #: singularity it does from proportionally nearer ones.
 _CONTRACTS = 100.0
@@ -105,6 +105,10 @@ class Sample(NamedTuple):
 class Proof:
     """States of a mechanism, and what the Pinocchio engine answers there.
 
+    Speeds, steps in time and what counts as zero are in units of the mechanism: its characteristic
+    length, the largest entry of its mass matrix, and the time in which it falls (1 s without
+    gravity), so that a proof does not depend on the mechanism's size.
+
     Parameters
     ----------
     mechanism
@@ -128,7 +132,8 @@ class Proof:
         self._rng = np.random.default_rng(0)
         nominal = [_nominal(mechanism, group) for group in parameters]
         moved = [
-            _range(group, one, redundant) for group, one in zip(parameters, nominal, strict=True)
+            _range(mechanism, group, one, redundant)
+            for group, one in zip(parameters, nominal, strict=True)
         ]
         #: How far parameters are moved for derivatives.
         self._direction = np.concatenate([np.zeros(0), *moved])
@@ -137,6 +142,12 @@ class Proof:
         self._nominal, self._groups = mechanism, tuple(parameters)
         self._m = with_parameters(mechanism, parameters, self._parameters)
         self._left_out = _left_out(self._m)
+        equations = self._m.system.equations
+        #: Rate of a proof's motions, 1/s.
+        self._rate = _SPEED * equations.speed / equations.length or 1.0
+        #: Its step in time, s.
+        self.step: float = _STEP / self._rate
+        self._length: float = equations.length
         self._frames, self._independent = tuple(wrench_frames), independent
         nv = mechanism.model.nv
         self._dependent = np.setdiff1d(np.arange(nv), independent)
@@ -164,25 +175,29 @@ class Proof:
         q = self._closed(self._closed(q))
         basis = self._basis(q)
         # Near a singularity dependent velocities are many times larger than independent ones.
-        fastest = float(np.abs(basis / m.velocity_scale[:, None]).max(initial=0.0))
-        slow = 1 / max(fastest * m.velocity_scale[self._independent].max(initial=1.0), 1.0)
+        own = m.velocity_scale[self._independent]
+        fastest = float(np.abs(basis * own / m.velocity_scale[:, None]).max(initial=1.0))
+        slow = self._rate / fastest * self._length * own
         u, w = slow * rng.normal(size=(2, self._independent.size))
+        w *= self._rate
         v = basis @ u
         move = np.zeros(model.nv)
         move[self._dependent] = rng.normal(size=self._dependent.size)
-        away = _AWAY * min(1.0, _CONTRACTS / self._condition(q))
+        away = _AWAY * self._length * min(1.0, _CONTRACTS / self._condition(q))
         near = pin.integrate(model, q, away * move * m.system.column_scale)
         a = self._acceleration(q, v, w)
         weight = float(
             np.abs(pin.computeGeneralizedGravity(model, m.system.data, q)).max(initial=0)
         )
-        wrenches = max(weight, _WEIGHTLESS) * rng.normal(size=6 * len(self._frames))
+        mass, condition = tree_mass(m.system, q), self._condition(q)
+        largest, accepted = float(np.abs(mass).max()) or 1.0, self._accepted(q, mass, condition)
+        wrenches = max(weight, _WEIGHTLESS * largest * self._rate**2) * rng.normal(
+            size=6 * len(self._frames)
+        )
         try:
             tau = m.inverse_dynamics(q, v, a, wrenches=self._acting(wrenches)).tau
         except SingularityError:  # actuators that hardly move one of the motions
             tau = 0.1 * weight * rng.normal(size=m.system.actuated.size)
-        mass, condition = tree_mass(m.system, q), self._condition(q)
-        largest, accepted = float(np.abs(mass).max()) or 1.0, self._accepted(q, mass, condition)
         rounding = self._left_out and self._left_out * max(condition, self._of_actuators(q))
         accepted = max(accepted, _OF_ROUNDING * rounding**2)
         return Sample(
@@ -238,6 +253,7 @@ class Proof:
         if not self._independent.size:
             return q
         direction = self._rng.normal(size=self._independent.size)
+        direction *= m.velocity_scale[self._independent]
         for _ in range(30):
             try:
                 step = self._basis(q) @ direction
@@ -285,7 +301,7 @@ class Proof:
             if name == "forward_dynamics":  # those of the actuators and of the weight cancel
                 unforced = self._m.forward_dynamics(sample.q, sample.v, 0.0 * sample.tau)
                 sizes.append(np.abs(unforced).max(initial=0.0))
-            zero = _ZERO * (sample.mass if name in _OF_MASS else 1.0)
+            zero = _ZERO * self.unit(name, sample)
             known = 1.0 if sample.rounding else _CANCELLED  # what cancels is not known better
             least = max(zero, known * float(np.max(sizes, initial=0.0)))
             for k, (one, of_batch, wanted) in enumerate(zip(found, batch, expected, strict=False)):
@@ -298,6 +314,17 @@ class Proof:
         if not compared:
             raise CompileError(f"generated code of {name} flags all {len(given)} states", "")
         return worst
+
+    def unit(self, name: str, sample: Sample) -> float:
+        """Return the size of a function's results where they are not zero, at least."""
+        rate, length = self._rate, max(self._length, 1.0)
+        if name in _OF_MASS:
+            return sample.mass * (1.0 if name == "mass_matrix" else rate**2)
+        if name == "velocity":
+            return rate * length
+        if name in ("acceleration", "forward_dynamics", "forward_dynamics_derivatives"):
+            return rate**2 * length
+        return length
 
     def limit(self, name: str, sample: Sample, result: str = "") -> float:
         """Return the largest relative difference of a function's result that is accepted."""
@@ -351,7 +378,7 @@ class Proof:
             values["q"] = sample.near
         sizes = {one.name: one.shape[0] for one in function.inputs}
         count = sizes.get("h", 0)
-        values["h"] = np.full(count, STEP / max(count, 1))
+        values["h"] = np.full(count, self.step / max(count, 1))
         return [values[one.name] for one in function.inputs]
 
     # What the Pinocchio engine answers ------------------------------------------------------------
@@ -514,7 +541,7 @@ class Proof:
         stepper = Stepper(self._m, s.q, s.v, wrenches=self._acting(s.wrenches))
         states = []
         for _ in range(count):
-            stepper.advance(s.tau, STEP / count)
+            stepper.advance(s.tau, self.step / count)
             states.append((stepper.q, stepper.v))
         qs, vs = zip(*states, strict=True)
         return np.concatenate(qs), np.concatenate(vs)
@@ -532,7 +559,7 @@ def _nominal(mechanism: ClosedLoopModel, group: str) -> Array:
     return Parameters(mechanism.system, [group]).nominal
 
 
-def _range(group: str, nominal: Array, redundant: bool) -> Array:
+def _range(mechanism: ClosedLoopModel, group: str, nominal: Array, redundant: bool) -> Array:
     """Return how far the parameters of a group may be moved, so that inertias stay such.
 
     Where rows are redundant, lengths and directions are not moved: that could lock the mechanism.
@@ -541,7 +568,11 @@ def _range(group: str, nominal: Array, redundant: bool) -> Array:
     if kind in ("placement", "closure"):
         return np.full(nominal.size, 0.0 if redundant else 0.05)
     if kind == "payload":
-        return np.array([1.0, *[1e-3] * 3, 1e-2, 0.0, 1e-2, 0.0, 0.0, 1e-2])
+        mass = sum(inertia.mass for inertia in mechanism.model.inertias) or 1.0
+        length = mechanism.characteristic_length
+        inertia = 1e-2 * length**2
+        of_mass = [1.0, *[1e-3 * length] * 3, inertia, 0.0, inertia, 0.0, 0.0, inertia]
+        return mass * np.array(of_mass)
     if kind == "gravity":
-        return np.ones(3)
+        return np.full(3, np.linalg.norm(nominal) or 1.0)
     return np.where(nominal, np.abs(nominal), 1e-3 * np.abs(nominal).max())

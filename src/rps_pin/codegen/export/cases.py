@@ -8,7 +8,7 @@ import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.model import ClosedLoopModel
-from rps_pin.codegen.engine.proof import STEP, Proof, Sample
+from rps_pin.codegen.engine.proof import Proof, Sample
 from rps_pin.codegen.export.evaluation import Evaluation
 from rps_pin.codegen.export.package import Case, conditions
 from rps_pin.codegen.export.vectors import vectors
@@ -83,7 +83,7 @@ class Cases:
         return float(growth) if opening <= 1.0 else np.inf
 
     def _given(self, name: str, inputs: Sequence[str], sample: Sample) -> list[Array]:
-        values = {**sample._asdict(), "h": np.array([STEP])}
+        values = {**sample._asdict(), "h": np.array([self._proof.step])}
         if name in ("closed", "gaps"):
             values["q"] = sample.near
         return [np.asarray(values[key], dtype=np.float64) for key in inputs]

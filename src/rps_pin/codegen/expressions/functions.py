@@ -183,8 +183,9 @@ def _velocity(x: MechanismExpressions) -> Made:
 @_function()
 def _acceleration(x: MechanismExpressions) -> Made:
     w = ca.SX.sym("w", x.independent.size)
-    opening = x.jacobian @ x.v
-    speed = 1 + ca.sumsqr(x.v / x.system.column_scale)
+    opening = ca.DM(x.system.row_scale) * (x.jacobian @ x.v)
+    least = x.system.equations.speed**2 + x.nothing
+    speed = least + ca.sumsqr(x.v / x.system.column_scale)
     consistent = ca.sumsqr(opening) / speed / x.consistent**2
     check = ca.vertcat(x.opening + consistent, x.growth)
     given = {"q": x.q, "v": x.v, "w": w}

@@ -167,7 +167,7 @@ def _closed(system: ConstraintSystem, q: Array) -> Array | None:
 
 def _newton(system: ConstraintSystem, q: Array) -> Array | None:
     """Return what Newton's steps of least norm lead to, if they close the loops."""
-    equations, tolerance, first = system.equations, closed_gap(system), np.inf
+    equations, tolerance, first = system.equations, closed_gap(system, q), np.inf
     for _ in range(10):
         gaps = equations.gaps(q)
         largest = equations.largest_gap(gaps)

@@ -45,7 +45,7 @@ SPREAD = 1e12
 #: Condition of J_d at samples up to which other independent velocities are as good.
 _WELL_CONDITIONED = 1e3
 #: Keeps a quotient of two numbers that vanish at zero; not zero in single precision either.
-_NOTHING = 1e-30
+_NOTHING = {"double": 1e-300, "float": 1e-30}
 #: Largest check in double and single precision, squared and over that of `GROWTH`: what rounding
 #: errors may grow to, relative, is about 1e-11 and 1e-4 then.
 LIMITS: Mapping[str, float] = {"double": 1.0, "float": 1e-4}
@@ -109,6 +109,7 @@ class MechanismExpressions:
         #: Opening rate that `acceleration` accepts, relative to the speed; in double precision as
         #: `kinematics` does.
         self.consistent = max(1e-4, system.rule.consistent) if single else system.rule.consistent
+        self.nothing = _NOTHING["float" if single else "double"]
         self.parameters = Parameters(system, parameters)
         self.tree = tree = Tree(self.parameters.model, self.parameters)
         self.rows: ClosureRows = closure_rows(tree, system.equations)
@@ -304,7 +305,7 @@ class MechanismExpressions:
             factors = Householder(ca.solve(lower, ca.densify(of_actuators.T)))
             tau, growth = factors.solve(whitened), _growth(factors, scale)
             missing = ca.solve(lower, reduced - of_actuators.T @ tau)
-            share = ca.sumsqr(missing) / (ca.sumsqr(whitened) + _NOTHING)
+            share = ca.sumsqr(missing) / (ca.sumsqr(whitened) + self.nothing)
             unproduced = self.least_force(reduced - of_actuators.T @ tau)
         rest = force - unproduced
         rest[actuated, 0] -= tau
@@ -332,7 +333,7 @@ class MechanismExpressions:
         along = LDL(ca.sparsify((metric.T @ metric)[rest, rest])).solve(ca.sparsify(reduced[rest]))
         unproduced = _rows_times(1 / scale, metric[:, rest] @ along)
         size = reduced.T @ LDL(ca.sparsify(metric.T @ metric)).solve(ca.sparsify(reduced))
-        share = (reduced[rest].T @ along) / (size + _NOTHING)
+        share = (reduced[rest].T @ along) / (size + self.nothing)
         driven = self.reduced(force - unproduced)[0][at]
         weights = 1 / scale[self.system.actuated]
         factors = Householder(_rows_times(weights, self.basis[actuated, at]))
@@ -409,7 +410,12 @@ class MechanismExpressions:
     @cached_property
     def inertia_check(self) -> Expression:
         """Spread of the pivots of T' M T over `SPREAD`: at most 1 where every motion moves mass."""
-        inverse = self.inertia.inverse_diagonal.elements()
+        scale = self.system.column_scale[self.independent]
+        units = (scale / scale.max(initial=0.0)) ** 2  # of the pivots
+        inverse = [
+            d / float(unit)
+            for d, unit in zip(self.inertia.inverse_diagonal.elements(), units, strict=True)
+        ]
         largest = sum((ca.fabs(1 / d) for d in inverse), ca.SX(0))
         return largest * sum((ca.fabs(d) for d in inverse), ca.SX(0)) / SPREAD
 

@@ -10,7 +10,7 @@ import numpy as np
 from rps_pin.control.estimator.leg_geometry import LegGeometry
 from rps_pin.numerics.elementary import Number
 from rps_pin.rps.kernels.legs import cone_cosine, rest_axis
-from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE, within
+from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE, length_within, within
 from rps_pin.rps.kinematics.legs import RADIAL, cone_angles, violations
 from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.rps.kinematics.tracking import Triple
@@ -85,6 +85,7 @@ def within_limits(geometry: LegGeometry, bounds: Bounds) -> Number:
     for leg, (e_x, e_y) in enumerate(_E):
         axis = rest_axis(x * e_x + y * e_y, y * e_x - x * e_y, tilt, cos_r, sin_r)
         cosine = cone_cosine(direction[leg], direction[leg + 3], axis[0], axis[2])
-        kept = within(length[leg], shortest, longest) * within(angle[leg], least, greatest)
+        kept = length_within(length[leg], shortest, longest)
+        kept = kept * within(angle[leg], least, greatest)
         inside = inside * kept * (cosine >= least_cosine)  # a product: whether all hold
     return inside

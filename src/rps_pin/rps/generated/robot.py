@@ -112,7 +112,7 @@ def _keeps_limits(
         out, _, up = legs.rest_axis(e[i], t[i], of.tilt, *groups["rest"])
         cones.append(legs.cone_cosine(of.cosine[i], of.sine[i], out, up))
     margins = (
-        limits.length_margin(of.length, *groups["lengths"]) / (1.0 + greatest(*of.length)),
+        limits.length_margin(of.length, *groups["lengths"]) / greatest(*of.length),
         limits.angle_margin(of.cosine, of.sine, groups["middle"], groups["half_angle"]),
         limits.cone_margin((cones[0], cones[1], cones[2]), groups["cone"]),
     )

@@ -9,19 +9,25 @@ from __future__ import annotations
 from rps_pin.numerics.elementary import Number, greatest, least, less, select
 from rps_pin.rps.kernels.tips import Three
 
-#: Limits are kept to rounding error, m or rad.
+#: Limits are kept to rounding error: angles in rad, lengths relative to their limits.
 LIMIT_TOLERANCE = 1e-12
+_LESS, _MORE = 1.0 - LIMIT_TOLERANCE, 1.0 + LIMIT_TOLERANCE
 
 
 def within(value: Number, lower: Number, upper: Number) -> Number:
-    """Return whether a value keeps its limits, to rounding: a product of two conditions."""
+    """Return whether an angle keeps its limits, to rounding: a product of two conditions."""
     return (value >= lower - LIMIT_TOLERANCE) * (value <= upper + LIMIT_TOLERANCE)
+
+
+def length_within(value: Number, lower: Number, upper: Number) -> Number:
+    """Return whether a length keeps its limits, which are not negative, to rounding."""
+    return (value >= lower * _LESS) * (value <= upper * _MORE)
 
 
 def length_margin(d: Three, lower: Number, upper: Number) -> Number:
     """Return how far the lengths, m, are within their limits, at most."""
     below, above = least(*d) - lower, upper - greatest(*d)
-    return select(less(below, above), below, above) - LIMIT_TOLERANCE
+    return select(less(below, above), below, above) - LIMIT_TOLERANCE * greatest(*d)
 
 
 def angle_margin(

@@ -19,7 +19,7 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, LimitViolation, UnreachableError
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips as ring
-from rps_pin.rps.kernels.limits import within
+from rps_pin.rps.kernels.limits import length_within, within
 from rps_pin.rps.kinematics.pose import Tilt, components, tilt_of
 from rps_pin.rps.kinematics.samples import refuse
 from rps_pin.rps.parameters import RPSParameters
@@ -34,6 +34,8 @@ ACROSS.setflags(write=False)
 _UP = np.array([0.0, 0.0, 1.0])
 #: A leg shorter than this part of g has no direction.
 VANISHING = 1e-9
+#: How limits of a unit are kept.
+_KEPT = {"m": length_within, "rad": within}
 #: A limit that no cosine is below.
 ANY_ANGLE = -2.0
 
@@ -251,8 +253,8 @@ def cone_angles(angle: Array, rotation: Array, rest_angle: float = 0.0) -> Array
 def within_limits(parameters: RPSParameters, length: Array, angle: Array, cone: Array) -> Bools:
     """Return for each pose whether every leg keeps its limits, shape (...)."""
     inside = np.ones(length.shape, dtype=bool)
-    for _, _, value, lower, upper in _limits(parameters, length, angle, cone):
-        inside &= within(value, lower, upper)
+    for _, unit, value, lower, upper in _limits(parameters, length, angle, cone):
+        inside &= _KEPT[unit](value, lower, upper)
     return np.asarray(inside.all(axis=-1))
 
 
@@ -264,7 +266,7 @@ def violations(
         LimitViolation(leg + 1, quantity, float(value[leg]), lower, upper, unit)
         for quantity, unit, value, lower, upper in _limits(parameters, length, angle, cone)
         for leg in range(3)
-        if not within(value[leg], lower, upper)
+        if not _KEPT[unit](value[leg], lower, upper)
     ]
 
 

@@ -10,6 +10,7 @@ leaves the other forces as they are: this separates the two.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,8 @@ from rps_pin.trajectories.path import PathSample
 
 #: Relative step of the rate in the slope of friction: errors of about its square.
 _STEP = 1e-5
+#: Places along a curve where its size is looked for.
+_PLACES = 33
 
 
 class LimitUse(NamedTuple):
@@ -80,17 +83,33 @@ class CurveDynamics:
         self.curve = curve
         self.limits = limits
         self.wrench = wrench
+        #: u'^2 and u'' at which forces of inertia are of the size of the weight, 1/s^2.
+        self._square = self._size_of_square()
+
+    def _size_of_square(self) -> float:
+        p = self.robot.parameters
+        _, first, _ = self.curve.at(np.linspace(0.0, self.curve.length, _PLACES))
+        moved = first * [1.0, p.platform_radius, p.platform_radius]
+        largest = float(np.abs(moved).max())
+        acceleration = float(np.linalg.norm(p.gravity))
+        if not acceleration and math.isfinite(self.limits.force):
+            acceleration = self.limits.force / p.platform_mass
+        elif not acceleration:
+            acceleration = self.limits.speed**2 / p.platform_radius
+        square = acceleration / largest if largest > 0 else 1.0
+        return square if 0 < square < math.inf else 1.0
 
     def terms(self, u: Array) -> CurveTerms:
         """Return the terms at parameters of shape (...)."""
         x, first, second = self.curve.at(u)
-        still = np.zeros_like(x)
+        square, still = self._square, np.zeros_like(x)
+        rate, change = math.sqrt(square) * first, square * second
         jacobian = leg_jacobians(self.robot.parameters, x).length_jacobian
         holding = self._forces(x, still, still)
-        there, back = self._forces(x, first, second), self._forces(x, -first, second)
+        there, back = self._forces(x, rate, change), self._forces(x, -rate, change)
         return CurveTerms(
-            self._forces(x, still, first) - holding,
-            (there + back) / 2 - holding,
+            (self._forces(x, still, square * first) - holding) / square,
+            ((there + back) / 2 - holding) / square,
             holding,
             np.einsum("...ij,...j->...i", jacobian, first),
         )

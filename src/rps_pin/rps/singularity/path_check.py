@@ -53,7 +53,7 @@ def check_path(
     robot: _HasParameters,
     trajectory: Trajectory,
     *,
-    tolerance: float = 1e-9,
+    tolerance: float | None = None,
     threshold: float = GRAZE,
     least_steps: int = 1000,
     max_step: float = 0.01,
@@ -67,7 +67,8 @@ def check_path(
     trajectory
         The path; its rates must be the derivatives of its poses. Accelerations are not used.
     tolerance
-        Widest bracket of an event, s. Two crossings less than this apart count as a graze.
+        Widest bracket of an event, s; 1e-10 of the path's duration if left out. Two crossings less
+        than this apart count as a graze.
     threshold
         A smallest distance below this is a graze. Distances are those of `SingularityMeasures`: of
         type II, the legs' speed over the platform's; 1e-3 means that the actuators feel a
@@ -83,7 +84,8 @@ def check_path(
         the right shapes, or it is tilted by a whole turn.
     """
     threshold = positive_number(threshold, "threshold")
-    path = PathSignals(robot.parameters, trajectory, positive_number(tolerance, "tolerance", "s"))
+    width = None if tolerance is None else positive_number(tolerance, "tolerance", "s")
+    path = PathSignals(robot.parameters, trajectory, width)
     steps = whole_number(least_steps, "least_steps")
     times = _sample_times(path, steps, positive_number(max_step, "max_step"))
     values, rates = path.signals(times)
@@ -92,7 +94,7 @@ def check_path(
     nearest = found.nearest(singularities)
     pose = path.sample(np.array([nearest[2]]))[0][0]
     density = times.size, float(np.diff(times).max())
-    about = path.duration, threshold, tolerance
+    about = path.duration, threshold, path.tolerance
     return PathCheck(singularities, found.limits(), *nearest, *about, *density, pose)
 
 

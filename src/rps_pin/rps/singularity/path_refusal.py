@@ -39,7 +39,7 @@ def require_clear(
     robot: RPSRobot,
     trajectory: Trajectory,
     *,
-    tolerance: float = 1e-9,
+    tolerance: float | None = None,
     words: PathWords = OF_TRAJECTORIES,
 ) -> PathCheck:
     """Return what `check_path` found of a trajectory that the robot can follow.

@@ -25,6 +25,8 @@ from rps_pin.validation import positive_number
 
 #: Times that are worked on at once.
 _CHUNK = 50_000
+#: Widest bracket of an event, over the duration, unless another is given.
+_BRACKET = 1e-10
 
 
 class Signal(NamedTuple):
@@ -51,17 +53,19 @@ TYPE_I = slice(2, 5)
 class PathSignals:
     """A trajectory of a robot as signals of time."""
 
-    def __init__(self, parameters: RPSParameters, trajectory: Trajectory, tolerance: float) -> None:
+    def __init__(
+        self, parameters: RPSParameters, trajectory: Trajectory, tolerance: float | None
+    ) -> None:
         self.parameters = parameters
         self.trajectory = trajectory
         self.duration = positive_number(trajectory.duration, "the trajectory's duration", "s")
-        self.tolerance = tolerance
+        self.tolerance = _BRACKET * self.duration if tolerance is None else tolerance
         self.limits = _limits_of(parameters)
         least = 4 * float(np.spacing(self.duration))
-        if tolerance < least:
+        if self.tolerance < least:
             raise InputError(
-                f"tolerance = {tolerance:.3g} s: times up to {self.duration:.6g} s can be told "
-                f"apart down to {least:.3g} s"
+                f"tolerance = {self.tolerance:.3g} s: times up to {self.duration:.6g} s can be "
+                f"told apart down to {least:.3g} s"
             )
 
     def sample(self, times: Array) -> tuple[Array, Array]:
@@ -131,11 +135,16 @@ def _rooms(
         if signal.name == "spherical joint":
             room = value - math.cos(min(signal.limit + LIMIT_TOLERANCE, math.pi))
         elif signal.side == "lower":
-            room = value - signal.limit + LIMIT_TOLERANCE
+            room = value - signal.limit + _slack(signal)
         else:
-            room, change = signal.limit + LIMIT_TOLERANCE - value, -change
+            room, change = signal.limit + _slack(signal) - value, -change
         rooms[:, column], rates[:, column] = room, change
     return rooms, rates
+
+
+def _slack(signal: Signal) -> float:
+    """Return by how much a limit may be passed: by rounding."""
+    return LIMIT_TOLERANCE * (signal.limit if signal.unit == "m" else 1.0)
 
 
 def _cone_cosines(

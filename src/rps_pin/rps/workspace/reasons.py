@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rps_pin.arrays import Array
-from rps_pin.rps.kernels.limits import within
+from rps_pin.rps.kernels.limits import length_within, within
 from rps_pin.rps.parameters import RPSParameters
 
 Flags = NDArray[np.uint16]
@@ -74,8 +74,8 @@ def broken_limits(
     """
     shortest, longest = parameters.leg_length_limits
     checks = [
-        (Reason.LEG_1_SHORT, within(length, shortest, math.inf)),
-        (Reason.LEG_1_LONG, within(length, -math.inf, longest)),
+        (Reason.LEG_1_SHORT, length_within(length, shortest, math.inf)),
+        (Reason.LEG_1_LONG, length_within(length, 0.0, longest)),
         (Reason.LEG_1_ANGLE, within(angle, *parameters.leg_angle_limits)),
     ]
     if cone is not None:

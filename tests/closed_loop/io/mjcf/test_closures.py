@@ -265,8 +265,9 @@ def test_a_loop_that_cannot_close_is_told_with_its_line() -> None:
         ClosureError, match="line 3: tendon 'tie': the loops do not close"
     ) as caught:
         ClosedLoopModel.from_mjcf(text)
-    assert caught.value.gap == pytest.approx(np.radians(0.09), rel=1e-6)
     mechanism = ClosedLoopModel.from_mjcf(text, within_limits=False)
+    gap = mechanism.characteristic_length * np.radians(0.09)
+    assert caught.value.gap == pytest.approx(gap, rel=1e-6)
     q = mechanism.close(mechanism.home)
     assert q[0] - q[1] == pytest.approx(np.radians(1.6), abs=1e-12)
     far = pin.SE3(np.eye(3), np.array([0.0, 0.0, 9.0]))
