@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from rps_pin import ClosedLoopModel, RPSRobot
+from rps_pin import ClosedLoopModel, RPSRobot, bounds
 from rps_pin.bounds import SWITCH, check_size, most
 from rps_pin.control.simulation.plant import Plant
 from rps_pin.errors import InputError, MechanismError
@@ -69,3 +70,48 @@ def test_plants_of_any_size_are_refused(settings: dict[str, int], why: str) -> N
     robot = RPSRobot.from_preset("micro")
     with pytest.raises(InputError, match=why):
         Plant(robot, np.array([0.223, 0.0, 0.0]), **settings)
+
+
+def test_the_page_of_limits_lists_every_bound() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "limits.md").read_text("utf-8")
+    listed = {
+        name: int(number.replace(" ", ""))
+        for number, name in re.findall(r"\| ([\d ]+) \| `([A-Z_]+)` \|", page)
+    }
+    there = {
+        name: value
+        for name, value in vars(bounds).items()
+        if name.isupper() and isinstance(value, int)
+    }
+    assert listed == there
+    assert f"`{SWITCH}`" in page
+
+
+@each(
+    ("bound", "content", "read"),
+    [
+        ("XML", "<robot/>", "urdf"),
+        ("YAML", "urdf: a.urdf", "yaml"),
+        ("VALUES", "urdf: [a, b]", "yaml"),
+    ],
+)
+def test_larger_files_are_read_with_the_switch(
+    bound: str, content: str, read: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = tmp_path_factory.mktemp("sizes") / f"file.{read}"
+    path.write_text(content, "utf-8")
+
+    def refusal() -> str:
+        with pytest.raises((InputError, MechanismError)) as caught:
+            if read == "urdf":
+                ClosedLoopModel.from_urdf(path, [], [])
+            else:
+                ClosedLoopModel.load(path)
+        return str(caught.value)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bounds, bound, 2)
+        assert f"more than 2 {'values' if bound == 'VALUES' else 'bytes'}" in refusal()
+        assert f"{SWITCH}=10" in refusal()
+        patch.setenv(SWITCH, "10")
+        assert "more than" not in refusal()

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from pydantic import Field
 
+from rps_pin.bounds import YAML
 from rps_pin.config import (
-    LARGEST_FILE,
     Entry,
     Finite,
     Positive,
@@ -139,7 +139,7 @@ def bomb(levels: int) -> str:
         ("a: " + "[" * 50_000, "nested too deeply"),
         ("a: " + "{b: " * 20_000, "nested too deeply"),
         ("a: " + "- " * 50_000, "not valid YAML"),
-        ("x" * (LARGEST_FILE + 1), f"more than {LARGEST_FILE} bytes"),
+        ("x" * (YAML + 1), f"more than {YAML} bytes.*RPS_PIN_BOUNDS=10"),
     ],
     ids=["bomb", "list in itself", "mapping in itself", "lists", "mappings", "dashes", "long"],
 )

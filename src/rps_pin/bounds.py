@@ -21,6 +21,12 @@ LINKS_IN_A_ROW = 1000
 LINKS = 20_000
 #: Steps of a simulation; rows that it keeps, of some kB each; ticks of a control loop, likewise.
 STEPS, ROWS, TICKS = 10_000_000, 2_000_000, 2_000_000
+#: Bytes of a URDF or MJCF, without its meshes; and of a YAML file, which takes 20 s a megabyte.
+XML, YAML = 64 * 2**20, 200_000
+#: Values of a YAML file, its aliases expanded.
+VALUES = 100_000
+#: Points of an axis of a workspace's grid.
+POINTS = 1_000_000
 #: Integration steps in a tick, and ticks between a command and its effect.
 SUBSTEPS, DELAY = 1000, 100_000
 
@@ -43,13 +49,15 @@ def most(bound: int) -> int:
     return round(factor * bound)
 
 
+#: What to say of a bound that a reader met.
+FOR_MORE = f"the environment variable {SWITCH}=10 takes ten times as many"
+
+
 def beyond(size: float, bound: int) -> str:
     """Return what to say of a size beyond a bound; or nothing: ``"at most 400 are taken ..."``."""
     if size <= bound or size <= (limit := most(bound)):
         return ""
-    return (
-        f"at most {limit} are taken; the environment variable {SWITCH}=10 takes ten times as many"
-    )
+    return f"at most {limit} are taken; {FOR_MORE}"
 
 
 def check_size(size: float, bound: int, what: str) -> None:

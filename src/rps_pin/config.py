@@ -21,15 +21,12 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
+from rps_pin import bounds
+from rps_pin.bounds import FOR_MORE, most
 from rps_pin.contents import known_format, xml_root_tag
 from rps_pin.errors import InputError, MechanismError, did_you_mean, shown
 from rps_pin.files import opened
 from rps_pin.validation import LARGEST
-
-#: Larger files are refused: descriptions are written by hand, and reading takes 20 s a megabyte.
-LARGEST_FILE = 200_000
-#: Most values of a file, its aliases expanded.
-LARGEST_CONTENT = 100_000
 
 #: YAML's numbers; longer ones than `LONGEST_NUMBER` are refused.
 _NUMBER = re.compile(
@@ -218,15 +215,15 @@ def read_yaml(path: str | os.PathLike[str], what: str) -> YamlFile:
     Raises
     ------
     InputError
-        If the file cannot be read, is larger than `LARGEST_FILE`, or is not such a mapping; with
+        If the file cannot be read, is larger than `bounds.YAML`, or is not such a mapping; with
         the line where that shows.
     """
     with opened(path, what) as file:
-        content = file.read(LARGEST_FILE + 1)
-        origin = os.fspath(path)
-        if len(content) > LARGEST_FILE:
+        limit, origin = most(bounds.YAML), os.fspath(path)
+        content = file.read(limit + 1)
+        if len(content) > limit:
             raise InputError(
-                f"{what} {origin} has more than {LARGEST_FILE} bytes, the most that is read"
+                f"{what} {origin} has more than {limit} bytes, the most that is read; {FOR_MORE}"
             )
         _refuse_other_formats(content, origin, what)
         text = content.decode("utf-8-sig")
@@ -274,20 +271,21 @@ def _parsed(text: str, origin: str) -> YamlFile:
 def _refuse_huge(root: Node, origin: str) -> None:
     """Count the values with their aliases expanded, each node once; refuse keys that are nests."""
     sizes: dict[int, int] = {}
+    limit = most(bounds.VALUES)
 
     def size(node: Node) -> int:
         key = id(node)
         if key not in sizes:
-            sizes[key] = LARGEST_CONTENT + 1  # for a node inside itself
+            sizes[key] = limit + 1  # for a node inside itself
             for name, _ in node.value if isinstance(node, MappingNode) else ():
                 if not isinstance(name, ScalarNode):
                     _refuse_key(name, origin)
             sizes[key] = 1 + sum(size(child) for child in _children(node))
         return sizes[key]
 
-    if size(root) > LARGEST_CONTENT:
+    if size(root) > limit:
         raise InputError(
-            f"{origin} would expand to more than {LARGEST_CONTENT} values, the most that is read"
+            f"{origin} would expand to more than {limit} values, the most that is read; {FOR_MORE}"
         )
 
 

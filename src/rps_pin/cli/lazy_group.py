@@ -13,6 +13,8 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from rps_pin.cli.decimal_numbers import DecimalCommand
+
 #: Of the whole command line, and of each command.
 SETTINGS: dict[str, Any] = {
     "rich_markup_mode": "markdown",
@@ -48,5 +50,6 @@ def _imported(name: str) -> Any:
     """Return the command of a module, with the settings of the whole command line."""
     module = importlib.import_module(f"rps_pin.cli.{name}")
     one = typer.Typer(add_completion=False, **SETTINGS)
-    one.command(name.rpartition("_")[2])(getattr(module, f"{name}_command"))
+    command = one.command(name.rpartition("_")[2], cls=DecimalCommand)
+    command(getattr(module, f"{name}_command"))
     return typer.main.get_command(one)

@@ -11,6 +11,7 @@ import pinocchio as pin
 import typer
 
 from rps_pin.cli.completion import MECHANISMS, mechanism_names, names_or_files
+from rps_pin.cli.decimal_numbers import decimal
 from rps_pin.cli.printing import say
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.io.gepetto import FILE
@@ -143,9 +144,7 @@ def by_joint(pairs: Sequence[str], option: str) -> dict[str, float]:
     for pair in pairs:
         name, _, number = pair.rpartition("=")
         try:
-            if "_" in number or not number.isascii():  # which Python's float takes
-                raise ValueError
-            value = float(number)
+            value = decimal(number)
         except ValueError:
             name = ""
         if not name:

@@ -94,8 +94,10 @@ def simulate_command(
 
     - `rps-pin simulate delta --hold --speed arm_1_joint=0.5`
     """
+    from rps_pin.closed_loop.simulation.integrators import check_times
     from rps_pin.closed_loop.simulation.simulate import simulate
 
+    check_times(duration, step, 1)
     mechanism, file = options.load_mechanism(file, ignore_limits, accuracy)
     folder = output or Path(f"{file.stem}-simulation")
     files = [folder / "simulation.csv"]
@@ -117,9 +119,7 @@ def simulate_command(
         say(f"note: --hold: {_phrase(unheld)}", err=True)
     console = common.text_console(as_json, soft_wrap=True)
     times: dict[str, Any] = {"duration": duration, "step": step, "method": method.value}
-    if step > 0:
-        columns = 5 + mechanism.model.nq + 2 * mechanism.model.nv + forces.size
-        common.tell_size("simulation.csv", duration / step, columns)
+    common.tell_size("simulation.csv", duration / step, 5 + q.size + 2 * v.size + forces.size)
     with common.share_bar(console, "simulating") as progress:
         motion = simulate(mechanism, q, v, tau=forces, progress=progress, **times)
     folder.mkdir(parents=True, exist_ok=True)

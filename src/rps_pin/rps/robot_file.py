@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from rps_pin.config import LARGEST_FILE
+from rps_pin.bounds import YAML, most
 from rps_pin.errors import InputError
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
@@ -47,6 +47,6 @@ def _is_mechanism(file: Path) -> bool:
     """Return whether a file is a URDF, a MuJoCo file, or a description that names one."""
     if file.suffix.lower() in (".urdf", ".xml", ".mjcf"):
         return True
-    if not file.is_file() or file.stat().st_size > LARGEST_FILE:
+    if not file.is_file() or file.stat().st_size > most(YAML):
         return False
     return re.search(rb"^(urdf|mjcf)\s*:", file.read_bytes(), re.MULTILINE) is not None

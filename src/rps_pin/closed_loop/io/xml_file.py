@@ -13,12 +13,11 @@ from typing import Any, BinaryIO
 
 from lxml import etree
 
+from rps_pin import bounds
+from rps_pin.bounds import FOR_MORE, most
 from rps_pin.contents import known_format
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.files import opened
-
-#: The longest XML text that is read, bytes. (Meshes are files of their own.)
-LARGEST_XML = 64 * 2**20
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -46,7 +45,7 @@ def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
     Raises
     ------
     InputError
-        If the file cannot be read, or is larger than `LARGEST_XML`.
+        If the file cannot be read, or is larger than `bounds.XML`.
     MechanismError
         If it is a file of another kind that is known: an archive, a web page.
     """
@@ -62,17 +61,20 @@ def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:
             content = read_whole(file, origin, form)
             _refuse_known(content, origin, form)
             text = _decoded(content)
-    if len(text) > LARGEST_XML:
-        raise InputError(f"{origin} has more than {LARGEST_XML} characters, the most that is read")
+    if len(text) > (limit := most(bounds.XML)):
+        raise InputError(
+            f"{origin} has more than {limit} characters, the most that is read; {FOR_MORE}"
+        )
     return _without_declaration(text), origin
 
 
 def read_whole(file: BinaryIO, origin: str, form: str) -> bytes:
-    """Return the content of an open file; `InputError` if it is larger than `LARGEST_XML`."""
-    content = file.read(LARGEST_XML + 1)
-    if len(content) > LARGEST_XML:
+    """Return the content of an open file; `InputError` if it is larger than `bounds.XML`."""
+    limit = most(bounds.XML)
+    content = file.read(limit + 1)
+    if len(content) > limit:
         raise InputError(
-            f"the {form} {origin} has more than {LARGEST_XML} bytes, the most that is read"
+            f"the {form} {origin} has more than {limit} bytes, the most that is read; {FOR_MORE}"
         )
     return content
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.bounds import POINTS, check_size
 from rps_pin.errors import InputError
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.validation import positive_number, real, real_array, whole_number
@@ -102,9 +103,9 @@ def leg_grid(
     counts = points if isinstance(points, tuple) else (points,) * 3
     if len(counts) != 3:
         raise InputError(f"points = {points!r}; it must be a whole number, or three")
-    first, second, third = (
-        np.linspace(shortest, longest, whole_number(n, "points", least=2)) for n in counts
-    )
+    for count in counts:
+        check_size(whole_number(count, "points", least=2), POINTS, f"{count} points of an axis")
+    first, second, third = (np.linspace(shortest, longest, count) for count in counts)
     return Grid("leg lengths", (first, second, third))
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rps_pin import ClosedLoopModel, InputError, LoopClosure, MechanismError
-from rps_pin.closed_loop.io import xml_file
+from rps_pin import ClosedLoopModel, InputError, LoopClosure, MechanismError, bounds
 from rps_pin.closed_loop.io.urdf import model_from_urdf, parts_from_urdf
 from tests.closed_loop.io.urdf.texts import joint, link, robot
 from tests.each import each
@@ -77,10 +76,10 @@ def test_lines_are_those_of_the_file(tmp_path: Path) -> None:
 
 
 def test_large_files_are_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xml_file, "LARGEST_XML", 1000)
+    monkeypatch.setattr(bounds, "XML", 1000)
     (tmp_path / "r.urdf").write_text(ARM + " " * 1000, "utf-8")
     for source in (tmp_path / "r.urdf", ARM + " " * 1000):
-        with pytest.raises(InputError, match="more than 1000"):
+        with pytest.raises(InputError, match=r"more than 1000 .*RPS_PIN_BOUNDS=10"):
             model_from_urdf(source)
 
 
