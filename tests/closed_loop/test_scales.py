@@ -15,7 +15,8 @@ import pinocchio as pin
 import pytest
 
 from rps_pin import ClosedLoopModel, ClosureError, JointEffects, LoopClosure, SingularityError
-from rps_pin.errors import AccuracyWarning
+from rps_pin.closed_loop import JointMerge, merged
+from rps_pin.errors import AccuracyWarning, MechanismError
 from tests.closed_loop.random_mechanisms import EVERY_KIND, case
 from tests.closed_loop.scaled_answers import Answer, Inputs, answers, differences
 from tests.each import each
@@ -186,3 +187,22 @@ def test_gaps_count_by_their_part_of_the_mechanism(units: Units) -> None:
         mechanism.simulate(q, opened, duration=units.time, step=0.1 * units.time)
     with pytest.raises(ClosureError):
         mechanism.acceleration(q, 1e-3 * opened, still[:1])
+
+
+@each("units", UNITS)
+def test_joints_that_meet_are_merged_in_all_units(units: Units) -> None:
+    """Two hinges a thousandth of a link apart do not meet, however small the link is."""
+
+    def cross(apart: float) -> pin.Model:
+        model, length, mass = pin.Model(), units.length, units.mass
+        inertia = pin.Inertia(mass, length * np.array([0.5, 0.1, 0.1]), units.inertia * np.eye(3))
+        first = model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "first")
+        place = pin.SE3(np.eye(3), np.array([apart * length, 0.0, 0.0]))
+        model.appendBodyToJoint(
+            model.addJoint(first, pin.JointModelRY(), place, "second"), inertia, pin.SE3.Identity()
+        )
+        return merged(model, [JointMerge(("first", "second"), "universal", "cross")])
+
+    assert cross(0.0).nv == cross(1e-12).nv == 2
+    with pytest.raises(MechanismError, match="where they meet in a point"):
+        cross(1e-3)

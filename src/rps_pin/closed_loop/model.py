@@ -666,8 +666,8 @@ class ClosedLoopModel:
         Returns
         -------
         array
-            Closed configuration, shape (nq,), gaps at most 1e-12 m (or 1e-12 characteristic
-            lengths where that is more than a metre).
+            Closed configuration, shape (nq,), gaps at most 1e-12 of the way along the links (of
+            displacements of slides and free-flyers where these are more).
 
         Raises
         ------

@@ -31,7 +31,7 @@ from rps_pin.validation import real_vector
 MergedKind = Literal["spherical", "universal"]
 
 _JOINTS_OF = {"spherical": 3, "universal": 2}
-#: Origins count as coincident below this distance, m.
+#: Origins count as coincident below this distance, over the longest offset in the tree.
 _COINCIDENT = 1e-9
 #: Links between joints may have this share of the mass, and of the moments of inertia about the
 #: joint, of what the last one carries: many files give them 1e-9 kg for want of 0.
@@ -221,11 +221,19 @@ def _check_link(model: pin.Model, what: str, first: int, second: int) -> None:
             f"{what}: the link between {before!r} and {after!r} also carries {', '.join(others)}"
         )
     offset = float(np.linalg.norm(model.jointPlacements[second].translation))
-    if offset > _COINCIDENT:
+    if offset > _COINCIDENT * _longest(model):
         raise MechanismError(
             f"{what}: the origins of {before!r} and {after!r} are {offset:.6g} m apart; "
             "joints are merged where they meet in a point"
         )
+
+
+def _longest(model: pin.Model) -> float:
+    """Return the longest offset of a joint, a frame or a centre of mass from its joint, m."""
+    offsets = [one.translation for one in model.jointPlacements]
+    offsets += [frame.placement.translation for frame in model.frames]
+    offsets += [inertia.lever for inertia in model.inertias]
+    return max(float(np.linalg.norm(offset)) for offset in offsets)
 
 
 def _check_masses(model: pin.Model, what: str, row: list[int]) -> None:

@@ -90,7 +90,8 @@ def simulate(
         External wrenches by frame name, as for `ClosedLoopModel.inverse_dynamics`; or a function
         of (t, q, v) that returns them, smooth in time, called at every stage of a step.
     closing
-        ``"projection"`` keeps the loops closed to 1e-12 m; ``"baumgarte"`` stabilises them.
+        ``"projection"`` keeps the loops closed as `ClosedLoopModel.close` does; ``"baumgarte"``
+        stabilises them.
     tolerance
         Relative and absolute error per step of ``"adaptive"``; the absolute one in rad and
         characteristic lengths L, and in these by the time of a fall by L / 2 (the duration, where

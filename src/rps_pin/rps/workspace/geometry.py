@@ -24,6 +24,8 @@ from rps_pin.rps.workspace.result import Workspace
 from rps_pin.validation import choice, whole_number
 
 Space = Literal["position", "pose"]
+#: Of coordinates, over the largest of their axis.
+_ROUNDING = 1e-12
 MESH_FORMATS = (".stl", ".ply", ".obj")
 
 
@@ -166,7 +168,8 @@ def _opposite_inside(workspace: Workspace, pose: Array) -> Bools:
     coordinates = fields.length if workspace.grid.kind == "leg lengths" else opposite
     inside = fields.reason == 0
     for i, axis in enumerate(workspace.grid.axes):
-        inside &= (coordinates[:, i] >= axis[0] - 1e-12) & (coordinates[:, i] <= axis[-1] + 1e-12)
+        slack = _ROUNDING * float(np.abs(axis).max())
+        inside &= (coordinates[:, i] >= axis[0] - slack) & (coordinates[:, i] <= axis[-1] + slack)
     return np.asarray(inside)
 
 
