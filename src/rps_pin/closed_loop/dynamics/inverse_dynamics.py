@@ -174,7 +174,8 @@ def inverse_dynamics(
         system.state(q, v, a)
         return _of_any_actuators(system, q, jacobian, force)
     passive_jacobian = jacobian.take(system.passive, axis=1)
-    multipliers = system.factorisation.multipliers(jacobian, passive_jacobian, force)
+    factorisation = system.factorisation
+    multipliers = factorisation.multipliers(jacobian, passive_jacobian, force)
     if multipliers is None:
         system.state(q, v, a)
         return _of_any_actuators(system, q, jacobian, force)
@@ -184,13 +185,10 @@ def inverse_dynamics(
     residual = dnrm2(rest, size)
     # The estimate of the condition does not see a pivot that is exactly zero, nor a matrix of
     # rounding errors.
-    if not (
-        residual < _INFINITY
-        and dnrm2(multipliers) <= system.factorisation.huge_force * dnrm2(force)
-    ):
+    if not (residual < _INFINITY and dnrm2(multipliers) <= factorisation.huge_force * dnrm2(force)):
         system.state(q, v, a)
         return _of_any_actuators(system, q, jacobian, force)
-    scales = system.factorisation.scales
+    scales = factorisation.scales
     return InverseDynamics(rest[size:], multipliers, residual, scales, passive_jacobian)
 
 
