@@ -15,6 +15,8 @@ from rps_pin import (
     SingularityError,
 )
 from rps_pin.task import Task
+from tests.closed_loop.mechanisms import values
+from tests.closed_loop.test_completion import flat_parallelogram
 from tests.task.robots import poses, task
 from tests.worst import worst
 
@@ -186,3 +188,17 @@ def test_measures_vanish_at_singularities_of_their_own_kind_and_forces_are_refus
     refusing = Task(strict, "left_tip", ["x", "z"])
     with pytest.raises(SingularityError, match="the actuators do not determine the task here"):
         refusing.forces_to_actuators(beside, [1.0, 1.0])
+
+
+def test_the_constraint_measure_vanishes_where_the_closures_lose_rank() -> None:
+    """A parallelogram laid flat, where it may become an antiparallelogram: zero as the sine."""
+    m, _ = flat_parallelogram(["crank_joint"])
+    one = Task(m, joints=["crank_joint"])
+    angles = np.array([1.0, 1e-2, 1e-4, 1e-6])
+    names = ("crank_joint", "coupler_joint", "rocker_joint")
+    q = np.array([values(m, dict(zip(names, (a, -a, a), strict=True))) for a in angles])
+    found = one.singularities(q)
+    assert found.constraint[0] > 0.1
+    np.testing.assert_allclose(found.constraint[2] / found.constraint[1], 1e-2, rtol=1e-3)
+    np.testing.assert_allclose(found.constraint[3] / found.constraint[2], 1e-2, rtol=1e-3)
+    np.testing.assert_allclose(found.type_i[0], one.singularities(q[0]).type_i, rtol=1e-12)

@@ -60,6 +60,11 @@ class PinocchioEngine:
 
         return self._each(answer, (q,), (self._mechanism.constraint_size,), errors)
 
+    def jacobian(self, q: ArrayLike, errors: Errors = "raise") -> Array:
+        """Return J, (..., nc, nv)."""
+        shape = (self._mechanism.constraint_size, self._nv)
+        return self._each(self._mechanism.jacobian, (q,), shape, errors)
+
     def mass_matrix(self, q: ArrayLike, errors: Errors = "raise") -> Array:
         """Return the reduced mass matrix, (..., m, m)."""
         return self._each(self._mechanism.mass_matrix, (q,), (self._count, self._count), errors)

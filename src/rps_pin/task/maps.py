@@ -379,7 +379,8 @@ class TaskMaps:
                 + (f", {idle} idle freedoms not counted" if idle else "")
             )
         q = description.configuration
-        A = self._frame_rows(q, "raise") @ self._motions(q) / self._units[:, None]
+        self._rank = description.rank
+        A, _, _ = self._in_motions(q)
         values = singular_values(A)
         if rank(values / max(values[0], 1e-300), 1e-8) < self.size:
             free = null_space(A.T, 1e-8)[:, 0]
@@ -392,9 +393,18 @@ class TaskMaps:
                 else f"coordinate {named[0]} of the task does not move"
             )
 
-    def _motions(self, q: Array) -> Array:
-        """Return N, orthonormal in one unit but in the joints' units, shape (nv, M)."""
-        return self.mechanism.allowed_motions(q)
+    def _in_motions(self, q: Array) -> tuple[Array, Array, Array]:
+        """Return A N, S N and the singular values of J, all in one unit, at (..., nq).
+
+        N is an orthonormal basis of the motions that J's largest singular values leave, as many of
+        these as the rank is at regular configurations.
+        """
+        system = self.mechanism.system
+        J = system.scaled(self._by_actuators.jacobian(q))
+        _, values, right = np.linalg.svd(J)
+        N = np.swapaxes(right[..., self._rank :, :], -1, -2)
+        A = self._frame_rows(q, "raise") * system.column_scale / self._units[:, None]
+        return A @ N, N[..., self._actuated, :], values
 
     def _frame_rows(self, q: ArrayLike, errors: Errors) -> Array:
         """Return A, shape (..., m, nv): x' = A v."""
@@ -405,11 +415,8 @@ class TaskMaps:
             columns = [model.joints[model.getJointId(name)].idx_v for name in names]
             found[..., range(self.size), columns] = 1.0
             return found
-        whole = self._whole(q_, errors)
-        for index in np.ndindex(q_.shape[:-1]):
-            rows = self.extended.jacobian(whole[index])[self._x.rows]
-            found[index] = -rows[:, : self._nv]
-        return found
+        J = self._by_task.jacobian(self._whole(q_, errors), **options_of(errors))
+        return np.asarray(-J[..., self._x.rows, : self._nv])
 
     def _basis(self, q: ArrayLike, errors: Errors) -> Array:
         """Return T of the extended mechanism: v = T x', shape (..., nv + m, m)."""

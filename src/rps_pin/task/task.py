@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.codegen.engine.batches import Errors
 from rps_pin.errors import InputError, MechanismError, SingularityError
-from rps_pin.numerics.linear_algebra import rank, singular_values
+from rps_pin.numerics.linear_algebra import RANK_TOLERANCE
 from rps_pin.task import polytope
 from rps_pin.task.maps import TaskMaps, options_of
 from rps_pin.task.singularity import SingularityMeasures
@@ -274,29 +274,22 @@ class Task(TaskMaps):
         q
             Closed configurations, shape (..., nq).
         """
-        q_ = self._rows(q, self._nq, "q")
-        found = np.empty((*q_.shape[:-1], 4))
-        for index in np.ndindex(q_.shape[:-1]):
-            found[index] = self._measures(q_[index])
-        return SingularityMeasures(*np.moveaxis(found, -1, 0))
-
-    def _measures(self, q: Array) -> tuple[float, float, float, float]:
-        system = self.mechanism.system
-        jacobian = system.scaled(self.mechanism.jacobian(q))
-        values = singular_values(jacobian)
-        motions = self._motions(q)
-        counting = system.model.nv - motions.shape[1]
-        constraint = float(values[counting - 1] / values[0]) if counting else 1.0
-        A = self._frame_rows(q, "raise") @ motions / self._units[:, None]
-        S = motions[self._actuated] / system.column_scale[self._actuated][:, None]
-        type_i = float(singular_values(A)[self.size - 1]) if A.shape[1] >= self.size else 0.0
-        if rank(singular_values(A)) < self.size:
-            return type_i, np.nan, constraint, np.nan
+        A, S, values = self._in_motions(self._rows(q, self._nq, "q"))
+        inputs = np.linalg.svd(A, compute_uv=False)
+        type_i = inputs[..., self.size - 1]
+        regular = type_i > RANK_TOLERANCE * np.maximum(inputs[..., 0], 1.0)
         K = S @ np.linalg.pinv(A)
-        gains = singular_values(K)
-        type_ii = float(gains[-1]) if K.shape[0] >= self.size else 0.0
-        determinant = np.linalg.det(K) if K.shape[0] == self.size else np.prod(gains)
-        return type_i, type_ii, constraint, float(determinant)
+        gains = np.linalg.svd(K, compute_uv=False)
+        square = K.shape[-2] == K.shape[-1]
+        determinant = np.linalg.det(K) if square else np.prod(gains, axis=-1)
+        enough = K.shape[-2] >= self.size  # actuators
+        rank = self._rank
+        return SingularityMeasures(
+            np.asarray(type_i),
+            np.where(regular, gains[..., -1] if enough else 0.0, np.nan),
+            values[..., rank - 1] / values[..., 0] if rank else np.ones(A.shape[:-2]),
+            np.where(regular, determinant, np.nan),
+        )
 
     # Parts ----------------------------------------------------------------------------------------
 
