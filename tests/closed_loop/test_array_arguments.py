@@ -23,7 +23,7 @@ from rps_pin.codegen.engine.forces import GeneratedForces
 from rps_pin.control import ComputedTorque, Gains, Plant
 from rps_pin.control.estimator.real_time_robot import RealTimeRobot
 from rps_pin.errors import InputError, RPSPinError
-from tests.codegen.engines import of_file
+from tests.codegen.engines import QUICK, of_file
 from tests.worst import worst
 
 #: Conversions of an array (n,) that keep its numbers, or round them to single precision.
@@ -131,6 +131,14 @@ ARGUMENTS = {
     "steps": "q v tau",
     "passive_jacobian": "q",
 }
+#: Of a mechanism that is compiled with parameters.
+BY_PARAMETERS = {
+    "gaps_by_parameters": "q",
+    "inverse_dynamics_by_parameters": "q v a",
+    "forward_dynamics_by_parameters": "q v tau",
+    "inverse_dynamics": "q v a",
+    "jacobian": "q",
+}
 OTHERS: dict[str, dict[str, Any]] = {
     "frame_placement": {"frame": "coupler"},
     "frame_jacobian": {"frame": "coupler"},
@@ -145,6 +153,13 @@ OTHERS: dict[str, dict[str, Any]] = {
 @cache
 def _pinocchio() -> ClosedLoopModel:
     return ClosedLoopModel.load("urdf/four_bar.yaml")
+
+
+@cache
+def _with_parameters() -> CompiledMechanism:
+    return _pinocchio().compile(
+        compiler=QUICK, parameters=["mass:crank_joint", "mass:coupler_joint"]
+    )
 
 
 @cache
@@ -176,6 +191,12 @@ def _calls() -> Iterator[tuple[str, Callable[..., Any], dict[str, np.ndarray], d
                 arrays = {one: _values()[one] for one in given.split()}
                 others = OTHERS.get(name, {})
                 yield f"{kind}.{name}", getattr(mechanism, name), arrays, others
+    fast = _with_parameters()
+    for name, given in BY_PARAMETERS.items():
+        arrays = {one: _values()[one] for one in given.split()} | {
+            "parameters": np.array([1.3, 2.25])
+        }
+        yield f"by parameters.{name}", getattr(fast, name), arrays, {}
     robot = _robot()
     motion = {"pose": _POSE, "rate": _RATE, "acceleration": _RATE}
     for name in ("motion", "state", "actuator_forces"):
@@ -290,12 +311,37 @@ def test_every_call_with_arrays_is_in_the_table(kind: type) -> None:
             assert (
                 not arrays - scalars
                 or name in ARGUMENTS
-                or name.endswith("_by_parameters")
-                or name == "generated"
+                or name in BY_PARAMETERS
+                or name == "generated"  # see the next test
             )
 
 
 _TYPES = ("ArrayLike", "Array")
+
+
+def test_generated_functions_give_a_status_for_what_is_not_finite() -> None:
+    """And refuse the rest, as all other calls do."""
+    mechanism, arrays = of_file("four_bar"), {one: _values()[one] for one in "qva"}
+
+    def call(**given: Any) -> tuple[Any, Any]:
+        *answers, status = mechanism.generated("inverse_dynamics", None, None, *given.values())
+        return answers, status
+
+    answers, status = call(**arrays)
+    assert status == 0
+    wanted = _numbers(answers)
+    for name, array in arrays.items():
+        for form, convert in GOOD.items():
+            found, status = call(**{**arrays, name: convert(array)})
+            assert status == 0
+            assert _differ(_numbers(found), wanted) <= 1e-12, (name, form)
+        for form, convert in BAD.items():
+            if form in ("NaN", "infinite"):
+                assert call(**{**arrays, name: convert(array)})[1] != 0, (name, form)
+                continue
+            with pytest.raises(InputError):
+                call(**{**arrays, name: convert(array)})
+                pytest.fail(f"{name}: {form}")
 
 
 @pytest.mark.parametrize("engine", ["compiled mechanism", "robot"])
