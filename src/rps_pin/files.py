@@ -94,11 +94,23 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
                 os.close(os.open(scratch, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
             except OSError as error:  # name the file that was asked for
                 raise type(error)(error.errno, error.strerror, str(target)) from None
-            yield scratch
+            with _errors_name(target, scratch):
+                yield scratch
             scratch.chmod(0o666 & ~_umask())
             scratch.replace(target)
         finally:
             scratch.unlink(missing_ok=True)
+
+
+@contextmanager
+def _errors_name(target: Path, scratch: Path) -> Iterator[None]:
+    """Let errors of writing, which may name no file or the temporary one, name the target."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is not None and error.filename in (None, str(scratch), scratch):
+            error.filename = str(target)
+        raise
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
