@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -99,7 +99,8 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
             scratch.chmod(0o666 & ~_umask())
             scratch.replace(target)
         finally:
-            scratch.unlink(missing_ok=True)
+            with suppress(FileNotFoundError, NotADirectoryError):
+                scratch.unlink()
 
 
 @contextmanager

@@ -11,9 +11,12 @@ from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
+import typer.main
 
+from rps_pin.cli.app import app, export
 from rps_pin.files import write_text
 from tests.cli.commands import rps_pin
+from tests.each import each
 
 ROOT = Path(__file__).parents[2]
 PRESET = ROOT / "src" / "rps_pin" / "rps" / "presets" / "micro.yaml"
@@ -97,10 +100,13 @@ def test_control_and_reproduce(tmp_path: Path) -> None:
         ended = rps_pin("control", str(scenario), "-o", str(file.parent))
         assert ended.stderr == f"error: {file} exists; --overwrite replaces it\n"
         assert file.read_text() == "PRECIOUS"
-    (tmp_path / "reproduction.md").write_text("PRECIOUS")
-    ended = rps_pin("reproduce", "--quick", "-o", str(tmp_path))
-    assert ended.returncode == 1
-    assert "reproduction.md exists; --overwrite replaces it" in ended.stderr
+    (tmp_path / "reproduction").mkdir()
+    for name in ("reproduction.md", "reproduction/figure_7.png", "reproduction/fit.png"):
+        (tmp_path / name).write_text("PRECIOUS")
+        ended = rps_pin("reproduce", "--quick", "-o", str(tmp_path))
+        assert ended.returncode == 1
+        assert f"{name} exists; --overwrite replaces it" in ended.stderr
+        (tmp_path / name).unlink()
 
 
 def test_an_input_is_never_replaced(tmp_path: Path) -> None:
@@ -204,3 +210,80 @@ def test_folders_and_open_files_are_refused(tmp_path: Path) -> None:
         ended = rps_pin("urdf", "-o", path, "--overwrite")
     assert ended.returncode == 1
     assert "a.txt: name that file itself" in ended.stderr
+
+
+#: All commands that write: words; the last is where to.
+EVERY = {
+    **{name: [*words, "-o"] for name, words in FOLDERS.items()},
+    **{name: words for name, (words, _, _) in FILES.items()},
+    "control": ["control", str(ROOT / "docs" / "scenarios" / "micro_helix.yaml"), "-o"],
+    "reproduce": ["reproduce", "--quick", "-o"],
+    "export c": ["export", "c", "four_bar", "-o"],
+    "png": ["view", "--png"],
+    "video": ["view", "--video"],
+}
+
+
+def test_every_command_that_writes_is_tried() -> None:
+    top, inner = (typer.main.get_group(one).list_commands(None) for one in (app, export))  # type: ignore[arg-type]
+    names = [*top, *(f"export {name}" for name in inner)]
+    helps = {name: rps_pin(*name.split(), "--help").stdout for name in names}
+    found = {name for name, text in helps.items() if "--output " in text or "--html " in text}
+    tried = {" ".join(words[: 2 if words[0] == "export" else 1]) for words in EVERY.values()}
+    assert found == tried
+
+
+@each("name", EVERY)
+def test_a_file_in_place_of_a_folder_is_told_before_the_work(name: str, tmp_path: Path) -> None:
+    """And a loop of links, and a folder that is missing; nothing is made or changed."""
+    file, loop = tmp_path / "file", tmp_path / "loop"
+    file.write_text("PRECIOUS")
+    if not loop.is_symlink():
+        loop.symlink_to(loop)
+    words, suffix = EVERY[name], {"png": ".png", "video": ".gif"}.get(name, "")
+    if suffix:
+        (tmp_path / f"loop{suffix}").symlink_to(f"loop{suffix}")
+    given = {f"loop{suffix}": "Too many levels"}
+    if name in ("urdf", "html", "png", "video"):
+        given[f"file/x{suffix}"] = "file is a file: file/x"
+    else:
+        given["file"] = "file is a file: file"
+    before = sorted(tmp_path.iterdir())
+    for value, reason in given.items():
+        ended = rps_pin(*words, value, "--overwrite", folder=tmp_path)
+        assert ended.returncode == 1, ended
+        assert ended.stderr.startswith("error: "), ended
+        assert reason in ended.stderr, ended
+        assert ended.stdout == ""
+    assert file.read_text() == "PRECIOUS"
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_what_is_no_file_among_the_results_stays(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (out / "simulation.csv").mkdir(parents=True)
+    words = (*FOLDERS["simulate"], "-o", "out", "--overwrite")
+    ended = rps_pin(*words, folder=tmp_path)
+    assert "simulation.csv is a folder: no file can be written there" in ended.stderr
+    (out / "simulation.csv").rmdir()
+    (out / "simulation.csv").symlink_to("/dev/null")
+    (out / "viewer.html").symlink_to("../elsewhere.html")
+    ended = rps_pin(*words, folder=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    assert (out / "simulation.csv").readlink() == Path("/dev/null")
+    assert (out / "viewer.html").is_symlink()
+    assert (tmp_path / "elsewhere.html").read_text("utf-8").startswith("<!DOCTYPE html>")
+
+
+def test_unusual_names(tmp_path: Path) -> None:
+    ended = rps_pin("urdf", "-o", "-", folder=tmp_path)
+    assert ended.stdout == rps_pin("urdf").stdout
+    assert list(tmp_path.iterdir()) == []
+    for name in ("two\nlines.urdf", " ", "-o.urdf", "*.urdf", "bad\udcff.urdf"):
+        ended = rps_pin("urdf", f"--output={name}", folder=tmp_path)
+        assert (ended.returncode, ended.stderr) == (0, "")
+        assert "<robot" in (tmp_path / name).read_text()
+        ended = rps_pin("urdf", f"--output={name}", folder=tmp_path)
+        assert ended.returncode == 1
+        assert ended.stderr.count("\n") == 1
+    assert len(list(tmp_path.iterdir())) == 5

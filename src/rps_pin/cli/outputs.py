@@ -47,6 +47,10 @@ def check_outputs(
     InputError
         If one is an input, write-protected or no file, or exists and may not be replaced.
     """
+    for file in files:
+        there_is = next((one for one in file.parents if one.exists()), None)
+        if there_is is not None and not there_is.is_dir():
+            raise InputError(f"{there_is} is a file: {file} cannot be in it")
     there = [file for file in files if not is_stream(file) and (file.exists() or file.is_symlink())]
     for file in filter(Path.exists, there):
         if was_read(file) or any(one.exists() and file.samefile(one) for one in inputs):

@@ -22,9 +22,10 @@ def reproduce_command(
     """Reproduce the paper: each equation, figure and table compared with what is computed here.
 
     Output: the page (**reproduction.md**) and, in the folder **reproduction** next to it, its
-    pictures and all interpretations of the paper's Table 1 that were tried (**readings.csv**).
-    A whole earlier reproduction is replaced. It takes about a minute; Ctrl-C leaves no incomplete
-    file. The project's own page, docs/reproduction.md, is made by `rps-pin reproduce -o docs`.
+    pictures and all interpretations of the paper's Table 1 (**interpretations.csv**) that were
+    tried. A whole earlier reproduction is replaced. It takes about a minute; Ctrl-C leaves no
+    incomplete file. The project's own page, docs/reproduction.md, is made by `rps-pin reproduce
+    -o docs`.
 
     Exit status: 0 done; 1 an error; 2 wrong usage.
 
@@ -32,10 +33,9 @@ def reproduce_command(
     """
     from rps_pin.paper.compute import compute
     from rps_pin.paper.page import summary_lines
-    from rps_pin.paper.write import write
+    from rps_pin.paper.write import results, write
 
-    both = [output / "reproduction.md", output / "reproduction" / "interpretations.csv"]
-    check_outputs(both, overwrite, renewed=True)
+    check_outputs(results(output), overwrite, renewed=True)
     console = common.text_console()
 
     def track(items: Iterable[Any], task: str) -> Iterable[Any]:

@@ -16,7 +16,8 @@ from rps_pin.files import write_text
 def urdf_command(
     robot: RobotOption = "sokolov",
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File to write; default: standard output.")
+        Path | None,
+        typer.Option("--output", "-o", help="File to write; default, and -: standard output."),
     ] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
@@ -28,7 +29,7 @@ def urdf_command(
     Example: `rps-pin urdf --robot micro -o micro.urdf`
     """
     text = load_robot(robot).urdf
-    if output is None:
+    if output is None or str(output) == "-":
         typer.echo(text, nl=False)
         return
     check_outputs([output], overwrite)

@@ -18,6 +18,13 @@ from rps_pin.rps.robot import RPSRobot
 _DOTS_PER_INCH = 80
 
 
+#: Names of the pictures' files.
+NAMES = (
+    *(f"figure_{number}" for number in range(1, 10)),
+    *("approach", "probes", "interpretations", "table_2", "fit"),
+)
+
+
 def pictures(found: Reproduction) -> dict[str, Callable[[], Figure]]:
     """Return what draws each picture, by the name of its file."""
     micro = found.workspace.parameters
@@ -47,7 +54,7 @@ def write_figures(
     """Write every picture as PNG into a folder, each whole or not at all; return the files."""
     draw = pictures(found)
     files = []
-    for name in track(list(draw), "pictures"):
+    for name in track(NAMES, "pictures"):
         path = folder / f"{name}.png"
         with matplotlib.rc_context(STYLE), whole_file(path) as scratch:
             draw[name]().savefig(scratch, dpi=_DOTS_PER_INCH, metadata={"Software": None})

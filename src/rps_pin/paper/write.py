@@ -7,9 +7,16 @@ from pathlib import Path
 
 from rps_pin.files import write_text
 from rps_pin.paper.compute import Reproduction
-from rps_pin.paper.figures import write_figures
+from rps_pin.paper.figures import NAMES, write_figures
 from rps_pin.paper.page import render
 from rps_pin.paper.tables import interpretations_csv
+
+
+def results(folder: Path) -> list[Path]:
+    """Return the files that `write` writes, the page first."""
+    beside = folder / "reproduction"
+    pictures = [beside / f"{name}.png" for name in NAMES]
+    return [folder / "reproduction.md", *pictures, beside / "interpretations.csv"]
 
 
 def write(
@@ -35,10 +42,9 @@ def write(
     list of Path
         The files, the page first.
     """
-    page, beside = folder / "reproduction.md", folder / "reproduction"
-    beside.mkdir(parents=True, exist_ok=True)
-    pictures = write_figures(found, beside, track)
-    interpretations = beside / "interpretations.csv"
+    page, *_, interpretations = files = results(folder)
+    interpretations.parent.mkdir(parents=True, exist_ok=True)
+    write_figures(found, interpretations.parent, track)
     for path, text in ((interpretations, interpretations_csv(found)), (page, render(found))):
         write_text(path, text)
-    return [page, *pictures, interpretations]
+    return files
