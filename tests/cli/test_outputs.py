@@ -10,8 +10,8 @@ import threading
 from pathlib import Path
 
 import pytest
-from matplotlib.figure import Figure
 import typer.main
+from matplotlib.figure import Figure
 
 from rps_pin.cli.app import app, export
 from rps_pin.files import write_text
