@@ -10,7 +10,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+from rps_pin import SingularityError
 from rps_pin.codegen.build import tcc
 from tests.proofs import common
 from tests.reference import jets
@@ -111,6 +113,47 @@ def test_the_last_pose_leads_to_the_next_at_1_khz(name) -> None:
         found = one.to_task(robot.drives(jets.constant(x)).value, near=q)
         assert worst(found - x) < 1e-11
         q = one.configuration(found, near=q)
+
+
+def five_bar_with_its_arms_in_line() -> list[float]:
+    """The tip between elbows that are as far apart as the arms are long."""
+    left = 0.3 * np.array([np.cos(2.6), np.sin(2.6)])
+
+    def right(angle: float):
+        return np.array([0.4 + 0.28 * np.cos(angle), 0.28 * np.sin(angle)])
+
+    angle = brentq(lambda t: np.linalg.norm(right(t) - left) - (0.42 + 0.45), 0.0, 1.5)
+    return list(left + (right(angle) - left) * 0.42 / (0.42 + 0.45))
+
+
+def planar_rrr_with_its_forearms_in_one_point() -> list[float]:
+    """Turned about the centre until elbow, pin and centre are in line, by the law of cosines."""
+    far = 0.1 + 0.25
+    arm = np.arccos((far**2 - 0.3**2 - 0.2**2) / (2 * 0.3 * 0.2))
+    return [0.0, 0.0, np.arctan2(0.2 * np.sin(arm), 0.3 + 0.2 * np.cos(arm))]
+
+
+@pytest.mark.parametrize(
+    ("name", "pose", "before"),
+    [
+        # hexagons with three axes of symmetry, one turned by 90 degrees (Fichter, 1986)
+        ("stewart", [0, 0, 0.63, 0, 0, np.pi / 2], [0, 0, 0, 0, 0, -0.2]),
+        ("planar_rrr", planar_rrr_with_its_forearms_in_one_point(), [0, 0, -0.2]),
+        ("five_bar", five_bar_with_its_arms_in_line(), [0, 0.1]),
+    ],
+)
+def test_singularities_are_where_geometry_has_them(name, pose, before) -> None:
+    """`type_ii` is zero there and not before, and the determinant changes sign."""
+    one, pose, before = task(name), np.array(pose), np.array(before)
+    nearer = [one.configuration(pose + share * before) for share in (1.0, 1e-3, 0.0, -1e-3)]
+    found = one.singularities(nearer)
+    assert found.type_ii[0] > 0.05
+    assert 1e-6 < found.type_ii[1] < 0.01
+    assert found.type_ii[2] < 1e-12
+    assert np.sign(found.determinant[1]) == np.sign(found.determinant[0])
+    assert np.sign(found.determinant[3]) == -np.sign(found.determinant[1])
+    with pytest.raises(SingularityError, match="do not determine the task"):
+        one.forces_to_actuators(nearer[2], np.ones(one.size))
 
 
 @EACH
