@@ -5,11 +5,12 @@
 #   PYTHON       the interpreter .venv is made with (default: the first python3 that is 3.11 or newer)
 #   JOBS         parallel test processes (default 2)
 #   PYTEST_ARGS  more arguments for pytest
+#   MINUTES      length of `make fuzz` (default 60)
 #   NO_APT       set to 1 to never install Debian packages, not even when that needs no password
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-lowest docs bench wheel lint format setup setup-dev clean distclean
+.PHONY: help demo test test-lowest fuzz docs bench wheel lint format setup setup-dev clean distclean
 
 # A sourced ROS or openrobots environment must not put its own pinocchio before ours.
 unexport PYTHONPATH
@@ -20,6 +21,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 JOBS ?= 2
 PYTEST_ARGS ?=
+MINUTES ?= 60
 export JOBS PYTEST_ARGS PYTHON NO_APT
 
 help: ## list the targets
@@ -34,6 +36,9 @@ test: setup-dev ## lint, format check, types, documentation and all tests; insta
 
 test-lowest: ## the tests that use each dependency, with the lowest versions allowed (by uv)
 	@sh tools/check-lowest "$$PWD/build/lowest"
+
+fuzz: setup-dev ## hostile files, options and calls for MINUTES=60; findings go to build/fuzz
+	OPENBLAS_NUM_THREADS=1 .venv/bin/python -m tests.fuzz --minutes $(MINUTES)
 
 docs: setup-dev ## build the documentation into build/docs, warnings are errors
 	@sh tools/check docs

@@ -23,9 +23,8 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from rps_pin import bounds
 from rps_pin.bounds import FOR_MORE, most
-from rps_pin.contents import known_format, xml_root_tag
 from rps_pin.errors import InputError, MechanismError, did_you_mean, shown
-from rps_pin.files import opened
+from rps_pin.files import known_format, opened, xml_root_tag
 from rps_pin.validation import LARGEST
 
 #: YAML's numbers; longer ones than `LONGEST_NUMBER` are refused.

@@ -81,7 +81,7 @@ def whole_number(value: object, name: str, least: int = 1) -> int:
 
 def choice(value: object, name: str, options: Sequence[str]) -> str:
     """Return a value that is one of the options."""
-    if value not in options:
+    if not isinstance(value, str) or value not in options:
         listed = " or ".join(repr(option) for option in options)
         raise InputError(f"{name} = {shown(value)}: it must be {listed}")
     return str(value)
@@ -119,7 +119,7 @@ def real_vector(value: ArrayLike, size: int, name: str) -> Array:
         type(value) is np.ndarray  # no subclass: it may mean something else by its numbers
         and value.dtype is FLOAT64
         and value.shape == (size,)
-        and (not size or math.isfinite(dasum(value)))
+        and (not size or dasum(value) <= LARGEST)
     ):
         return value
     array = numbers(value, name, f"{size} numbers")
@@ -171,18 +171,17 @@ def fixed_array(
     ):
         raise InputError(f"{name} has shape {array.shape}; it must be {wanted}")
     refuse_not_finite(array, name)
-    if (np.abs(array) > LARGEST).any():
-        raise InputError(f"{name} = {shown(value)}: no entry may be beyond {LARGEST}")
     return read_only(array)
 
 
 def refuse_not_finite(array: Array, name: str) -> None:
-    """Raise `InputError` at the first entry that is not finite."""
-    finite = np.isfinite(array)
-    if not finite.all():
-        where = tuple(int(i) for i in np.argwhere(~finite)[0])
+    """Raise `InputError` at the first entry that is not finite, or beyond `LARGEST`."""
+    good = np.abs(array) <= LARGEST
+    if not good.all():
+        where = tuple(int(i) for i in np.argwhere(~good)[0])
         entry = f"entry {where[0] if len(where) == 1 else where} is " if where else "it is "
-        raise InputError(f"{name} is not finite: {entry}{array[where]}")
+        what = f"beyond {LARGEST:g}" if np.isfinite(array[where]) else "not finite"
+        raise InputError(f"{name} is {what}: {entry}{array[where]}")
 
 
 def one_shape(**arrays: Array) -> tuple[Array, ...]:

@@ -23,6 +23,7 @@ from rps_pin.closed_loop.freedoms import NAMED, Freedom, freedoms, of_actuators
 from rps_pin.closed_loop.regular import actuated_rank, regular_near
 from rps_pin.errors import few
 from rps_pin.numerics.linear_algebra import rank, singular_values
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.plain_text import plain
 
 _JOINT_KINDS = {
@@ -88,6 +89,7 @@ class ClosureDescription(NamedTuple):
         return f"{first} = {' + '.join(others) or 'fixed'}"
 
 
+@refuses_other_kinds
 @dataclass(frozen=True, eq=False)
 class MechanismDescription:
     """Result of `ClosedLoopModel.describe`; ``str()`` of it is a table.

@@ -54,6 +54,7 @@ from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.closed_loop.summary import in_lines, in_one_line
 from rps_pin.errors import ClosureError, CompileError, MechanismError, warn_caller
 from rps_pin.one_thread import one_thread, refuse_second_thread
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import choice, non_negative_number, real_vector, whole_number
 
 _REFERENCES = {
@@ -62,6 +63,7 @@ _REFERENCES = {
 }
 
 
+@partial(refuses_other_kinds, besides=("inverse_dynamics", "forward_dynamics"))
 @one_thread("system.guard", besides=("inverse_dynamics", "forward_dynamics"), properties=("home",))
 class ClosedLoopModel:
     """Any mechanism: an open tree whose loops are closed by Pinocchio constraint models.

@@ -18,9 +18,8 @@ from rps_pin.closed_loop.io.urdf.packages import file_of
 from rps_pin.closed_loop.io.urdf.tree import urdf_file
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.config import read_yaml
-from rps_pin.contents import known_format
 from rps_pin.errors import InputError, few, warn_caller
-from rps_pin.files import opened
+from rps_pin.files import known_format, opened
 
 PackagePath = Sequence[str | os.PathLike[str]]
 

@@ -20,6 +20,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from rps_pin.arrays import Array, ComplexArray
 from rps_pin.control.axis_loop import AxisLoop, axis_loop
+from rps_pin.other_kinds import refuses_other_kinds
 
 
 class LoopMargins(NamedTuple):
@@ -53,6 +54,7 @@ class LoopMargins(NamedTuple):
         )
 
 
+@refuses_other_kinds
 def loop_margins(
     proportional: float,
     derivative: float,

@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.paper.lagrange_terms import lagrange_terms
 from rps_pin.rps.kinematics.legs import leg_motion
 from rps_pin.rps.kinematics.pose import checked_motion
@@ -53,6 +54,7 @@ class LagrangeDynamics(NamedTuple):
     """A = df/dx, shape (..., 3, 6), m and m^2."""
 
 
+@refuses_other_kinds
 @maskable(pose=1, rate=1, acceleration=1)
 def lagrange_forces(
     parameters: RPSParameters,

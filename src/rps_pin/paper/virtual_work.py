@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics import rates
 from rps_pin.rps.kinematics.legs import RADIAL
 from rps_pin.rps.kinematics.pose import checked_motion, platform_motion
@@ -52,6 +53,7 @@ class PoseForces(NamedTuple):
         return self.platform + self.cylinders + self.rods
 
 
+@refuses_other_kinds
 @maskable(pose=1, rate=1, acceleration=1)
 def virtual_work_forces(
     parameters: RPSParameters,

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.pose import position
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import parameters_of, workspace
@@ -51,6 +52,7 @@ class PaperComparison(NamedTuple):
     singularity."""
 
 
+@refuses_other_kinds
 def paper_comparison(
     parameters: RPSParameters | None = None,
     base_radii: Sequence[float] = (0.120, 0.150, 0.180, 0.210, 0.240),

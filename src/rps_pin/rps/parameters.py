@@ -19,7 +19,8 @@ from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED
 from rps_pin.config import Finite, NonNegative, Positive, first_problem, read_yaml
 from rps_pin.errors import InputError, ParameterError, did_you_mean
 from rps_pin.files import whole_file
-from rps_pin.validation import fixed_array, inertia_fault, read_only
+from rps_pin.other_kinds import refuses_other_kinds
+from rps_pin.validation import LARGEST, fixed_array, inertia_fault, read_only
 
 #: A printed table rounds its inertias (the paper's Table 1 by 0.5 %): this much of the largest
 #: principal moment may be missing from the triangle inequality.
@@ -44,7 +45,16 @@ def _array(*shape: int) -> pydantic.BeforeValidator:
 _ToList = pydantic.PlainSerializer(lambda array: array.tolist(), return_type=list)
 Vector3 = Annotated[np.ndarray, _array(3), _ToList]
 Matrix3 = Annotated[np.ndarray, _array(3, 3), _ToList]
-Bound = Annotated[float, Field(gt=0)]  # infinity means: no bound
+
+
+def _bounded(limit: float) -> float:
+    """Return a limit that is infinite or at most `LARGEST`."""
+    if not (math.isinf(limit) or abs(limit) <= LARGEST):
+        raise ValueError(f"it must be infinite (no limit) or at most {LARGEST:g}")
+    return limit
+
+
+Bound = Annotated[float, Field(gt=0), pydantic.AfterValidator(_bounded)]  # infinity means: no bound
 Angle = Annotated[float, Field(ge=-math.pi, le=math.pi, allow_inf_nan=False)]
 
 
@@ -168,6 +178,7 @@ class RPSParameters(pydantic.BaseModel):
         lower, upper = limits
         if math.isnan(lower) or math.isnan(upper):
             raise ValueError("must not be NaN")
+        _bounded(lower), _bounded(upper)
         if not lower < upper:
             raise ValueError("the lower limit must be below the upper one")
         if info.field_name == "leg_length_limits" and lower < 0:
@@ -238,6 +249,7 @@ class RPSParameters(pydantic.BaseModel):
         return tuple(sorted(path.stem for path in _PRESETS.glob("*.yaml")))
 
     @classmethod
+    @refuses_other_kinds
     def from_preset(cls, name: str) -> RPSParameters:
         """Return a preset by name: ``"sokolov"`` (the paper's Table 1) or ``"micro"``.
 
@@ -251,6 +263,7 @@ class RPSParameters(pydantic.BaseModel):
         return cls.from_yaml(_PRESETS / f"{name}.yaml")
 
     @classmethod
+    @refuses_other_kinds
     def from_yaml(cls, path: str | os.PathLike[str]) -> RPSParameters:
         """Read parameters from a YAML file: one ``field: value`` a line, SI units.
 
@@ -268,6 +281,7 @@ class RPSParameters(pydantic.BaseModel):
             place = file.place([error.field] if error.field in file.values else [])
             raise ParameterError(error.field, error.value, error.rule, place) from None
 
+    @refuses_other_kinds
     def to_yaml(self, path: str | os.PathLike[str]) -> None:
         """Write the parameters to a YAML file, each with its meaning and unit as a comment."""
         document = CommentedMap(self.model_dump())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel, InverseDynamics, LoopClosure
 from rps_pin.closed_loop.io.urdf import model_from_urdf
 from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.actuator_forces import actuator_forces
 from rps_pin.rps.dynamics.force_equations import ForceTerms
 from rps_pin.rps.dynamics.friction import friction_effects
@@ -31,7 +32,14 @@ from rps_pin.rps.task import RPSTask
 from rps_pin.rps.urdf import LEGS, ball_frames, build_urdf
 from rps_pin.validation import whole_number
 
+#: Calls of microseconds where code is generated.
+_FAST = (
+    *("actuator_forces", "inverse_dynamics", "inverse_kinematics", "forward_kinematics"),
+    *("platform_placement", "motion", "state"),
+)
 
+
+@partial(refuses_other_kinds, besides=_FAST)
 class RPSRobot:
     """A 3-RPS parallel robot.
 

@@ -22,6 +22,7 @@ from lxml import etree
 from yourdfpy import Box, Cylinder, Sphere
 
 from rps_pin.arrays import Array
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 
 LEGS = (1, 2, 3)
@@ -56,6 +57,7 @@ def ball_frames(leg: int) -> tuple[str, str]:
     return f"platform_ball_{leg}", f"leg_{leg}_ball"
 
 
+@refuses_other_kinds
 def build_urdf(parameters: RPSParameters) -> str:
     """Return the URDF of the robot as XML text.
 

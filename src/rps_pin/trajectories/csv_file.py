@@ -28,6 +28,7 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 from rps_pin.files import opened
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.csv_columns import OF_RPS, Columns, HasCoordinates, is_number
 from rps_pin.trajectories.derivative_check import disagreement
 from rps_pin.trajectories.sampled_path import FEWEST_POSES, Ends, SampledPath
@@ -45,6 +46,7 @@ _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 _POINT = "; numbers are written with a point, 0.5 and not 0,5"
 
 
+@refuses_other_kinds
 def read_csv(
     path: str | os.PathLike[str],
     task: HasCoordinates | None = None,
@@ -221,7 +223,7 @@ def _row(line: str, delimiter: str, names: Sequence[str]) -> list[float]:
         found = [float(cell) for cell in cells]
     except ValueError:
         found = [math.nan]
-    if "_" in line or not all(map(math.isfinite, found)):  # float("1_0") is 10
+    if "_" in line or not (line.isascii() and all(map(math.isfinite, found))):  # float("1_0") is 10
         raise InputError(next(filter(None, map(_fault, names, cells))))
     return found
 

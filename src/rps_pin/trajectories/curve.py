@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.path import PathSample, checked_times
 
 
@@ -63,6 +64,7 @@ class TimeLaw(Protocol):
         ...
 
 
+@refuses_other_kinds
 class TimedCurve:
     """A trajectory made of a curve and a law of time.
 

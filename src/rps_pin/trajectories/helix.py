@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
 from rps_pin.trajectories.path import checked_parameters
 from rps_pin.trajectories.piecewise_law import PiecewiseLaw
@@ -46,6 +47,7 @@ class _Robot(Protocol):
     def parameters(self) -> _HasParameters: ...
 
 
+@refuses_other_kinds
 class HelixCurve:
     """The helix without a time: u is phi, from 0 to 2 pi.
 
@@ -86,6 +88,7 @@ class HelixCurve:
         )
 
 
+@refuses_other_kinds
 class HelixPath(TimedCurve):
     """A helix of the platform's centre: a `HelixCurve` and Eq. 29, corrected, scaled in time.
 
@@ -140,6 +143,7 @@ class HelixPath(TimedCurve):
         return self.law.at(t)
 
 
+@refuses_other_kinds
 def helix(
     robot: _Robot,
     *,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import fixed_array, numbers
 
 POSE = "coordinates, as z, tilt_x, tilt_y"
@@ -45,6 +46,7 @@ class Trajectory(Protocol):
 _AT_REST = 1e-9
 
 
+@refuses_other_kinds
 def end_states(trajectory: Trajectory) -> tuple[str, str]:
     """Return how a trajectory starts and how it ends, for reports.
 

@@ -9,12 +9,14 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
 from rps_pin.trajectories.path import POSE, checked_parameters
 from rps_pin.trajectories.time_laws import Profile, time_law
 from rps_pin.validation import fixed_array, numbers
 
 
+@refuses_other_kinds
 class LineCurve:
     """The straight line between two poses, u from 0 to 1.
 
@@ -43,6 +45,7 @@ class LineCurve:
         return CurveSample(pose, slope, np.zeros_like(pose))
 
 
+@refuses_other_kinds
 def point_to_point(
     start: ArrayLike,
     end: ArrayLike,

@@ -29,6 +29,7 @@ from scipy.interpolate import BPoly, BSpline, make_interp_spline
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories import path
 from rps_pin.trajectories.path import POSE, PathSample
 from rps_pin.trajectories.resampled import ResampledCurve
@@ -43,6 +44,7 @@ FEWEST_POSES = 6
 _MET = 1e-9
 
 
+@refuses_other_kinds
 class SampledPath:
     """A trajectory through samples.
 

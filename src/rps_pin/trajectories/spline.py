@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
 from rps_pin.trajectories.path import Trajectory, checked_parameters, checked_poses, length_scale
 from rps_pin.trajectories.resampled import TILT_SCALE
@@ -25,6 +26,7 @@ from rps_pin.trajectories.time_laws import Profile, time_law
 from rps_pin.validation import positive_number
 
 
+@refuses_other_kinds
 class ChordSpline:
     """The natural cubic spline through poses, over the length of the chords between them.
 
@@ -80,6 +82,7 @@ class ChordSpline:
         return CurveSample(*(np.asarray(self._spline(along, order)) for order in range(3)))
 
 
+@refuses_other_kinds
 class TimedSpline(SampledPath):
     """The quintic spline through poses at given times, at rest at both ends: see `SampledPath`."""
 
@@ -87,6 +90,7 @@ class TimedSpline(SampledPath):
         super().__init__(times, poses, ends="at rest")
 
 
+@refuses_other_kinds
 def spline(
     poses: ArrayLike,
     times: ArrayLike | None = None,

@@ -14,12 +14,14 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.curve import CurveSample, TimedCurve
 from rps_pin.trajectories.path import POSE, checked_parameters
 from rps_pin.trajectories.time_laws import Profile, time_law
 from rps_pin.validation import finite_number, fixed_array, positive_number, whole_number
 
 
+@refuses_other_kinds
 class HarmonicCurve:
     """Harmonic coordinates: x_i(u) = middle_i + size_i sin(frequency_i u + phase_i).
 
@@ -68,6 +70,7 @@ class HarmonicCurve:
         )
 
 
+@refuses_other_kinds
 def circle(
     *,
     height: float,
@@ -111,6 +114,7 @@ def circle(
     )
 
 
+@refuses_other_kinds
 def lissajous(
     *,
     height: float,

@@ -18,6 +18,7 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.curve import LawSample, TimeLaw
 from rps_pin.trajectories.path import checked_times
 from rps_pin.trajectories.piecewise_law import PiecewiseLaw
@@ -32,6 +33,7 @@ _QUINTIC_PEAKS = (15 / 8, 10 / sqrt(3), 60.0)
 RAMP = 0.25
 
 
+@refuses_other_kinds
 class QuinticLaw:
     """u = D (10 s^3 - 15 s^4 + 6 s^5), s = t / T: speed and acceleration vanish at both ends.
 
@@ -82,6 +84,7 @@ class QuinticLaw:
         )
 
 
+@refuses_other_kinds
 class TrapezoidalLaw(PiecewiseLaw):
     """Trapezoidal speed: acceleration, constant speed, and a deceleration as long.
 
@@ -129,6 +132,7 @@ class TrapezoidalLaw(PiecewiseLaw):
         return cls(D, duration, ramp=min(v / a / duration, 0.5))
 
 
+@refuses_other_kinds
 class SCurveLaw(PiecewiseLaw):
     """An S-curve: up to seven pieces of constant jerk.
 

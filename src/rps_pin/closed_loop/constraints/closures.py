@@ -39,6 +39,7 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.couplings import JointCoupling
 from rps_pin.errors import InputError, MechanismError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import numbers, real
 
 __all__ = [
@@ -90,6 +91,7 @@ class ClosedFrame:
         return data.oMi[self.joint] * self.placement
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class LoopClosure:
     """Two frames of a tree, by name, that a joint without coordinates connects.

@@ -20,8 +20,10 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array
 from rps_pin.errors import MechanismError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class JointCoupling:
     """A joint whose coordinate follows from those of others.

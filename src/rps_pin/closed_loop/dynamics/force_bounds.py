@@ -16,9 +16,11 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import real_vector
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class ForceBound:
     """Limits on one component of a closure's force: lower <= direction . force <= upper.
@@ -86,6 +88,7 @@ class ForceBound:
         return full
 
 
+@refuses_other_kinds
 def friction_pyramid(
     closure: str,
     friction: float,

@@ -33,10 +33,11 @@ from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.dynamics.force_bounds import ForceBound
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.model import ClosedLoopModel
-from rps_pin.errors import InfeasibleError, InputError, LimitExcess
+from rps_pin.errors import InfeasibleError, InputError, LimitExcess, shown
 from rps_pin.numerics.linear_algebra import Decomposition
 from rps_pin.numerics.quadratic_program import LeastDistance, NearestPoint, least_violation
 from rps_pin.one_thread import one_thread
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import numbers, real_vector
 
 TorqueLimits = Literal["model"] | float | ArrayLike | tuple[ArrayLike, ArrayLike] | None
@@ -64,6 +65,7 @@ class DistributedForces(NamedTuple):
     """Of ProxQP; 0 where it was not needed."""
 
 
+@refuses_other_kinds
 @one_thread("mechanism.system.guard")
 class ForceDistribution:
     """Finds the forces of least effort within limits, at one state after another.
@@ -117,6 +119,9 @@ class ForceDistribution:
         self._largest_lever = float(self._levers.max())
         self.lower, self.upper = self._torque_limits(torque_limits)
         self.bounds: Sequence[ForceBound] = tuple(bounds)
+        for bound in self.bounds:
+            if not isinstance(bound, ForceBound):
+                raise InputError(f"bounds: {shown(bound)} is not a ForceBound")
         # Each bound's direction over all rows; and times the scaled multipliers.
         self._directions = np.zeros((len(self.bounds), mechanism.constraint_size))
         for direction, bound in zip(self._directions, self.bounds, strict=True):

@@ -92,7 +92,7 @@ def reduced_acceleration(
     """
     q, v = state
     force, resisting = -pin.rnea(system.model, system.data, q, v, a_0), None
-    if system.effects is not None or wrenches:
+    if system.effects is not None or wrenches is not None:
         resisting = resisting_force(system, q, v, wrenches)
         force -= resisting
     force[system.actuated] += tau

@@ -17,7 +17,7 @@ def required_force(
 ) -> Array:
     """Return rnea(q, v, a) + passive joint forces - external forces, shape (nv,)."""
     force: Array = pin.rnea(system.model, system.data, q, v, a).copy()
-    if system.effects is not None or wrenches:
+    if system.effects is not None or wrenches is not None:
         pin.computeJointJacobians(system.model, system.data, q)
         force += resisting_force(system, q, v, wrenches)
     return force

@@ -163,7 +163,7 @@ def inverse_dynamics(
     if closed and equations.is_open(q):
         system.state(q, v, a)  # not finite?
         system.refuse_open(q)
-    if system.effects is not None or wrenches:
+    if system.effects is not None or wrenches is not None:
         force = force + resisting_force(system, q, v, wrenches)
 
     if system.completion is not None:

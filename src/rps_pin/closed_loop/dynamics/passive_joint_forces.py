@@ -23,6 +23,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import joint_id
 from rps_pin.errors import InputError, MechanismError, shown
 from rps_pin.numerics.elementary import Number, tanh
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import numbers, positive_number, read_only, real_vector
 
 #: rad/s or m/s.
@@ -44,6 +45,7 @@ def friction_slope(
     return damping + friction / friction_speed * (1.0 - share * share)
 
 
+@refuses_other_kinds
 @dataclass(frozen=True, eq=False)
 class JointEffects:
     """Damping, friction and springs of a model's joints; see the module's text.

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from rps_pin.closed_loop.constraints.closures import frame_id
 from rps_pin.closed_loop.editing.rebuild import copy_joint_properties
 from rps_pin.errors import InputError, MechanismError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import fixed_array, inertia_fault, positive_number, real_vector
 
 #: Between a part's name and its own names.
@@ -24,6 +25,7 @@ SEPARATOR = "/"
 FREE_JOINT = "root_joint"
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class Part:
     """An open tree, and the placement of its world in the whole.
@@ -44,6 +46,7 @@ class Part:
     parent: str = "universe"
 
 
+@refuses_other_kinds
 def compose(parts: Mapping[str, Part], *, name: str = "") -> pin.Model:
     """Return one model of several trees.
 
@@ -86,6 +89,7 @@ def compose(parts: Mapping[str, Part], *, name: str = "") -> pin.Model:
     return whole
 
 
+@refuses_other_kinds
 def body(
     name: str,
     mass: float,

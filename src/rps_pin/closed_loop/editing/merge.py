@@ -26,6 +26,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import joint_id
 from rps_pin.closed_loop.editing.rebuild import JointRow, NewJoint, rebuilt
 from rps_pin.errors import MechanismError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import real_vector
 
 MergedKind = Literal["spherical", "universal"]
@@ -41,6 +42,7 @@ _PERPENDICULAR = 1e-6
 _PARALLEL = 1e-3
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class JointMerge:
     """Revolute joints in a row, named from the base outwards, and the joint they become.
@@ -79,6 +81,7 @@ class JointMerge:
             raise MechanismError(f"a merged joint cannot be called {self.name!r}")
 
 
+@refuses_other_kinds
 def merged(model: pin.Model, merges: Sequence[JointMerge]) -> pin.Model:
     """Return a model in which rows of revolute joints are single joints.
 

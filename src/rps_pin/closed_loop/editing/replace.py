@@ -26,6 +26,7 @@ from rps_pin.closed_loop.editing.rebuild import (
     rebuilt,
 )
 from rps_pin.errors import MechanismError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import real_vector
 
 #: A kind by name, or any of Pinocchio's joint models.
@@ -58,6 +59,7 @@ JOINT_KINDS = (FIXED, *_OF_ONE_AXIS, *_KINDS)
 _ROTOR = ("armature", "rotorInertia")
 
 
+@refuses_other_kinds
 def replace_joints(model: pin.Model, kinds: Mapping[str, JointKind]) -> pin.Model:
     """Return a model in which some joints are of another type.
 

@@ -15,9 +15,8 @@ from lxml import etree
 
 from rps_pin import bounds
 from rps_pin.bounds import FOR_MORE, most
-from rps_pin.contents import known_format
 from rps_pin.errors import InputError, MechanismError
-from rps_pin.files import opened
+from rps_pin.files import known_format, opened
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),

@@ -95,7 +95,7 @@ def stiff_damping(
 ) -> Damping | None:
     """Return the damping at a state if it is stiff for a step; see `damping_at`."""
     damping = damping_at(system, q, v, basis)
-    if damping is None:
+    if damping is None or not damping.mass.size:
         return None
     _, solved, failed = dposv(damping.mass, damping.damping)  # the sum of the rates is cheaper
     if failed or step * float(np.trace(solved)) <= STIFF:

@@ -14,6 +14,7 @@ from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.assembly.joint_limits import JointLimits
 from rps_pin.closed_loop.column_names import column_names
 from rps_pin.files import whole_file
+from rps_pin.other_kinds import refuses_other_kinds
 
 #: Arrays of a `Simulation` with a row for each time, in the order of a table.
 _ARRAYS = ("time", "q", "v", "a", "tau", "kinetic", "potential", "gap", "work")
@@ -40,6 +41,7 @@ class JointLimitPassed(NamedTuple):
         )
 
 
+@refuses_other_kinds
 @dataclass(frozen=True, eq=False)
 class Simulation:
     """A simulated motion; n recorded times.

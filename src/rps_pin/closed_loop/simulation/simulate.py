@@ -33,12 +33,14 @@ from rps_pin.closed_loop.simulation.motion import (
 )
 from rps_pin.closed_loop.simulation.result import Recorder, Simulation
 from rps_pin.errors import RPSPinError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import choice, positive_number
 
 #: How often `progress` is called, about.
 _PROGRESS_CALLS = 200
 
 
+@refuses_other_kinds
 def simulate(
     mechanism: Mechanism,
     q: ArrayLike,

@@ -11,9 +11,11 @@ from rps_pin.closed_loop.simulation.fixed_step import fixed_step
 from rps_pin.closed_loop.simulation.motion import Drive, Motion, WrenchesInTime, closed_start
 from rps_pin.copies import DeepCopied
 from rps_pin.one_thread import one_thread
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import positive_number, real_vector, whole_number
 
 
+@refuses_other_kinds
 @one_thread("_system.guard")
 class Stepper(DeepCopied):
     """Simulation with fixed steps and projection, as `simulate` does it, one call at a time.

@@ -22,6 +22,7 @@ from rps_pin.control.estimator.leg_geometry import LegGeometry, leg_geometry
 from rps_pin.control.estimator.leg_jacobian import leg_jacobian
 from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.errors import SingularityError, UnreachableError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import choice, real_vector
 
@@ -67,6 +68,7 @@ class TaskSpaceInertia:
         return reduced + reduced.T
 
 
+@refuses_other_kinds
 def effective_inertia(robot: RPSRobot, pose: ArrayLike, *, space: str = "actuator") -> Array:
     """Return the inertia of each error of a control law in a pose, shape (3,).
 

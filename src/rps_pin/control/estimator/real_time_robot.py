@@ -33,6 +33,7 @@ from rps_pin.control.loop.limits import RobotLimits
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.copies import DeepCopied
 from rps_pin.one_thread import TickGuard, guarded, one_thread
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.forward_kinematics import CONDITION_LIMIT, start_of
 from rps_pin.rps.kinematics.tracking import LegDirections, Triple, follow
 from rps_pin.rps.robot import RPSRobot
@@ -114,6 +115,7 @@ class RealTimeRobot(DeepCopied):
         If there is no generated code, with ``compiled=True``.
     """
 
+    @refuses_other_kinds
     def __init__(
         self,
         robot: RPSRobot,
@@ -230,6 +232,7 @@ class RealTimeRobot(DeepCopied):
             "rate": rate,
         }
 
+    @refuses_other_kinds
     def take(self, memory: dict[str, Any]) -> None:
         """Set the state from generated code's memory."""
         d, speed = memory["length"], memory["speed"]

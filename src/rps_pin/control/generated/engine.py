@@ -46,7 +46,8 @@ def generated_tick(
     CompileError
         If there is none and it must be.
     """
-    if isinstance(compiled, str | bool) and compiled not in ("auto", True, False):
+    words = isinstance(compiled, str | bool) and compiled in ("auto", True, False)
+    if not (words or hasattr(compiled, "address")):
         raise InputError(f'compiled = {shown(compiled)}: it must be "auto", True or False')
     if compiled is False:
         return None, "interpreted, as asked for"

@@ -50,6 +50,7 @@ from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.one_thread import guarded, one_thread
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import choice, numbers, positive_number, real, whole_number
@@ -131,6 +132,7 @@ class Controller(DeepCopied, ABC):
 
     _default_space: Space = "actuator"
 
+    @refuses_other_kinds
     def __init__(
         self,
         robot: RPSRobot,

@@ -14,10 +14,12 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.validation import positive_number, read_only, real_array
 
 
+@refuses_other_kinds
 @dataclass(frozen=True, eq=False)
 class Gains:
     """Gains, one number for all three errors or three numbers each.
@@ -82,6 +84,8 @@ class Gains:
             Shape () or (3,), kg (or kg m^2 for tilts); see `effective_inertia`.
         """
         factor = real_array(inertia, "inertia")
+        if factor.shape not in ((), (3,)):
+            raise InputError(f"inertia has shape {factor.shape}; it must be () or (3,)")
         return Gains(self.proportional * factor, self.derivative * factor, self.integral * factor)
 
     @property

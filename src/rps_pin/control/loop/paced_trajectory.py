@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.path import PathSample, Trajectory
 from rps_pin.validation import non_negative_number, positive_number
 
 
+@refuses_other_kinds
 class PacedTrajectory:
     """The targets of a control loop, one per tick.
 

@@ -32,6 +32,7 @@ from rps_pin.control.laws import Compensation, pd_control
 from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.gains import Gains
 from rps_pin.control.loop.setpoints import Setpoint
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import choice
@@ -55,6 +56,7 @@ class PDControl(Controller):
         As for `Controller`.
     """
 
+    @refuses_other_kinds
     def __init__(
         self,
         robot: RPSRobot,

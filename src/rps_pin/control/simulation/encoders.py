@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rps_pin.arrays import Array
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import non_negative_number, whole_number
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class Encoders:
     """Readings of lengths d: round((d + noise) / resolution) resolution.

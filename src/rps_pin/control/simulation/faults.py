@@ -12,6 +12,7 @@ import numpy as np
 from rps_pin import validation
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 
 Kind = Literal["lost", "nan", "jump", "stuck", "target", "target_nan"]
 _LEG_KINDS = ("nan", "jump", "stuck")
@@ -19,6 +20,7 @@ _LEG_KINDS = ("nan", "jump", "stuck")
 _ROUNDING = 1e-9
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class Fault:
     """One fault.

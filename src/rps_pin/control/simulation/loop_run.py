@@ -18,6 +18,7 @@ from rps_pin.control.simulation.faults import Fault, Faults
 from rps_pin.control.simulation.plant import Plant
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.trajectories.path import PathSample, Trajectory
 from rps_pin.validation import choice, positive_number
@@ -100,6 +101,7 @@ class LoopRun:
         return self.type_ii
 
 
+@refuses_other_kinds
 def run_loop(
     controller: Controller,
     plant: Plant,
@@ -234,6 +236,7 @@ class _Record:
 COLUMNS = 24
 
 
+@refuses_other_kinds
 def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
     """Write a run as CSV, one row per tick, with units in the header.
 

@@ -12,6 +12,7 @@ from rps_pin.arrays import Array
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.control.simulation.loop_run import LoopRun
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.legs import leg_angles_and_lengths, tips
 from rps_pin.rps.kinematics.pose import position, rotation
 
@@ -50,6 +51,7 @@ class TrackingErrors:
         return cls(run.configuration[:, 6:9] - centre, angle, run.length - length)
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class LoopSummary:
     """Figures of a run over a window of time. SI units, but errors in um and urad.

@@ -22,6 +22,7 @@ from rps_pin.control.simulation.encoders import Encoders
 from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, shown
 from rps_pin.one_thread import one_thread
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.pose import platform_pose
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number, real_vector, whole_number
@@ -65,6 +66,7 @@ class Plant(DeepCopied):
         If a leg has no length in the pose.
     """
 
+    @refuses_other_kinds
     def __init__(
         self,
         robot: RPSRobot,

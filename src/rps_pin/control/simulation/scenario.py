@@ -32,6 +32,7 @@ from rps_pin.control.simulation.plant import Plant
 from rps_pin.control.simulation.scenario_schema import Machine, ScenarioEntry
 from rps_pin.control.simulation.wrong_parameters import wrong_parameters
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.motion.trajectory_file import described_trajectory, load_trajectory
 from rps_pin.rps.robot import RPSRobot
@@ -126,6 +127,7 @@ class Scenario:
         return loop_margins(kp, kd, ki, period=period, delay=delay, cut_off=cut_off)
 
 
+@refuses_other_kinds
 def load_scenario(path: str | os.PathLike[str]) -> Scenario:
     """Read a scenario; file names in it are relative to its folder.
 

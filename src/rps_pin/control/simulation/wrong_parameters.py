@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.validation import positive_number
 
@@ -12,6 +13,7 @@ _FRICTION = (
 )
 
 
+@refuses_other_kinds
 def wrong_parameters(
     parameters: RPSParameters,
     *,

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.actuator_forces import ForceShare, forces_of
 from rps_pin.rps.dynamics.force_equations import ForceTerms, inertia_entries, vector_entries
 from rps_pin.rps.dynamics.friction import FRICTION, has_friction
@@ -60,6 +61,7 @@ class ForceCauses:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
+@refuses_other_kinds
 @maskable("legs", pose=1, rate=1, acceleration=1, wrench=1)
 def force_causes(
     robot: RPSRobot,

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.force_equations import platform_wrench
 from rps_pin.rps.dynamics.loads import checked_wrench
 from rps_pin.rps.kernels import platform
@@ -91,6 +92,7 @@ class JointReactions(NamedTuple):
         )
 
 
+@refuses_other_kinds
 @maskable(pose=1, rate=1, acceleration=1, wrench=1)
 def joint_reactions(
     robot: RPSRobot,

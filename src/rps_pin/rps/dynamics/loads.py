@@ -17,9 +17,11 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, ParameterError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import finite_number, fixed_array, inertia_fault, real_array
 
 
+@refuses_other_kinds
 @dataclass(frozen=True, eq=False)
 class Payload:
     """A rigid body fixed to the platform.

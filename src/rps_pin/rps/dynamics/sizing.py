@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, SingularityError, UnreachableError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.motion_run import crossed_singularity, sample_times, singular_sample
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, ActuatorSizing, Margin, SizingSheet
 from rps_pin.rps.robot import RPSRobot
@@ -22,6 +23,7 @@ from rps_pin.trajectories.path import Trajectory
 from rps_pin.validation import real, real_array
 
 
+@refuses_other_kinds
 def size_trajectory(
     robot: RPSRobot,
     trajectory: Trajectory,
@@ -61,6 +63,7 @@ def size_trajectory(
     return size_motion(robot, time, *motion, limits=limits, wrench=wrench, threshold=threshold)
 
 
+@refuses_other_kinds
 def size_motion(
     robot: RPSRobot,
     time: ArrayLike,

@@ -17,9 +17,11 @@ from rich.text import Text
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class ActuatorLimits:
     """Limits of one actuator; infinity where there is no limit."""
@@ -112,6 +114,7 @@ class ActuatorSizing:
         return self.length_max - self.length_min
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class SizingSheet:
     """A motion's demands on the three actuators; n samples."""

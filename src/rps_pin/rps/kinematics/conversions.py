@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.pose import checked_motion, checked_pose, platform_motion
 from rps_pin.rps.kinematics.samples import Errors, maskable
@@ -65,6 +66,7 @@ class ParasiticMotion(NamedTuple):
 # The paper's angles -------------------------------------------------------------------------------
 
 
+@refuses_other_kinds
 def pose_from_angles(z: ArrayLike, alpha: ArrayLike, beta: ArrayLike) -> Array:
     """Return the pose (..., 3) of the paper's height (m), alpha and beta (rad; Z-Y-Z, Eq. 5).
 
@@ -79,6 +81,7 @@ def pose_from_angles(z: ArrayLike, alpha: ArrayLike, beta: ArrayLike) -> Array:
     return np.stack([height, -b * np.sin(a), b * np.cos(a)], axis=-1)
 
 
+@refuses_other_kinds
 def angles_from_pose(pose: ArrayLike) -> PaperAngles:
     """Return the paper's p_z, alpha and beta of a pose (..., 3); the inverse of `pose_from_angles`.
 
@@ -98,6 +101,7 @@ def angles_from_pose(pose: ArrayLike) -> PaperAngles:
 # The centre ---------------------------------------------------------------------------------------
 
 
+@refuses_other_kinds
 @maskable(position=1, branch=0)
 def pose_from_position(
     position: ArrayLike,
@@ -151,6 +155,7 @@ def pose_from_position(
     return np.where((signs == "+")[..., None], both[..., 0, :], both[..., 1, :])
 
 
+@refuses_other_kinds
 def position_from_pose(pose: ArrayLike, platform_radius: float) -> Centre:
     """Return the platform's centre, Eq. 4, and the branch of a pose (..., 3).
 
@@ -171,6 +176,7 @@ def position_from_pose(pose: ArrayLike, platform_radius: float) -> Centre:
     )
 
 
+@refuses_other_kinds
 def parasitic_motion(
     pose: ArrayLike,
     platform_radius: float,

@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import ClosureError, SingularityError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kernels.continuation import follow_legs, newton_step
 from rps_pin.rps.kinematics import leg_equations as equations
 from rps_pin.rps.kinematics.assembly_modes import assembly_modes, longest_leg
@@ -166,6 +167,7 @@ def start_of(
     return pose, d, directions, condition
 
 
+@refuses_other_kinds
 class EncoderTracker:
     """Follows the platform from encoder readings, one call a tick, with the same guarantees.
 

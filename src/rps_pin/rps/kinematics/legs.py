@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array, Bools
-from rps_pin.errors import InputError, LimitViolation, UnreachableError
+from rps_pin.errors import InputError, LimitViolation, UnreachableError, shown
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips as ring
 from rps_pin.rps.kernels.limits import length_within, within
@@ -140,7 +140,11 @@ def legs_of_pose(pose: Array, base_radius: float, platform_radius: float) -> Pos
 
 def check_legs(legs: PoseLegs | None, pose: Array) -> None:
     """Raise `InputError` if legs are given and are not as many as the poses (..., 3)."""
-    if legs is not None and legs.geometry.length.shape != pose.shape:
+    if legs is None:
+        return
+    if not isinstance(legs, PoseLegs):
+        raise InputError(f"legs = {shown(legs)}: it must be what legs_of_pose returns")
+    if legs.geometry.length.shape != pose.shape:
         raise InputError(
             f"legs are those of poses of shape {legs.geometry.length.shape}; they must be those "
             f"of the poses given, of shape {pose.shape}"

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rps_pin.arrays import Array
 from rps_pin.errors import ClosureError, InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics import pose as poses
 from rps_pin.rps.kinematics.legs import tips
 from rps_pin.rps.kinematics.samples import Errors, maskable, refuse
@@ -17,6 +18,7 @@ from rps_pin.validation import positive_number, real_array
 _ORTHONORMAL = 1e-6
 
 
+@refuses_other_kinds
 @maskable(position=1, rotation=2)
 def constraint_residuals(
     position: ArrayLike, rotation: ArrayLike, platform_radius: float, *, errors: Errors = "raise"
@@ -48,6 +50,7 @@ def constraint_residuals(
     )
 
 
+@refuses_other_kinds
 @maskable(position=1, rotation=2)
 def pose_from_placement(
     position: ArrayLike,

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop.constraints.system import MAX_CONDITION
 from rps_pin.errors import InputError, SingularityError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips as ring
 from rps_pin.rps.kinematics import pose as poses
@@ -152,6 +153,7 @@ def tip_jacobian_rates(
     return _by_pose(slope_rates, parameters.platform_radius, by_z=0.0)
 
 
+@refuses_other_kinds
 @maskable(pose=1)
 def leg_jacobians(
     parameters: RPSParameters, pose: ArrayLike, *, errors: Errors = "raise"
@@ -179,6 +181,7 @@ def leg_jacobians(
     return legs
 
 
+@refuses_other_kinds
 @maskable(pose=1, rate=1)
 def leg_jacobian_rates(
     parameters: RPSParameters, pose: ArrayLike, rate: ArrayLike, *, errors: Errors = "raise"
@@ -238,6 +241,7 @@ def jacobian_rates_of_legs(
 # Poses from legs ----------------------------------------------------------------------------------
 
 
+@refuses_other_kinds
 def pose_rate(
     parameters: RPSParameters,
     pose: ArrayLike,
@@ -276,6 +280,7 @@ def pose_rate(
     return _solved(parameters, masked_leg_jacobians(parameters, x), speed, errors, max_gain)
 
 
+@refuses_other_kinds
 def pose_acceleration(
     parameters: RPSParameters,
     pose: ArrayLike,
@@ -315,6 +320,7 @@ def pose_acceleration(
 # The platform -------------------------------------------------------------------------------------
 
 
+@refuses_other_kinds
 def platform_twist(
     parameters: RPSParameters,
     pose: ArrayLike,

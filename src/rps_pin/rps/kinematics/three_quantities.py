@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, UnreachableError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.samples import Errors, check_errors_option, refuse
 from rps_pin.validation import one_shape, positive_number, real_array
 
@@ -44,6 +45,7 @@ class PoseSolutions(NamedTuple):
     """Whether there is besides a whole curve of poses, of which none is listed, shape (...)."""
 
 
+@refuses_other_kinds
 def poses_from(
     platform_radius: float,
     *,

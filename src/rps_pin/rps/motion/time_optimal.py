@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.loads import checked_wrench
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.curve_dynamics import CurveDynamics
@@ -50,6 +51,7 @@ class _OwnTime:
         return CurveSample(*self.trajectory.sample(u))
 
 
+@refuses_other_kinds
 def time_optimal(
     robot: RPSRobot,
     path: Curve | Trajectory,

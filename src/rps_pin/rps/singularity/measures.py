@@ -69,6 +69,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics import rates
 from rps_pin.rps.kinematics.legs import RADIAL, refuse_vanishing
 from rps_pin.rps.kinematics.pose import checked_pose, rotation
@@ -80,6 +81,7 @@ from rps_pin.task.singularity import SingularityMeasures
 GRAZE = 1e-3
 
 
+@refuses_other_kinds
 @maskable(pose=1)
 def singularity_measures(
     parameters: RPSParameters, pose: ArrayLike, *, errors: Errors = "raise"

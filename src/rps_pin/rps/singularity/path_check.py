@@ -26,6 +26,7 @@ import numpy as np
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.errors import InputError
 from rps_pin.numerics.bisection import bisected
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measures import GRAZE
 from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck, SingularityEvent
@@ -49,6 +50,7 @@ class _HasParameters(Protocol):
     def parameters(self) -> RPSParameters: ...
 
 
+@refuses_other_kinds
 def check_path(
     robot: _HasParameters,
     trajectory: Trajectory,

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rps_pin.errors import SingularityError, UnreachableError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.legs import cone_angles, violations
 from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.rps.robot import RPSRobot
@@ -35,6 +36,7 @@ class PathWords(NamedTuple):
 OF_TRAJECTORIES = PathWords()
 
 
+@refuses_other_kinds
 def require_clear(
     robot: RPSRobot,
     trajectory: Trajectory,

@@ -12,6 +12,7 @@ from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.errors import InputError
 from rps_pin.numerics.bisection import bisected
 from rps_pin.numerics.level_sets import without_vertices, zero_triangles
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.legs import cone_angles, within_limits
 from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.rps.kinematics.rates import masked_leg_jacobians
@@ -39,6 +40,7 @@ class SingularSurface(NamedTuple):
     """Whether a vertex keeps the robot's limits, shape (n,)."""
 
 
+@refuses_other_kinds
 def singular_surface(
     parameters: RPSParameters,
     *,

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError, UnreachableError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.assembly_mode import AssemblyMode
 from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, Fields, evaluate, side_of_singularity
@@ -29,6 +30,7 @@ BLOCK = 16_384
 MOST_POINTS = 20_000_000
 
 
+@refuses_other_kinds
 def workspace(
     robot: RPSRobot | RPSParameters,
     grid: Grid | None = None,

@@ -18,6 +18,7 @@ import trimesh
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
 from rps_pin.rps.workspace.result import Workspace
@@ -41,6 +42,7 @@ class Volume(NamedTuple):
     `boundary` encloses."""
 
 
+@refuses_other_kinds
 def volume(workspace: Workspace) -> Volume:
     """Return the volumes of a workspace, by the trapezoidal rule over its inside points.
 
@@ -69,6 +71,7 @@ def volume(workspace: Workspace) -> Volume:
     return Volume(*(float(volumes.sum()) for volumes in elements))
 
 
+@refuses_other_kinds
 def boundary(workspace: Workspace, space: Space = "position") -> trimesh.Trimesh:
     """Return the boundary of a workspace as a closed triangle mesh, normals outwards.
 
@@ -106,6 +109,7 @@ def boundary(workspace: Workspace, space: Space = "position") -> trimesh.Trimesh
     return mesh
 
 
+@refuses_other_kinds
 def theoretical_cylinder(
     parameters: RPSParameters, lower: float, upper: float, sections: int = 96
 ) -> trimesh.Trimesh:
@@ -138,6 +142,7 @@ def theoretical_cylinder(
     return cylinder
 
 
+@refuses_other_kinds
 def save_mesh(
     mesh: trimesh.Trimesh, path: str | os.PathLike[str], *, overwrite: bool = False
 ) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.bounds import POINTS, check_size
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.validation import positive_number, real, real_array, whole_number
 
@@ -45,12 +46,14 @@ class Grid(NamedTuple):
         """Points in all."""
         return math.prod(self.shape)
 
+    @refuses_other_kinds
     def points(self, block: Block = WHOLE) -> Array:
         """Return the points of a block of the grid, shape (n_1, n_2, n_3, 3)."""
         first, second, third = self.axes
         planes, rows = block
         return np.stack(np.meshgrid(first[planes], second[rows], third, indexing="ij"), axis=-1)
 
+    @refuses_other_kinds
     def blocks(self, points: int) -> list[Block]:
         """Cut the grid into blocks of at most `points` points (or one row), in storage order."""
         planes, rows, columns = self.shape
@@ -62,6 +65,7 @@ class Grid(NamedTuple):
         ]
 
 
+@refuses_other_kinds
 def leg_grid(
     parameters: RPSParameters,
     points: int | tuple[int, int, int] = 51,
@@ -109,6 +113,7 @@ def leg_grid(
     return Grid("leg lengths", (first, second, third))
 
 
+@refuses_other_kinds
 def pose_grid(z: ArrayLike, tilt_x: ArrayLike, tilt_y: ArrayLike | None = None) -> Grid:
     """Return a grid of poses (z, tilt_x, tilt_y).
 

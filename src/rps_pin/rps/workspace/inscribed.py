@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, UnreachableError
 from rps_pin.numerics.bisection import bisected
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.pose import stacked
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import checked_start, parameters_of
@@ -45,6 +46,7 @@ class TiltRange(NamedTuple):
     """(upper - lower) pi tilt^2, or (upper - lower) 4 tilt^2, m rad^2."""
 
 
+@refuses_other_kinds
 def free_tilt(
     robot: RPSRobot | RPSParameters,
     z: ArrayLike,
@@ -114,6 +116,7 @@ def free_tilt(
     return free
 
 
+@refuses_other_kinds
 def largest_tilt_range(
     robot: RPSRobot | RPSParameters,
     shape: Shape = "cylinder",

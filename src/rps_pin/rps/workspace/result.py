@@ -9,12 +9,14 @@ import numpy as np
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.evaluate import Fields
 from rps_pin.rps.workspace.grids import Grid
 from rps_pin.rps.workspace.reasons import Flags, Reason
 
 
+@refuses_other_kinds
 @dataclass(frozen=True, eq=False)
 class Workspace:
     """Fields over the points of a grid, shape (n_1, n_2, n_3), SI units, base axes.

@@ -20,6 +20,7 @@ from loky.backend import resource_tracker
 from numpy.typing import ArrayLike
 
 from rps_pin.interruption import end_with_parent, workers_without_signals
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import BLOCK, GridJob, Progress
 from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, Fields
@@ -56,6 +57,7 @@ class WorkspaceCounts(NamedTuple):
     """In the file."""
 
 
+@refuses_other_kinds
 def workspace_to_file(
     robot: RPSRobot | RPSParameters,
     path: str | os.PathLike[str],

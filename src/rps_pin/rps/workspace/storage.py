@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import GridJob
 from rps_pin.rps.workspace.evaluate import Fields, evaluate
@@ -123,6 +124,7 @@ def new_workspace_file(
         file.attrs["complete"] = True
 
 
+@refuses_other_kinds
 def save_workspace(
     workspace: Workspace,
     path: str | os.PathLike[str],
@@ -157,6 +159,7 @@ def save_workspace(
         file.write(WHOLE, workspace.fields)
 
 
+@refuses_other_kinds
 def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> Workspace:
     """Read a workspace, or a block of its grid, from an HDF5 file.
 

@@ -182,6 +182,8 @@ class MjcfFiles:
             if xml in replaced:
                 continue
             place = Place(file, xml.sourceline, xml)
+            if event == "start":
+                _refuse_formats(place)
             other = None
             if event == "start" and xml.tag in ("include", "model") and xml.get("file"):
                 nearest_first = xml.tag == "model"
@@ -201,6 +203,15 @@ class MjcfFiles:
             return None
         self._others.append(path)
         return _root(_content(path), str(path))
+
+
+def _refuse_formats(place: Place) -> None:
+    """Refuse a percent sign in an attribute: in a message, MuJoCo takes it for a format of C."""
+    for name, value in place.xml.attrib.items():
+        if "%" in value:
+            raise MechanismError(
+                f"{place}: {name} = {value!r} has a %, which can end the process in MuJoCo"
+            )
 
 
 def _is_irregular(path: str) -> bool:

@@ -1,4 +1,4 @@
-"""Numbers of an MJCF that MuJoCo compiles and that mean nothing: not finite, or reversed ranges.
+"""Numbers of an MJCF that MuJoCo compiles and that mean nothing: not finite, huge, or reversed.
 
 A range may have an infinite end. MuJoCo takes a reversed one for none, unless ``limited`` is true.
 """
@@ -12,6 +12,7 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.io.mjcf.source import MjcfSource
 from rps_pin.errors import MechanismError
+from rps_pin.validation import LARGEST
 
 #: Arrays of MuJoCo's model that are read, by its lists of elements; there may be more of others.
 _READ = {
@@ -22,6 +23,8 @@ _READ = {
     "equalities": ("data",),
     "actuators": ("gear", "armature", "damping"),
 }
+#: How far the length of an axis may be from 1: MuJoCo makes it so, where it can.
+_UNIT = 1e-6
 _PREFIXES = {
     "bodies": "body",
     "joints": "jnt",
@@ -46,13 +49,18 @@ def refuse_wrong_numbers(source: MjcfSource) -> None:
     MechanismError
         With the line of the element.
     """
-    if not np.isfinite(source.model.opt.gravity).all():
+    if not (np.abs(source.model.opt.gravity) <= LARGEST).all():
         raise MechanismError(
-            f"{source.setting('option', attribute='gravity')}: gravity is not finite"
+            f"{source.setting('option', attribute='gravity')}: gravity is not finite, or beyond "
+            f"{LARGEST:g}"
         )
     for kind, number, name, values in _numbers(source):
-        if not np.isfinite(values).all():
-            source.refuse(kind, number, f"has {name} = {_shown(values)}, which is not finite")
+        if not (np.abs(values) <= LARGEST).all():
+            why = f"beyond {LARGEST:g}" if np.isfinite(values).all() else "not finite"
+            source.refuse(kind, number, f"has {name} = {_shown(values)}, which is {why}")
+    for number, axis in enumerate(source.model.jnt_axis):
+        if abs(np.linalg.norm(axis) - 1) > _UNIT:
+            source.refuse("joints", number, f"has an axis without direction: {_shown(axis)}")
     for kind, names in _RANGES.items():
         for name in names:
             ranges = getattr(source.model, f"{_PREFIXES[kind]}_{name}", np.empty((0, 2)))
@@ -69,7 +77,7 @@ def _numbers(source: MjcfSource) -> Iterator[tuple[str, int, str, Array]]:
     for kind, names in _READ.items():
         for name in names:
             array = np.asarray(getattr(m, f"{_PREFIXES[kind]}_{name}", ()), dtype=np.float64)
-            if not np.isfinite(array).all():
+            if not (np.abs(array) <= LARGEST).all():
                 yield from ((kind, i, name, np.atleast_1d(one)) for i, one in enumerate(array))
     for name in _OF_VELOCITIES:
         for velocity, one in enumerate(getattr(m, f"dof_{name}")):

@@ -95,13 +95,13 @@ class MjcfSource:
             spec = self._parsed()
             try:
                 return spec, spec.compile()
-            except ValueError as error:
+            except (ValueError, RuntimeError) as error:
                 spec = without_appearance(self._parsed(), self.mujoco)
                 model = spec.compile()
                 without = "textures, sensors, and shapes that give no mass are left out"
                 self.told[f"MuJoCo: {self._reason(error)}: {without}"] = [self.origin]
                 return spec, model
-        except ValueError as error:
+        except (ValueError, RuntimeError) as error:
             why = self._reason(error)
             raise MechanismError(f"{self.origin} is not a valid MJCF: {why}") from None
 
@@ -117,7 +117,7 @@ class MjcfSource:
         named = f"{self._path.absolute()}.xml"  # which is read from memory
         return spec.from_file(named, include={named: self._text.encode()})
 
-    def _reason(self, error: ValueError) -> str:
+    def _reason(self, error: ValueError | RuntimeError) -> str:
         """Return MuJoCo's reason, with file and line where it names none."""
         why = _one_line(error)
         line = _LINE.search(why)
@@ -130,7 +130,7 @@ class MjcfSource:
             return why
         try:
             self._in_one_text.compile()
-        except ValueError as same:
+        except (ValueError, RuntimeError) as same:
             found = _one_line(same)
             line = _LINE.search(found)
             place = self._files.at(int(line[1])) if line else None

@@ -18,6 +18,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.column_names import joint_coordinates
 from rps_pin.closed_loop.io.mjcf.source import MjcfSource
 from rps_pin.errors import MechanismError
+from rps_pin.validation import LARGEST
 
 #: Frame of the world that bears MuJoCo's name for it.
 WORLD = "world"
@@ -202,9 +203,10 @@ class MjcfTree:
             if name := m.key(key).name:
                 found[name] = self.configuration(m.key_qpos[key])
         for name, q in found.items():
-            if not np.isfinite(q).all():
+            if not (np.abs(q) <= LARGEST).all():
                 raise MechanismError(
-                    f"{self.source.origin}: key frame {name!r} has numbers that are not finite"
+                    f"{self.source.origin}: key frame {name!r} has numbers that are not finite, or "
+                    f"beyond {LARGEST:g}"
                 )
             configurations[name] = q
         return found.get("home", found["qpos0"])

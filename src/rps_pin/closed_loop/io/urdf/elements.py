@@ -18,6 +18,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.io.urdf import vocabulary
 from rps_pin.closed_loop.io.urdf.vocabulary import child, children, get, tag_of
 from rps_pin.errors import few
+from rps_pin.validation import LARGEST
 
 #: Joint types by the element that may have them.
 JOINT_TYPES = {
@@ -176,7 +177,12 @@ class UrdfFile:
         return str(value)
 
     def numbers(
-        self, element: Any, attribute: str, count: int, default: Sequence[float] | None = None
+        self,
+        element: Any,
+        attribute: str,
+        count: int,
+        default: Sequence[float] | None = None,
+        largest: float = LARGEST,
     ) -> list[float]:
         """Return an attribute's numbers; the default, or a refusal, where it is not there."""
         text = get(element, attribute)
@@ -189,8 +195,9 @@ class UrdfFile:
             wanted = "a finite number" if count == 1 else f"{count} finite numbers"
             self.refuse(element, f"{tag_of(element)} {attribute} = {text!r} must be {wanted}")
         values = [float(part) for part in parts]
-        if not all(map(math.isfinite, values)):
-            self.refuse(element, f"{tag_of(element)} {attribute} = {text!r} is not finite")
+        if not all(abs(value) <= largest for value in values):
+            why = f"is beyond {largest:g}" if all(map(math.isfinite, values)) else "is not finite"
+            self.refuse(element, f"{tag_of(element)} {attribute} = {text!r} {why}")
         return values
 
     def number(self, element: Any, attribute: str, default: float | None = None) -> float:
@@ -202,7 +209,7 @@ class UrdfFile:
         text = get(element, attribute)
         if text is not None and _INFINITE.fullmatch(text.strip()):
             return -math.inf if text.strip().startswith("-") else math.inf
-        value = self.number(element, attribute, default)
+        (value,) = self.numbers(element, attribute, 1, [default], sys.float_info.max)
         return math.copysign(math.inf, value) if abs(value) >= sys.float_info.max else value
 
     def placement(self, element: Any | None) -> pin.SE3:
