@@ -74,6 +74,7 @@ ANKLE_CRANK = 0.04
 #: Of the cranks' axes above the ankle; the motors sit one above the other.
 ANKLE_HEIGHTS = {"left": 0.13, "right": 0.21}
 ANKLE_RODS = {"left": 0.12, "right": 0.2}
+ANKLE_CRANK_LIMITS = (-1.4, 1.4)
 ANKLE_HALF, ANKLE_BACK, ANKLE_UP = 0.035, -0.045, 0.005
 
 
@@ -106,6 +107,7 @@ def ankle() -> str:
                 crank,
                 (0.0, y, ANKLE_HEIGHTS[side]),
                 axis=Y,
+                limits=ANKLE_CRANK_LIMITS,
                 effort=40.0,
                 speed=20.0,
             ),
@@ -289,6 +291,7 @@ def differential() -> str:
 # 3-RRS --------------------------------------------------------------------------------------------
 
 RRS_BASE, RRS_PROXIMAL, RRS_DISTAL, RRS_PLATFORM = 0.2, 0.15, 0.25, 0.12
+RRS_ARM_LIMITS = (-0.8, 2.0)
 
 
 def rrs() -> str:
@@ -316,6 +319,7 @@ def rrs() -> str:
                 arm,
                 polar(RRS_BASE, angle),
                 (0.0, 0.0, angle),
+                limits=RRS_ARM_LIMITS,
                 effort=30.0,
                 speed=10.0,
             ),
