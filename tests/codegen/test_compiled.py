@@ -29,11 +29,15 @@ from tests.codegen.engines import (
 )
 
 #: The derivatives of large ones take seconds to build; their proof compares them.
-LARGE = ("delta_rods", "stewart")
+LARGE = ("delta_rods", "stewart", "rotary_stewart")
 
 
 @pytest.mark.parametrize(
-    "name", ["four_bar", "five_bar", "slider_crank", "rps", "delta", "delta_rods", "stewart"]
+    "name",
+    [
+        *("four_bar", "five_bar", "slider_crank", "rps", "delta", "delta_rods", "stewart"),
+        *("rotary_stewart", "linear_delta", "planar_rrr"),
+    ],
 )
 def test_every_mechanism_of_the_package(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """And generated code answers all of it: nothing is handed to the Pinocchio engine."""

@@ -12,6 +12,7 @@ from rps_pin.panel import MechanismPanel
 
 URDF = Path(__file__).resolve().parents[2] / "urdf"
 NAMES = ["four_bar", "five_bar", "slider_crank", "delta", "stewart", "rps"]
+NAMES += ["rotary_stewart", "linear_delta", "planar_rrr"]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from rps_pin import SingularityError
 from rps_pin.codegen.build import tcc
 from tests.proofs import common
-from tests.reference import jets
+from tests.reference import delta, five_bar, jets
 from tests.reference.newton_euler import Jet
 from tests.reference.parallel import linear_delta, planar_rrr, rotary_stewart
 from tests.reference.parallel.robots import ROBOTS
@@ -97,6 +97,27 @@ def test_statics_are_those_of_forces_along_the_rods(name) -> None:
         wrench[kept] = rng.normal(size=len(kept))
         wanted = statics(pose, wrench[kept])
         assert worst(one.wrench_to_actuators(each, wrench) - wanted) < 1e-10 * worst(wanted)
+
+
+DIRECT = {
+    "delta": lambda a: [delta.platform_position(a)],
+    "linear_delta": linear_delta.platform_positions,
+    "planar_rrr": planar_rrr.poses,
+    "five_bar": lambda a: [five_bar.tip(jets.constant(a)).value],
+}
+"""Closed forms of the direct kinematics: poses of given actuators, some or all."""
+
+
+@pytest.mark.parametrize("name", DIRECT)
+def test_direct_kinematics_is_that_of_the_closed_form(name) -> None:
+    """From random positions of the actuators, of which the pose is one of the closed form's."""
+    one, rng = task(name), np.random.default_rng(6)
+    home = one.to_actuators(one.home)
+    size = 0.3 if name != "linear_delta" else 0.05
+    for _ in range(20):
+        a = home + size * rng.uniform(-1, 1, home.size)
+        apart = np.abs(one.to_task(a) - np.array(DIRECT[name](a))).max(axis=1)
+        assert worst(apart.min()) < 1e-10
 
 
 @EACH

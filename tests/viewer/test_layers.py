@@ -313,7 +313,13 @@ def test_the_workspace_surface_spans_the_workspace():
     assert 0.010 < np.abs(points[:, 0]).max() < 0.025
 
 
-@pytest.mark.parametrize("name", ["four_bar", "delta", "stewart", "slider_crank", "five_bar"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("four_bar", "delta", "stewart", "slider_crank", "five_bar"),
+        *("rotary_stewart", "linear_delta", "planar_rrr"),
+    ],
+)
 def test_any_mechanism_shows_with_all_that_fits_and_nothing_but_its_model(name):
     mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
     fitting = fitting_layers(mechanism)
