@@ -17,8 +17,9 @@ from rps_pin.control.simulation import loop_run as loop_run_module
 from rps_pin.control.simulation.encoders import Encoders
 from rps_pin.control.simulation.faults import Fault, Faults
 from rps_pin.control.simulation.loop_run import LoopRun, run_loop, write_loop_csv
-from rps_pin.control.simulation.plant import Plant, platform_pose
+from rps_pin.control.simulation.plant import Plant
 from rps_pin.errors import InputError, RPSPinError
+from rps_pin.rps.kinematics.pose import platform_pose
 from rps_pin.trajectories.path import PathSample, Trajectory
 from rps_pin.trajectories.point_to_point import point_to_point
 

@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.control.simulation.encoders import Encoders
-from rps_pin.control.simulation.plant import Plant, platform_pose
+from rps_pin.control.simulation.plant import Plant
 from rps_pin.errors import InputError, RPSPinError, UnreachableError
 from rps_pin.rps.dynamics.loads import Payload
+from rps_pin.rps.kinematics.pose import platform_pose
 from rps_pin.trajectories.point_to_point import point_to_point
 from tests import strategies
 

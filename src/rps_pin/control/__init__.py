@@ -3,8 +3,8 @@
 - `loop`: the laws `ComputedTorque` and `PDControl` with `Gains`, `PacedTrajectory`, `LoopClock`
 - `estimator`: `RealTimeRobot`, state estimate and inverse dynamics for other laws
 - `loop_margins`: stability margins for the tuning
-- `simulation`: `Plant` with `Encoders`, `wrong_parameters` and `Fault`; `run_loop` gives a
-  `LoopRun`, `LoopSummary` its figures; `load_scenario` reads YAML files
+- `simulation`: `Plant` with `Encoders`, `ServoDrives`, `wrong_parameters` and `Fault`; `run_loop`
+  gives a `LoopRun`, `LoopSummary` its figures; `load_scenario` reads YAML files
 
 The robot itself is in `rps_pin.rps`; `rps_pin.viewer.server.live_view` displays a running loop.
 """
@@ -26,6 +26,7 @@ from rps_pin.control.simulation.loop_run import LoopRun, run_loop, write_loop_cs
 from rps_pin.control.simulation.loop_summary import LoopSummary
 from rps_pin.control.simulation.plant import Plant
 from rps_pin.control.simulation.scenario import load_scenario
+from rps_pin.control.simulation.servo_drives import ServoDrives
 from rps_pin.control.simulation.wrong_parameters import wrong_parameters
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "PacedTrajectory",
     "Plant",
     "RealTimeRobot",
+    "ServoDrives",
     "Status",
     "effective_inertia",
     "load_scenario",

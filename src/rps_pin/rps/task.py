@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
@@ -118,6 +119,23 @@ class RPSTask(Task):
         """Return q, v and a at configurations; see `Task.motion`."""
         return self.state(self.at(q), rate, acceleration, errors=errors)
 
+    def rate(self, q: ArrayLike, v: ArrayLike, *, errors: Errors = "raise") -> Array:
+        """Return the poses' rates, from the free platform's velocity; see `Task.rate`."""
+        q_, v_ = self._rows(q, self._nq, "q"), self._rows(v, self._nv, "v")
+        batch = np.broadcast_shapes(q_.shape[:-1], v_.shape[:-1])
+        every = np.broadcast_to(q_, (*batch, self._nq)), np.broadcast_to(v_, (*batch, self._nv))
+        found = np.empty((*batch, 3))
+        for index in np.ndindex(batch):
+            found[index] = _platform_rate(every[0][index], every[1][index])
+        return found
+
     def singularities(self, q: ArrayLike) -> SingularityMeasures:
         """Return how far configurations are from singularities, in closed form."""
         return singularity_measures(self._robot.parameters, self.at(q), errors="mask")
+
+
+def _platform_rate(q: Array, v: Array) -> Array:
+    """Return the pose's rate at one configuration, (3,)."""
+    rotation = pin.Quaternion(q[9:13]).matrix()
+    tilting = pin.Jlog3(rotation) @ v[9:12]
+    return np.array([rotation[2] @ v[6:9], tilting[0], tilting[1]])

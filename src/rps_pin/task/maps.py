@@ -194,7 +194,7 @@ class TaskMaps:
             If the assembly mode ends on the way; says how far along.
         """
         q = self.configuration(x, near, within_limits=within_limits, errors=errors)
-        return np.asarray(q[..., self._of_actuators])
+        return np.asarray(q[..., self.of_actuators])
 
     def configuration(
         self,
@@ -265,7 +265,7 @@ class TaskMaps:
         RPSPinError
             As `to_actuators`.
         """
-        _ = self._of_actuators  # or refuse
+        _ = self.of_actuators  # or refuse
         q = self.mechanism.home if near is None else self._rows(near, self._nq, "near")
         found = self._by_actuators.complete(a, q, **_continued(within_limits, errors))
         about = self.at(q) if any(self.angular) else None
@@ -447,8 +447,14 @@ class TaskMaps:
         return whole
 
     @cached_property
-    def _of_actuators(self) -> Indices:
-        """Where the actuators' positions are in q."""
+    def of_actuators(self) -> Indices:
+        """Where the actuators' positions are in q, shape (na,).
+
+        Raises
+        ------
+        MechanismError
+            If an actuated joint has not one coordinate of its own.
+        """
         model, found = self.mechanism.model, []
         for name in self.mechanism.actuated:
             joint = model.joints[model.getJointId(name)] if model.existJointName(name) else None

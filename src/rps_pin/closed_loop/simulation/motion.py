@@ -23,6 +23,8 @@ from rps_pin.validation import real_vector
 State = tuple[Array, Array]
 Controller = Callable[[float, Array, Array], ArrayLike]
 WrenchesInTime = Callable[[float, Array, Array], Wrenches]
+#: Actuator forces (na,) of time, configuration and velocity.
+ForceLaw = Callable[[float, Array, Array], Array]
 
 #: Gap of an initial configuration, relative to what its rounding error is relative to, and opening
 #: rate per speed, above which it is refused.
@@ -45,6 +47,8 @@ class Drive:
         self._controller, self._size = controller, system.actuated.size
         given = np.zeros(self._size) if tau is None else tau
         self.tau = real_vector(given, self._size, "tau").copy()
+        #: Of forces that follow the state, in place of `tau`.
+        self.law: ForceLaw | None = None
         self._wrenches = wrenches
 
     def command(self, time: float, q: Array, v: Array) -> None:
@@ -52,6 +56,10 @@ class Drive:
         if self._controller is not None:
             answer = self._controller(time, q.copy(), v.copy())
             self.tau = real_vector(answer, self._size, "the controller's tau").copy()
+
+    def forces(self, time: float, q: Array, v: Array) -> Array:
+        """Return the actuator forces that act now, (na,)."""
+        return self.tau if self.law is None else self.law(time, q, v)
 
     def wrenches(self, time: float, q: Array, v: Array) -> Wrenches | None:
         """Return the wrenches that act now."""
@@ -79,7 +87,8 @@ class Motion:
         """
         refuse_infinite(q, v)
         wrenches = self._drive.wrenches(t, q, v)
-        a, self.power = self._manifold.acceleration(q, v, self._drive.tau, wrenches, self._gain)
+        tau = self._drive.forces(t, q, v)
+        a, self.power = self._manifold.acceleration(q, v, tau, wrenches, self._gain)
         return a
 
     def stiff_damping(self, q: Array, v: Array, step: float) -> Damping | None:

@@ -8,7 +8,13 @@ from numpy.typing import ArrayLike
 from rps_pin.closed_loop.constraints.system import Mechanism
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.fixed_step import fixed_step
-from rps_pin.closed_loop.simulation.motion import Drive, Motion, WrenchesInTime, closed_start
+from rps_pin.closed_loop.simulation.motion import (
+    Drive,
+    ForceLaw,
+    Motion,
+    WrenchesInTime,
+    closed_start,
+)
 from rps_pin.copies import DeepCopied
 from rps_pin.one_thread import one_thread
 from rps_pin.other_kinds import refuses_other_kinds
@@ -60,13 +66,14 @@ class Stepper(DeepCopied):
         self._motion = Motion(system, (self.q, self.v), self._drive, 0.0)
         self.time, self.gap = 0.0, self._motion.gap(self.q)
 
-    def advance(self, tau: ArrayLike, duration: float, steps: int = 1) -> None:
-        """Move on under constant actuator forces.
+    def advance(self, tau: ArrayLike | ForceLaw, duration: float, steps: int = 1) -> None:
+        """Move on under actuator forces.
 
         Parameters
         ----------
         tau
-            Shape (na,), N or N m.
+            Shape (na,), N or N m, held; or a function that returns them from time, q and v, which
+            is called within the steps too: those of springs, or of drives with loops of their own.
         duration
             s; positive.
         steps
@@ -83,13 +90,19 @@ class Stepper(DeepCopied):
         """
         positive_number(duration, "duration", "s")
         whole_number(steps, "steps")
-        self._drive.tau = real_vector(tau, self._drive.tau.size, "tau").copy()
+        if callable(tau):
+            self._drive.law = tau
+        else:
+            self._drive.tau = real_vector(tau, self._drive.tau.size, "tau").copy()
         motion, step = self._motion, duration / steps
         start, state, gap = self.time, (self.q, self.v), self.gap
-        with np.errstate(over="ignore", invalid="ignore"):  # refused in words
-            for k in range(steps):
-                time = start + k * step
-                a = motion.acceleration(time, *state)
-                moved, _ = fixed_step(motion, time, state, step, a)
-                state, gap = motion.finish(moved)
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # refused in words
+                for k in range(steps):
+                    time = start + k * step
+                    a = motion.acceleration(time, *state)
+                    moved, _ = fixed_step(motion, time, state, step, a)
+                    state, gap = motion.finish(moved)
+        finally:
+            self._drive.law = None
         (self.q, self.v), self.gap, self.time = state, gap, start + duration

@@ -1,4 +1,4 @@
-"""Encoders of the leg lengths: noise and quantisation."""
+"""Encoders of the actuators' positions: noise and quantisation."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rps_pin.validation import non_negative_number, whole_number
 @refuses_other_kinds
 @dataclass(frozen=True)
 class Encoders:
-    """Readings of lengths d: round((d + noise) / resolution) resolution.
+    """Readings of positions d: round((d + noise) / resolution) resolution.
 
     Parameters
     ----------
     resolution
-        m; zero for none.
+        m (rad of actuators that turn); zero for none.
     noise
-        Standard deviation, m: Gaussian, independent in each reading.
+        Standard deviation, likewise: Gaussian, independent in each reading.
     seed
         Of the noise: equal seeds give equal readings.
 
@@ -45,10 +45,10 @@ class Encoders:
         return np.random.default_rng(self.seed)
 
     def read(self, length: Array, generator: np.random.Generator) -> Array:
-        """Return a reading, shape (3,), m, of true lengths."""
+        """Return a reading of true positions, shape (na,)."""
         reading = np.array(length, dtype=np.float64)
         if self.noise:
-            reading += self.noise * generator.standard_normal(3)
+            reading += self.noise * generator.standard_normal(reading.size)
         if self.resolution:
             reading = np.round(reading / self.resolution) * self.resolution
         return reading

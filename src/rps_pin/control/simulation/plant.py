@@ -2,7 +2,7 @@
 
 It is integrated by the closed-loop model in full coordinates, with the loops closed at each step,
 and shares only Pinocchio with the controllers. A command passes a delay of whole ticks and the
-actuators' limits; a length passes the encoders.
+actuators' limits; a position passes the encoders.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
@@ -18,30 +17,30 @@ from rps_pin.bounds import DELAY, SUBSTEPS, check_size
 from rps_pin.closed_loop import Stepper
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.closed_loop.simulation.motion import WrenchesInTime
+from rps_pin.control.robots import Robot, force_limits, task_of
 from rps_pin.control.simulation.encoders import Encoders
+from rps_pin.control.simulation.servo_drives import ServoDrives, ServoForces
 from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, shown
 from rps_pin.one_thread import one_thread
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.rps.kinematics.pose import platform_pose
-from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import positive_number, real_vector, whole_number
 
-#: Indices of the prismatic joints in q and v.
-_LENGTHS = [1, 3, 5]
 _EXACT = Encoders()
 
 
 @one_thread("_stepper._system.guard")
 class Plant(DeepCopied):
-    """A 3-RPS under control.
+    """A 3-RPS, or any mechanism with a task, under control.
 
     Parameters
     ----------
     robot
-        The machine, which may differ from the controller's model (see `wrong_parameters`).
+        The machine, which may differ from the controller's model (see `wrong_parameters`): an
+        `RPSRobot`, a `Task`, or a `ClosedLoopModel` that has one.
     pose
-        At the start, at rest, shape (3,), m and rad.
+        At the start, at rest: the task's coordinates, shape (m,), m and rad, in the assembly mode
+        of home.
     period
         Time between two ticks, s.
     substeps
@@ -52,24 +51,28 @@ class Plant(DeepCopied):
         Default: exact ones.
     wrenches
         External wrenches on its frames: as for `simulate`.
+    force_limit
+        Of the actuators, N or N m: one or na; default: the robot's.
+    drives
+        Of actuators that take positions or speeds as commands; default: commands are forces.
 
     Attributes
     ----------
-    applied : (3,) array
-        The actuators' forces in the last tick, N.
+    applied : (na,) array
+        The actuators' forces in the last tick, N or N m; with `drives`, those at its end.
 
     Raises
     ------
     InputError
         If an argument has the wrong shape or type, or is out of its range.
-    UnreachableError
-        If a leg has no length in the pose.
+    UnreachableError, ClosureError
+        If the pose is out of reach.
     """
 
     @refuses_other_kinds
     def __init__(
         self,
-        robot: RPSRobot,
+        robot: Robot,
         pose: ArrayLike,
         *,
         period: float = 1e-3,
@@ -77,8 +80,12 @@ class Plant(DeepCopied):
         delay: int = 0,
         encoders: Encoders = _EXACT,
         wrenches: Wrenches | WrenchesInTime | None = None,
+        force_limit: ArrayLike | None = None,
+        drives: ServoDrives | None = None,
     ) -> None:
-        x = real_vector(pose, 3, "pose")
+        task = task_of(robot)
+        mechanism = task.mechanism
+        x = real_vector(pose, task.size, "pose")
         self._substeps = whole_number(substeps, "substeps")
         delay = whole_number(delay, "delay", 0)
         check_size(self._substeps, SUBSTEPS, f"substeps = {shown(self._substeps)}")
@@ -87,35 +94,53 @@ class Plant(DeepCopied):
             raise InputError(f"encoders is a {type(encoders).__name__}; it must be Encoders")
         self.robot, self.encoders = robot, encoders
         self.period = positive_number(period, "period", "s")
-        q, v, a = robot.state(x, np.zeros(3), np.zeros(3))
-        self._stepper = Stepper(robot.mechanism, q, v, wrenches=wrenches)
-        hold = robot.inverse_dynamics(q, v, a).tau
-        self._limit = robot.parameters.actuator_force_limit
+        still = np.zeros(task.size)
+        q, v, a = task.state(x, still, still)
+        self._task, self._pose = task, x
+        self._positions, self._actuated = task.of_actuators, mechanism.actuated_indices
+        self._limit = force_limits(robot, force_limit)
+        self._stepper = Stepper(mechanism, q, v, wrenches=wrenches)
+        hold = mechanism.inverse_dynamics(q, v, a).tau
         self.applied: Array = np.clip(hold, -self._limit, self._limit)
+        self._servo: ServoForces | None = None
+        if drives is not None:
+            where = task.of_actuators
+            self._servo = ServoForces(mechanism, drives, self._limit, where)
+            hold = drives.at_rest(q[where])
         self._queue = deque([hold] * delay)
         self._generator = encoders.generator()
 
-    def step(self, forces: ArrayLike) -> None:
+    def step(self, command: ArrayLike) -> None:
         """Take a command and advance by a period.
 
         Parameters
         ----------
-        forces
-            Shape (3,), N; limited to what the actuators can do.
+        command
+            Forces, shape (na,), N or N m, limited to what the actuators can do; with `drives`,
+            positions (m or rad) or speeds.
 
         Raises
         ------
         InputError
-            If a force is not finite.
+            If a number is not finite.
         RPSPinError
             If the motion is no longer determined: see `Stepper.advance`.
         """
-        self._queue.append(real_vector(forces, 3, "forces").copy())
-        self.applied = np.clip(self._queue.popleft(), -self._limit, self._limit)
-        self._stepper.advance(self.applied, self.period, self._substeps)
+        name = "forces" if self._servo is None else "command"
+        self._queue.append(real_vector(command, self.applied.size, name).copy())
+        given, servo = self._queue.popleft(), self._servo
+        if servo is None:
+            self.applied = np.clip(given, -self._limit, self._limit)
+            self._stepper.advance(self.applied, self.period, self._substeps)
+        else:
+            servo.command = given
+            self._stepper.advance(servo, self.period, self._substeps)
+            self.applied = servo(self.time, self._stepper.q, self._stepper.v)
+        if any(self._task.angular):  # of two rotation vectors, the one nearer to the last
+            self._pose = self.pose
 
     def reading(self) -> Array:
-        """Return the encoders' reading of the leg lengths, shape (3,), m."""
+        """Return the encoders' reading of the actuators' positions, shape (na,), m or rad."""
         return self.encoders.read(self.length, self._generator)
 
     # True state -----------------------------------------------------------------------------------
@@ -127,31 +152,28 @@ class Plant(DeepCopied):
 
     @property
     def configuration(self) -> Array:
-        """Pinocchio's q, shape (13,)."""
+        """Pinocchio's q, shape (nq,)."""
         return self._stepper.q
 
     @property
     def length(self) -> Array:
-        """Leg lengths, shape (3,), m."""
-        return np.asarray(self._stepper.q[_LENGTHS])
+        """Positions of the actuators (the 3-RPS's leg lengths), shape (na,), m or rad."""
+        return np.asarray(self._stepper.q[self._positions])
 
     @property
     def speed(self) -> Array:
-        """Leg speeds, shape (3,), m/s."""
-        return np.asarray(self._stepper.v[_LENGTHS])
+        """Speeds of the actuators, shape (na,), m/s or rad/s."""
+        return np.asarray(self._stepper.v[self._actuated])
 
     @property
     def pose(self) -> Array:
-        """(z, tilt_x, tilt_y) of the free platform, shape (3,), m and rad."""
-        return platform_pose(self._stepper.q)
+        """The task's coordinates, shape (m,), m and rad: (z, tilt_x, tilt_y) of the 3-RPS."""
+        return self._task.at(self._stepper.q, self._pose)
 
     @property
     def rate(self) -> Array:
-        """Time derivative of the pose, shape (3,), from the free platform's velocity."""
-        q, v = self._stepper.q, self._stepper.v
-        rotation = pin.Quaternion(q[9:13]).matrix()
-        tilting = pin.Jlog3(rotation) @ v[9:12]
-        return np.array([rotation[2] @ v[6:9], tilting[0], tilting[1]])
+        """Time derivative of the pose, shape (m,)."""
+        return self._task.rate(self._stepper.q, self._stepper.v)
 
     @property
     def gap(self) -> float:
