@@ -163,7 +163,7 @@ def fixed_array(
     sizes = ", ".join("nmkl"[i] if size is None else str(size) for i, size in enumerate(shape))
     wanted = f"({sizes}{',' if len(shape) == 1 else ''}){meaning and f': {meaning}'}"
     array = numbers(value, name, f"numbers of shape {wanted}")
-    parts = () if isinstance(value, np.ndarray) else np.asarray(value, dtype=object).flat
+    parts = () if isinstance(value, np.ndarray) else np.asarray(value, dtype=object).ravel()
     if any(isinstance(part, (bool, np.bool_)) for part in parts):  # NumPy makes [True, 0.5] floats
         raise InputError(f"{name} = {shown(value)}: it must be numbers of shape {wanted}")
     if array.ndim != len(shape) or any(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -14,7 +15,7 @@ from rps_pin import ClosedLoopModel, ForceDistribution, RPSParameters, RPSRobot
 from rps_pin.control import Gains, RealTimeRobot
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.paper import lagrange_forces
-from rps_pin.rps.workspace import leg_grid
+from rps_pin.rps.workspace import leg_grid, load_workspace, save_workspace, workspace
 from rps_pin.trajectories import read_csv
 from tests.cli.commands import rps_pin
 
@@ -104,6 +105,23 @@ def test_arrays_of_which_no_square_is_finite() -> None:
         with pytest.raises(InputError, match=r"is beyond 1e\+50: entry 0 is 1e\+200"):
             call()
             pytest.fail(str(call))
+
+
+def test_nests_deeper_than_arrays_are() -> None:
+    deep: Any = 1.0
+    for _ in range(60):
+        deep = [deep]
+    with pytest.raises(InputError, match="platform_inertia"):
+        RPSParameters.from_preset("micro").replace(platform_inertia=deep)
+
+
+def test_a_workspace_with_a_singular_point_inside(tmp_path: Path) -> None:
+    parameters, file = RPSParameters.from_preset("micro"), tmp_path / "w.h5"
+    save_workspace(workspace(parameters, leg_grid(parameters, 3)), file)
+    with h5py.File(file, "r+") as opened:
+        opened["determinant"][...] = 0.0
+    with pytest.raises(InputError, match="determinant is 0 at a point inside"):
+        load_workspace(file)
 
 
 def test_kinds_of_arguments_that_type_hints_do_not_tell() -> None:

@@ -174,7 +174,7 @@ def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> 
     ------
     InputError
         If there is no such file, or it does not hold a complete workspace: shapes that fit the
-        axes, finite numbers, all of them in the file itself.
+        axes, finite numbers, no singular point inside, all of them in the file itself.
     """
     planes, rows = block or WHOLE
     try:
@@ -213,6 +213,8 @@ def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> 
         found = np.asarray((reason & np.uint16(Reason.UNREACHABLE)) == 0)
         computed = evaluate(parameters, floats["pose"], 1.0, found=found)
         fields = computed._replace(reason=reason, **floats)
+    if (fields.determinant[reason == 0] == 0).any():
+        raise InputError(f"cannot read the workspace {path}: determinant is 0 at a point inside")
     return Workspace(parameters, grid, start, least, fields)
 
 
