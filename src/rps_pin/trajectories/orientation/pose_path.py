@@ -23,6 +23,7 @@ from scipy.spatial.transform import Rotation
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.rotation_vector import MOST_TURN, vector_rates
 from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.curve import CurveSample, TimedCurve, TimeLaw
 from rps_pin.trajectories.orientation.rotation_curve import RotationCurve, vectors_of
 from rps_pin.trajectories.path import checked_parameters, checked_times
@@ -52,6 +53,7 @@ class PoseSample(NamedTuple):
     """Shape (..., 3), rad/s^2."""
 
 
+@refuses_other_kinds
 class PoseCurve:
     """A smooth curve through poses of a frame, in a task's coordinates; see `pose_path`.
 
@@ -167,6 +169,7 @@ class PosePath(TimedCurve):
         return self.curve.motion(*self.law.at(checked_times(t, self.duration)))
 
 
+@refuses_other_kinds
 def pose_path(
     positions: ArrayLike,
     rotations: ArrayLike,
