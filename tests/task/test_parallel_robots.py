@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 from rps_pin import SingularityError
 from rps_pin.codegen.build import tcc
@@ -69,6 +70,33 @@ def test_states_and_dynamics_are_those_of_the_bodies_motions(name) -> None:
         assert worst(tau - forces) < 1e-9 * worst(forces)
         back = m.forward_dynamics(found.q, found.v, forces)
         assert worst(back - found.a) < 1e-7 * worst(found.a)
+
+
+def test_published_formulas_of_rotary_stewart_and_linear_delta() -> None:
+    """Single expressions as they are printed and as firmware has them, by SciPy's rotations.
+
+    Cranks: asin(g / sqrt(e^2 + f^2)) - atan2(f, e) (R. Eisele, Inverse kinematics of a Stewart
+    platform, 2019; F. Szufnarowski, 2013). Carriages: z + sqrt(L^2 - (X - x)^2 - (Y - y)^2), with
+    the towers at the difference of the radii (Marlin, Klipper).
+    """
+    x, _ = poses("rotary_stewart")
+    found = task("rotary_stewart").to_actuators(x)
+    for pose, angles in zip(x, found, strict=True):
+        turn = Rotation.from_rotvec(pose[3:])
+        for k in range(6):
+            side, middle = (1 if k % 2 == 0 else -1), np.deg2rad(120 * (k // 2))
+            at, beta = middle + side * 0.25, middle + side * np.pi / 2
+            ball = middle + side * (np.pi / 3 - 0.2)
+            leg = pose[:3] + turn.apply([0.15 * np.cos(ball), 0.15 * np.sin(ball), 0])
+            leg = leg - [0.2 * np.cos(at), 0.2 * np.sin(at), 0]
+            e, f = 0.16 * leg[2], 0.16 * (np.cos(beta) * leg[0] + np.sin(beta) * leg[1])
+            g = leg @ leg - (0.24**2 - 0.08**2)
+            assert worst(angles[k] - (np.arcsin(g / np.hypot(e, f)) - np.arctan2(f, e))) < 1e-11
+    x, _ = poses("linear_delta")
+    towers = 0.105 * np.exp(2j * np.pi / 3 * np.arange(3))
+    aside = np.abs(towers - (x[:, 0] + 1j * x[:, 1])[:, None])
+    wanted = x[:, 2:] + np.sqrt(0.215**2 - aside**2)
+    assert worst(task("linear_delta").to_actuators(x) - wanted) < 1e-12
 
 
 @OF_FRAMES
