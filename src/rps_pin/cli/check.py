@@ -9,8 +9,8 @@ import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
-from rps_pin.rps.singularity.measures import GRAZE
 from rps_pin.rps.singularity.path_check import check_path
+from rps_pin.task.paths.findings import GRAZE
 
 
 def check_command(

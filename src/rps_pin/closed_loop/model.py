@@ -501,6 +501,23 @@ class ClosedLoopModel:
             options["effects"] = replaced_effects(self.model, model, kinds, self.effects)
         return type(self)(model, self.closures, self.actuated, home=home, **options)
 
+    def with_model(self, model: pin.Model) -> ClosedLoopModel:
+        """Return the same mechanism on another model of the same joints: of other inertias, say.
+
+        Raises
+        ------
+        MechanismError
+            If the model has other joints.
+        """
+        kinds = [
+            [(name, joint.shortname()) for name, joint in zip(one.names, one.joints, strict=True)]
+            for one in (self.model, model)
+        ]
+        if kinds[0] != kinds[1]:
+            raise MechanismError("the model has other joints than the mechanism's")
+        options = self._options()
+        return type(self)(model, self.closures, self.actuated, home=self._home, **options)
+
     def _with(
         self, closures: Sequence[Closure], actuated: Sequence[str], home: ArrayLike | None = None
     ) -> ClosedLoopModel:

@@ -37,11 +37,11 @@ from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.measures import singularity_measures
 from rps_pin.rps.singularity.path_check import check_path
-from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck, SingularityEvent
 from rps_pin.rps.singularity.path_refusal import require_clear
 from rps_pin.rps.singularity.surface import singular_surface
 from rps_pin.rps.urdf import build_urdf
 from rps_pin.task import SingularityMeasures
+from rps_pin.task.paths.events import LimitEvent, PathCheck, SingularityEvent
 
 __getattr__ = moved_names(
     __name__,

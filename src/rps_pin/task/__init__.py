@@ -5,9 +5,25 @@ positions, velocities, accelerations, forces and gains both ways between these a
 of any mechanism, single and in batches, and `Task.compile` does so in generated code.
 """
 
+from rps_pin.task.loads import Payload
 from rps_pin.task.maps import TaskState
+from rps_pin.task.path_check import check_path
+from rps_pin.task.paths.events import LimitEvent, PathCheck, SingularityEvent
+from rps_pin.task.paths.limits import Cone
 from rps_pin.task.polytope import Ball, Polytope
 from rps_pin.task.singularity import SingularityMeasures
 from rps_pin.task.task import Task
 
-__all__ = ["Ball", "Polytope", "SingularityMeasures", "Task", "TaskState"]
+__all__ = [
+    "Ball",
+    "Cone",
+    "LimitEvent",
+    "PathCheck",
+    "Payload",
+    "Polytope",
+    "SingularityEvent",
+    "SingularityMeasures",
+    "Task",
+    "TaskState",
+    "check_path",
+]

@@ -15,6 +15,7 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
@@ -108,6 +109,11 @@ class TaskMaps:
     def size(self) -> int:
         """Number of coordinates, m."""
         return len(self.coordinates)
+
+    @property
+    def output_frame(self) -> tuple[str | None, pin.SE3]:
+        """Name of the output frame, none of a task of joints, and the placement of it there."""
+        return self._x.frame, self._x.placement
 
     @property
     def scale(self) -> Array:

@@ -18,6 +18,7 @@ from rps_pin.errors import InputError, MechanismError, SingularityError
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE
 from rps_pin.task import polytope
 from rps_pin.task.maps import TaskMaps, options_of
+from rps_pin.task.paths.limits import JointLimits, PositionLimits
 from rps_pin.task.singularity import SingularityMeasures
 from rps_pin.validation import numbers
 
@@ -290,6 +291,10 @@ class Task(TaskMaps):
             values[..., rank - 1] / values[..., 0] if rank else np.ones(A.shape[:-2]),
             np.where(regular, determinant, np.nan),
         )
+
+    def position_limits(self) -> PositionLimits:
+        """Return the limits of positions that a path is checked against; see `check_path`."""
+        return JointLimits(self.mechanism)
 
     # Parts ----------------------------------------------------------------------------------------
 

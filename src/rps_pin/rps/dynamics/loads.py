@@ -8,74 +8,15 @@ the moment about the platform's centre. It is an argument of the dynamics, ``wre
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, ParameterError
-from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.validation import finite_number, fixed_array, inertia_fault, real_array
+from rps_pin.errors import InputError
+from rps_pin.task.loads import Payload
+from rps_pin.validation import real_array
 
-
-@refuses_other_kinds
-@dataclass(frozen=True, eq=False)
-class Payload:
-    """A rigid body fixed to the platform.
-
-    Parameters
-    ----------
-    mass
-        kg; positive.
-    centre
-        Its centre of mass in platform axes, from the platform's centre, shape (3,), m.
-    inertia
-        About its own centre of mass, in platform axes, shape (3, 3), kg m^2; zero (a point) if left
-        out.
-
-    Raises
-    ------
-    ParameterError
-        If the mass is not positive, or no rigid body has the inertia.
-    InputError
-        If a number is not finite, or a shape is wrong.
-    """
-
-    mass: float
-    centre: Array | Sequence[float] = (0.0, 0.0, 0.0)
-    inertia: Array | Sequence[Sequence[float]] | None = None
-
-    def __post_init__(self) -> None:
-        mass = finite_number(self.mass, "payload mass", "kg")
-        if not mass > 0:
-            raise ParameterError("payload mass", mass, "must be positive, in kg")
-        inertia = np.zeros((3, 3)) if self.inertia is None else self.inertia
-        object.__setattr__(self, "mass", mass)
-        object.__setattr__(self, "centre", fixed_array(self.centre, "payload centre", (3,)))
-        object.__setattr__(self, "inertia", fixed_array(inertia, "payload inertia", (3, 3)))
-        if fault := inertia_fault(np.asarray(self.inertia)):
-            raise ParameterError("payload inertia", self.inertia, fault)
-
-    @property
-    def first_moment(self) -> Array:
-        """Mass times centre, shape (3,), kg m, platform axes."""
-        moment: Array = self.mass * np.asarray(self.centre, dtype=np.float64)
-        return moment
-
-    @property
-    def inertia_about_platform(self) -> Array:
-        """Inertia about the platform's centre, shape (3, 3), kg m^2, platform axes: Steiner."""
-        c = np.asarray(self.centre, dtype=np.float64)
-        own = np.asarray(self.inertia, dtype=np.float64)
-        inertia: Array = own + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
-        return inertia
-
-    def as_inertia(self) -> pin.Inertia:
-        """Return it as Pinocchio has it, in the platform's frame."""
-        return pin.Inertia(self.mass, np.asarray(self.centre), np.asarray(self.inertia))
+__all__ = ["Payload", "checked_wrench"]
 
 
 def checked_wrench(value: ArrayLike, batch: tuple[int, ...]) -> Array:

@@ -15,8 +15,8 @@ from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.rps.kinematics.legs import PoseLegs, legs_of_pose
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.rps.singularity.path_events import PathCheck
 from rps_pin.rps.singularity.path_refusal import require_clear
+from rps_pin.task.paths.events import PathCheck
 from rps_pin.trajectories.path import Trajectory
 from rps_pin.validation import real
 

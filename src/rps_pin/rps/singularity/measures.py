@@ -77,9 +77,6 @@ from rps_pin.rps.kinematics.samples import Errors, maskable, refuse
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.task.singularity import SingularityMeasures
 
-#: `distance` below which a path grazes a singularity.
-GRAZE = 1e-3
-
 
 @refuses_other_kinds
 @maskable(pose=1)

@@ -13,7 +13,7 @@ from rps_pin.rps.kinematics.legs import cone_angles, violations
 from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_check import check_path
-from rps_pin.rps.singularity.path_events import LimitEvent, PathCheck
+from rps_pin.task.paths.events import LimitEvent, PathCheck
 from rps_pin.trajectories.path import Trajectory
 
 #: At how many times between leaving a limit and coming back the worst is looked for.

@@ -7,12 +7,10 @@ for each limit of each leg, the room that is left, each with its exact rate alon
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from rps_pin.arrays import Array
-from rps_pin.errors import InputError
+from rps_pin.arrays import Array, Bools
 from rps_pin.rps.kernels import legs, tips
 from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE
 from rps_pin.rps.kinematics.pose import components, tilt_of
@@ -20,25 +18,13 @@ from rps_pin.rps.kinematics.rates import masked_leg_jacobians
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measure_rates import rates_of_legs
 from rps_pin.rps.singularity.measures import checked_tilt
+from rps_pin.task.paths.findings import Signal, checked_samples, checked_times
 from rps_pin.trajectories.path import Trajectory
-from rps_pin.validation import positive_number
 
+#: A leg shorter than this part of h, where the sign of type II jumps, is passing through zero.
+_VANISHING = 1e-6
 #: Times that are worked on at once.
 _CHUNK = 50_000
-#: Widest bracket of an event, over the duration, unless another is given.
-_BRACKET = 1e-10
-
-
-class Signal(NamedTuple):
-    """What a signal is about."""
-
-    name: str
-    """Kind of singularity, or quantity with a limit."""
-    leg: int
-    """1 to 3; 0 for the whole robot."""
-    side: str = ""
-    limit: float = 0.0
-    unit: str = ""
 
 
 #: In the order of `measure_rates`.
@@ -53,25 +39,21 @@ TYPE_I = slice(2, 5)
 class PathSignals:
     """A trajectory of a robot as signals of time."""
 
+    kinds = SINGULARITIES
+
     def __init__(
         self, parameters: RPSParameters, trajectory: Trajectory, tolerance: float | None
     ) -> None:
         self.parameters = parameters
         self.trajectory = trajectory
-        self.duration = positive_number(trajectory.duration, "the trajectory's duration", "s")
-        self.tolerance = _BRACKET * self.duration if tolerance is None else tolerance
+        self.duration, self.tolerance = checked_times(trajectory, tolerance)
         self.limits = _limits_of(parameters)
-        least = 4 * float(np.spacing(self.duration))
-        if self.tolerance < least:
-            raise InputError(
-                f"tolerance = {self.tolerance:.3g} s: times up to {self.duration:.6g} s can be "
-                f"told apart down to {least:.3g} s"
-            )
+        self.scale = np.array([1 / parameters.platform_radius, 1.0, 1.0])
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         """Return poses and rates at times (n,), shape (n, 3) each, checked."""
         found = self.trajectory.sample(times)
-        pose, rate = (_checked_samples(getattr(found, n), times, n) for n in ("pose", "rate"))
+        pose, rate = (checked_samples(getattr(found, n), times, n, 3) for n in ("pose", "rate"))
         return checked_tilt(pose), rate
 
     def signals(self, times: Array) -> tuple[Array, Array]:
@@ -79,6 +61,14 @@ class PathSignals:
         parts = [self._signals(times[i : i + _CHUNK]) for i in range(0, times.size, _CHUNK)]
         values, rates = zip(*parts, strict=True)
         return np.concatenate(values), np.concatenate(rates)
+
+    def may_jump(self, values: Array) -> Bools:
+        """Return where type II's sign may flip: a leg passes through no length, type I."""
+        return np.asarray(values[:, TYPE_I].min(axis=-1) <= _VANISHING)
+
+    def where(self, pose: Array) -> str:
+        """Return nothing: events have words for these poses."""
+        return ""
 
     def _signals(self, times: Array) -> tuple[Array, Array]:
         pose, rate = self.sample(times)
@@ -163,17 +153,3 @@ def _cone_cosines(
         legs.cone_cosine(cosine, sine, out, up).T,
         (turning + legs.cone_cosine(cosine, sine, *axis_rate)).T,
     )
-
-
-def _checked_samples(value: Array, times: Array, name: str) -> Array:
-    array = np.asarray(value)
-    if array.dtype.kind not in "iuf" or array.shape != (times.size, 3):
-        raise InputError(
-            f"the trajectory's {name} at {times.size} times has shape {array.shape} and type "
-            f"{array.dtype}; it must be ({times.size}, 3) numbers"
-        )
-    finite = np.isfinite(array).all(axis=-1)
-    if not finite.all():
-        when = times[int(np.argmin(finite))]
-        raise InputError(f"the trajectory's {name} is not finite at {when:.9g} s")
-    return array.astype(np.float64, copy=False)

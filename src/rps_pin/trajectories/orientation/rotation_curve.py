@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.trajectories.path import checked_parameters
 from rps_pin.validation import fixed_array, numbers
 
@@ -44,6 +45,7 @@ class RotationSample(NamedTuple):
     """Its derivative by u, shape (..., 3)."""
 
 
+@refuses_other_kinds
 class RotationCurve:
     """The spline through rotations, over a parameter u from 0.
 
