@@ -9,10 +9,12 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.rps.kinematics.pose import platform_pose
+from rps_pin.rps.kinematics.legs import leg_motion, legs_of_pose
+from rps_pin.rps.kinematics.pose import checked_motion, platform_motion, platform_pose
 from rps_pin.rps.kinematics.rates import leg_jacobian_rates, leg_jacobians
 from rps_pin.rps.kinematics.samples import Errors
 from rps_pin.rps.singularity.measures import singularity_measures
+from rps_pin.rps.singularity.path_signals import RobotLimits
 from rps_pin.task import SingularityMeasures, Task, TaskState
 
 
@@ -116,8 +118,21 @@ class RPSTask(Task):
     def motion(
         self, q: ArrayLike, rate: ArrayLike, acceleration: ArrayLike, *, errors: Errors = "raise"
     ) -> TaskState:
-        """Return q, v and a at configurations; see `Task.motion`."""
-        return self.state(self.at(q), rate, acceleration, errors=errors)
+        """Return q, v and a at configurations, within limits or not; see `Task.motion`."""
+        x, dx, ddx = checked_motion(self.at(q), rate, acceleration)
+        p = self._robot.parameters
+        of_pose = legs_of_pose(x, p.base_radius, p.platform_radius)
+        gone = of_pose.geometry.vanishing.any(axis=-1, keepdims=True)
+        if errors == "mask" and gone.any():
+            x = np.where(gone, self.home, x)
+            of_pose = legs_of_pose(x, p.base_radius, p.platform_radius)
+        legs = leg_motion(x, dx, ddx, p.platform_radius, p.base_radius, of_pose)
+        found = self._robot.state_of(x, platform_motion(x, dx, ddx, p.platform_radius), legs)
+        return TaskState(*(np.where(gone, np.nan, part) for part in found))
+
+    def position_limits(self) -> RobotLimits:
+        """Return the robot's limits: lengths, angles and cones of the legs."""
+        return RobotLimits(self._robot.parameters)
 
     def rate(self, q: ArrayLike, v: ArrayLike, *, errors: Errors = "raise") -> Array:
         """Return the poses' rates, from the free platform's velocity; see `Task.rate`."""

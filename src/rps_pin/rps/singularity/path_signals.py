@@ -14,7 +14,7 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.rps.kernels import legs, tips
 from rps_pin.rps.kernels.limits import LIMIT_TOLERANCE
 from rps_pin.rps.kinematics.pose import components, tilt_of
-from rps_pin.rps.kinematics.rates import masked_leg_jacobians
+from rps_pin.rps.kinematics.rates import LegJacobians, masked_leg_jacobians
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measure_rates import rates_of_legs
 from rps_pin.rps.singularity.measures import checked_tilt
@@ -62,6 +62,14 @@ class PathSignals:
         values, rates = zip(*parts, strict=True)
         return np.concatenate(values), np.concatenate(rates)
 
+    def rates(self, times: Array) -> Array:
+        """Return the rates alone at times (n,)."""
+        return self.signals(times)[1]
+
+    def matters(self, sizes: Array, slopes: Array, steps: Array, threshold: float) -> Bools:
+        """Return that every turning point does: signals cost little."""
+        return np.ones(sizes[1:].shape, dtype=bool)
+
     def may_jump(self, values: Array) -> Bools:
         """Return where type II's sign may flip: a leg passes through no length, type I."""
         return np.asarray(values[:, TYPE_I].min(axis=-1) <= _VANISHING)
@@ -76,14 +84,38 @@ class PathSignals:
         value, change = rates_of_legs(self.parameters, pose, rate, jacobians, vanishing)
         # A leg without length is a type I singularity; type II is not determined there.
         value[(value[:, TYPE_I] == 0).any(axis=-1), 0] = 1.0
-        speed = np.einsum("...ij,...j->...i", jacobians.length_jacobian, rate)
-        turning = np.einsum("...ij,...j->...i", jacobians.angle_jacobian, rate)
-        legs = {
-            "length": (jacobians.length, np.where(vanishing, 0.0, speed)),
-            "angle": (jacobians.angle, turning),
-        }
-        room, room_rate = _rooms(self.parameters, self.limits, pose, rate, legs)
+        room, room_rate = _room_of(self.parameters, self.limits, pose, rate, jacobians, vanishing)
         return np.concatenate([value, room], axis=-1), np.concatenate([change, room_rate], axis=-1)
+
+
+class RobotLimits:
+    """The limits of a robot's legs, as `rps_pin.task.paths.limits` has them of any mechanism."""
+
+    def __init__(self, parameters: RPSParameters) -> None:
+        self._parameters = parameters
+        self.signals = _limits_of(parameters)
+
+    def rooms(self, q: Array, v: Array, pose: Array, rate: Array) -> tuple[Array, Array]:
+        """Return the room to each limit and its rate, shape (n, limits), at poses (n, 3)."""
+        jacobians = masked_leg_jacobians(self._parameters, pose)
+        return _room_of(self._parameters, self.signals, pose, rate, *jacobians)
+
+
+def _room_of(
+    parameters: RPSParameters,
+    limits: tuple[Signal, ...],
+    pose: Array,
+    rate: Array,
+    jacobians: LegJacobians,
+    vanishing: Bools,
+) -> tuple[Array, Array]:
+    speed = np.einsum("...ij,...j->...i", jacobians.length_jacobian, rate)
+    turning = np.einsum("...ij,...j->...i", jacobians.angle_jacobian, rate)
+    legs = {
+        "length": (jacobians.length, np.where(vanishing, 0.0, speed)),
+        "angle": (jacobians.angle, turning),
+    }
+    return _rooms(parameters, limits, pose, rate, legs)
 
 
 def _limits_of(parameters: RPSParameters) -> tuple[Signal, ...]:

@@ -89,6 +89,17 @@ class Signals(Protocol):
         """Return whether a change of sign may be a jump, shape (n,), of values (n, signals)."""
         ...
 
+    def rates(self, times: Array) -> Array:
+        """Return the rates alone at times (n,)."""
+        ...
+
+    def matters(self, sizes: Array, slopes: Array, steps: Array, threshold: float) -> Bools:
+        """Return which turning points are to be bracketed, shape (n, signals).
+
+        Of the signals' sizes (n + 1, signals) and their slopes at samples `steps` (n,) apart, s.
+        """
+        ...
+
     def where(self, pose: Array) -> str:
         """Return a pose in words; empty for the 3-RPS's."""
         ...
@@ -251,11 +262,13 @@ class Findings:
         falls = (self.growth[:-1] < 0) & (self.growth[1:] >= 0)
         same = self.sign[:-1] == self.sign[1:]
         standing = self.zero[:-1] & self.zero[1:]
-        step, signal = np.nonzero(falls & same & ~standing)
+        sizes = self.sign * self.values
+        matters = self.path.matters(sizes, self.growth, np.diff(self.times), self.threshold)
+        step, signal = np.nonzero(falls & same & ~standing & matters)
         sign = self.sign[step, signal]
 
         def falling(times: Array, which: Indices) -> Bools:
-            rates = self.path.signals(times)[1]
+            rates = self.path.rates(times)
             return np.asarray(sign[which] * rates[np.arange(which.size), signal[which]] < 0)
 
         low, high = bisected(falling, self.times[step], self.times[step + 1], self.path.tolerance)

@@ -133,23 +133,33 @@ class TaskSignals:
 
     def signals(self, times: Array) -> tuple[Array, Array]:
         """Return every signal and its rate at times (n,), shape (n, signals) each."""
-        if not times.size:
-            return np.zeros((0, len(self.signals_known))), np.zeros((0, len(self.signals_known)))
-        pose, rate, state = self._state(times)
-        parts = [one.rooms(state.q, state.v, pose, rate) for one in self._positions]
-        which, sign, limit = self._speeds
-        v, a = (part[:, self._actuated][:, which] for part in (state.v, state.a))
-        parts.append((limit - sign * v, -sign * a))
-        values = self._by_differences(state)
-        rates = self._rates(times, values)
-        rooms, changes = (np.concatenate(one, axis=-1) for one in zip(*parts, strict=True))
-        order = [values[:, :3], rooms, values[:, 3:]], [rates[:, :3], changes, rates[:, 3:]]
-        return np.concatenate(order[0], axis=-1), np.concatenate(order[1], axis=-1)
+        motion = self._state(times)
+        rooms, changes = self._exact(*motion)
+        values = self._by_differences(motion[2])
+        rates = self._differences(times, values)
+        return self._ordered(values, rooms), self._ordered(rates, changes)
 
-    @property
-    def signals_known(self) -> tuple[Signal, ...]:
-        """All signals, in order."""
-        return (*self.kinds, *self.limits)
+    def rates(self, times: Array) -> Array:
+        """Return the rates alone at times (n,)."""
+        return self._ordered(self._differences(times), self._exact(*self._state(times))[1])
+
+    def matters(self, sizes: Array, slopes: Array, steps: Array, threshold: float) -> Bools:
+        """Return which turning points may be the nearest to a singularity, or beyond a limit.
+
+        A signal falls at most four times as far in a step as the cubic with its values and slopes
+        does.
+        """
+        first, last = sizes[:-1], sizes[1:]
+        low, high = slopes[:-1] * steps[:, None], slopes[1:] * steps[:, None]
+        s = np.linspace(0.0, 1.0, 33)[:, None, None]
+        cubic = (1 - s) ** 2 * ((1 + 2 * s) * first + s * low)
+        cubic = cubic + s**2 * ((3 - 2 * s) * last - (1 - s) * high)
+        least = np.minimum(first, last)
+        lowest = least - 4 * np.maximum(least - cubic.min(axis=0), 0.0)
+        kinds = len(self.kinds)
+        near = max(float(np.abs(sizes[:, :kinds]).min()), threshold)
+        bound = np.where(np.arange(sizes.shape[1]) < kinds, near, 0.0)
+        return np.asarray((lowest <= bound) | ~np.isfinite(lowest))
 
     def may_jump(self, values: Array) -> Bools:
         """Return False: the path ends before a measure could jump."""
@@ -166,10 +176,24 @@ class TaskSignals:
         """Return the times that were followed, and the motion of all joints there."""
         return self._times, self._state(self._times)[2]
 
-    def _rates(self, times: Array, values: Array) -> Array:
+    def _exact(self, pose: Array, rate: Array, state: TaskState) -> tuple[Array, Array]:
+        """Return the rooms of positions and speeds and their rates, (n, limits) each."""
+        parts = [one.rooms(state.q, state.v, pose, rate) for one in self._positions]
+        which, sign, limit = self._speeds
+        v, a = (part[:, self._actuated][:, which] for part in (state.v, state.a))
+        parts.append((limit - sign * v, -sign * a))
+        rooms, changes = (np.concatenate(one, axis=-1) for one in zip(*parts, strict=True))
+        return rooms, changes
+
+    def _ordered(self, by_differences: Array, exact: Array) -> Array:
+        kinds = len(self.kinds)
+        parts = by_differences[:, :kinds], exact, by_differences[:, kinds:]
+        return np.concatenate(parts, axis=-1)
+
+    def _differences(self, times: Array, values: Array | None = None) -> Array:
         """Return the rates of what has no exact ones, (n, signals of `_by_differences`)."""
         last = self._times[-1]
-        if times is self._times:
+        if times is self._times and values is not None:
             step = _FIRST * last
             to = np.where(times + step <= last, times + step, times - step)
             change = self._by_differences(self._state(to)[2]) - values
