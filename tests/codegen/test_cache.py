@@ -40,18 +40,24 @@ def entry(file: str = "library.so") -> Path:
     return found
 
 
+def replaced(file: Path, content: bytes) -> None:
+    """Write another file of this name: the first is loaded, and the process ends with it."""
+    file.unlink()
+    file.write_bytes(content)
+
+
 def shortened(file: Path) -> None:
-    file.write_bytes(file.read_bytes()[:-1])
+    replaced(file, file.read_bytes()[:-1])
 
 
 def changed(file: Path) -> None:
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 1
-    file.write_bytes(content)
+    replaced(file, content)
 
 
 def emptied(file: Path) -> None:
-    file.write_bytes(b"")
+    replaced(file, b"")
 
 
 @pytest.mark.parametrize("file", ["library.so", "record.json"])

@@ -406,7 +406,7 @@ class RPSRobot:
 
     @cached_property
     def task(self) -> RPSTask:
-        """Its pose as a `rps_pin.Task`, coordinates z, rx and ry, with closed forms."""
+        """Its pose as a `rps_pin.task.Task`, coordinates z, rx and ry, with closed forms."""
         return RPSTask(self)
 
     # Dynamics -------------------------------------------------------------------------------------
