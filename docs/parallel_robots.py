@@ -14,6 +14,7 @@ from marked import replaced
 
 from rps_pin import ClosedLoopModel, Task
 from rps_pin.closed_loop.visuals import visual_model
+from rps_pin.task import check_path
 from rps_pin.trajectories import point_to_point
 from rps_pin.viewer import save_png
 
@@ -57,8 +58,8 @@ def main() -> None:
 
 HEAD = [
     "| robot | largest speed | of the limit | largest force | of the limit | RMS force "
-    "| least `type_ii` |",
-    "|---|---|---|---|---|---|---|",
+    "| least `type_ii` | `check_path` |",
+    "|---|---|---|---|---|---|---|---|",
 ]
 
 
@@ -74,13 +75,14 @@ def row(name: str, task: Task) -> str:
     model = mechanism.model
     of_speed = speed / model.velocityLimit[actuated].min()
     of_force = largest / model.effortLimit[actuated].min()
-    turns = (
-        model.joints[model.getJointId(mechanism.actuated[0])].shortname().startswith("JointModelR")
-    )
-    per_second, force = ("rad/s", "N m") if turns else ("m/s", "N")
+    kind = model.joints[model.getJointId(mechanism.actuated[0])].shortname()
+    per_second, force = ("rad/s", "N m") if "JointModelR" in kind else ("m/s", "N")
+    check = check_path(task, motion)
+    events = len(check.singularities) + len(check.limits)
     return (
         f"| `{name}` | {speed:.3g} {per_second} | {of_speed:.0%} | {largest:.3g} {force} "
-        f"| {of_force:.0%} | {rms:.3g} {force} | {task.singularities(states.q).type_ii.min():.2f} |"
+        f"| {of_force:.0%} | {rms:.3g} {force} | {task.singularities(states.q).type_ii.min():.2f} "
+        f"| {f'{events} events' if events else 'ok'} |"
     )
 
 

@@ -15,6 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from rps_pin import SingularityError
 from rps_pin.codegen.build import tcc
+from rps_pin.task import check_path
+from rps_pin.trajectories import point_to_point
 from tests.proofs import common
 from tests.reference import delta, five_bar, jets
 from tests.reference.newton_euler import Jet
@@ -203,6 +205,10 @@ def test_singularities_are_where_geometry_has_them(name, pose, before) -> None:
     assert np.sign(found.determinant[3]) == -np.sign(found.determinant[1])
     with pytest.raises(SingularityError, match="do not determine the task"):
         one.forces_to_actuators(nearer[2], np.ones(one.size))
+    across = point_to_point(pose + before, pose - 0.3 * before, duration=1.0)
+    (event,) = check_path(one, across).singularities
+    assert (event.kind, event.singularity) == ("crosses", "type II")
+    assert worst(event.pose - pose) < 1e-9
 
 
 @EACH
