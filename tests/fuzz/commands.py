@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import importlib
 import inspect
 import os
 import shutil
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -16,7 +18,10 @@ from unittest import mock
 import typer
 from matplotlib.figure import Figure
 
+from rps_pin.cli import workspace
 from rps_pin.errors import InputError
+from rps_pin.paper import PaperComparison, paper_comparison
+from rps_pin.plots import style
 from tests.cli.commands import rps_pin
 from tests.fuzz import hostile
 from tests.fuzz.case import Case, WrongAnswerError
@@ -43,6 +48,8 @@ BASES: dict[str, str] = {
 }
 #: They wait for a browser, or compute for minutes what their other options do not change.
 LEFT_OUT = {"view": {"interactive", "mechanism", "port", "video", "png"}, "reproduce": {"output"}}
+#: How often another is drawn instead of commands that have few options, or take long.
+SELDOM = {"reproduce": 0.9, "doctor": 0.9, "workspace": 0.5}
 _FILES = {
     "four_bar.yaml": ROOT / "urdf" / "four_bar.yaml",
     "four_bar.urdf": ROOT / "urdf" / "four_bar.urdf",
@@ -93,7 +100,7 @@ def options(command: str) -> dict[str, tuple[str, Any]]:
 def mutant(rng: Random) -> Case:
     """Return a command line with one to three options changed, put in, doubled or left out."""
     command = rng.choice(sorted(BASES))
-    if command in ("reproduce", "doctor") and rng.random() < 0.9:
+    if rng.random() < SELDOM.get(command, 0.0):
         command = "ik"
     words = BASES[command].split()
     known = options(command)
@@ -186,7 +193,7 @@ def use(given: Case, folder: Path) -> None:
     (folder / "a_file").write_text("x")
     os.mkfifo(folder / "fifo")
     os.link(folder / "circle.yaml", folder / "loop")
-    with mock.patch.object(Figure, "savefig", _without_drawing):
+    with _without_what_no_option_changes():
         ended = rps_pin(*given.arguments, folder=folder, RPS_PIN_CHROMIUM="", COLUMNS="200")
     said = ended.stdout + ended.stderr
     if "Traceback" in said or ended.returncode not in (0, 1, 2):
@@ -202,8 +209,23 @@ def use(given: Case, folder: Path) -> None:
         raise WrongAnswerError(f"a number is not finite: {ended.stdout[-600:]}")
 
 
+@contextlib.contextmanager
+def _without_what_no_option_changes() -> Iterator[None]:
+    """Compute the paper's comparison once a process; draw nothing, which takes seconds."""
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(mock.patch.object(Figure, "savefig", _without_drawing))
+        stack.enter_context(mock.patch.object(style, "_large_as_pictures", contextlib.nullcontext))
+        stack.enter_context(mock.patch.object(workspace, "paper_comparison", _paper_comparison))
+        yield
+
+
+@cache
+def _paper_comparison() -> tuple[PaperComparison, ...]:
+    return paper_comparison()
+
+
 def _without_drawing(figure: Figure, target: Any, **options: Any) -> None:
-    """Write no picture, which takes seconds."""
+    """Write no picture."""
     del figure, options
     if isinstance(target, (str, Path)):
         Path(target).write_bytes(b"picture")
