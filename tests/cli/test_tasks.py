@@ -73,3 +73,52 @@ def test_what_does_not_fit_is_refused(words, status, message) -> None:
     assert done.returncode == status
     assert message in " ".join((done.stdout + done.stderr).split())
     assert "Traceback" not in done.stderr
+
+
+@pytest.fixture
+def path(tmp_path):
+    file = tmp_path / "path.yaml"
+    file.write_text("kind: point_to_point\nend: {z: 0.66, rx: 0.1}\nduration: 1\n")
+    return file
+
+
+def test_a_path_of_a_task_is_checked(path) -> None:
+    clear = rps_pin("check", str(path), "--mechanism", "stewart", "--json")
+    assert clear.returncode == 0
+    assert json.loads(clear.stdout)["ok"] is True
+    path.write_text("kind: point_to_point\nend: {rz: 1.8}\nduration: 2\n")
+    crossing = json.loads(rps_pin("check", str(path), "-m", "stewart", "--json").stdout)
+    assert not crossing["ok"]
+    met = [one for one in crossing["singularities"] if one["singularity"] == "type II"]
+    assert [one["kind"] for one in met] == ["crosses"]
+    assert met[0]["pose"][5] == pytest.approx(np.pi / 2, abs=1e-6)  # as its geometry says
+
+
+def test_a_trajectory_file_of_the_3rps_is_checked(path) -> None:
+    path.write_text("kind: circle\nheight: 0.223\ntilt: 0.1\nduration: 1\n")
+    assert rps_pin("check", str(path), "--robot", "micro").returncode == 0
+
+
+def test_any_mechanism_and_trajectory_is_shown(path, tmp_path) -> None:
+    page = tmp_path / "page.html"
+    done = rps_pin("view", str(path), "-m", "stewart", "--html", str(page))
+    assert done.returncode == 0, done.stderr
+    assert page.stat().st_size > 10_000
+    home = tmp_path / "home.html"
+    assert rps_pin("view", "-m", "delta", "--html", str(home)).returncode == 0
+    assert home.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("check", "-m", "stewart"), "a mechanism has no helix: give a trajectory"),
+        (("view", "-m", "delta", "--pose", "1", "0", "0"), "it does not go with a mechanism"),
+        (("view", "p.csv", "--pose", "1", "0", "0"), "it does not go with a trajectory"),
+        (("view", "p.csv", "-i"), "the panel takes no trajectory"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(words, message) -> None:
+    done = rps_pin(*words)
+    assert done.returncode == 2
+    assert message in " ".join(done.stderr.replace("│", " ").split())

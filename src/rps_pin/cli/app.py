@@ -31,7 +31,7 @@ for _panel, _name, _line in (
     (_ROBOT, "urdf", "Its URDF."),
     (_MOTION, "helix", "Actuator forces along the paper's helix."),
     (_MOTION, "dynamics", "Forces of any trajectory; actuator sizing."),
-    (_MOTION, "check", "Singularities and limits along a helix."),
+    (_MOTION, "check", "Singularities and limits along a path."),
     (_MOTION, "control", "A control loop on a simulated robot."),
     (_ANY, "describe", "Joints, closures, rank, mobility, actuation."),
     (_ANY, "assembly-modes", "Closed configurations with given joint values."),

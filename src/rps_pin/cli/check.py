@@ -1,7 +1,8 @@
-"""``rps-pin check``: a helix against singularities and limits."""
+"""``rps-pin check``: a helix, or a path of any task, against singularities and limits."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -9,11 +10,23 @@ import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
+from rps_pin.cli import task_options as tasks
+from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.singularity.path_check import check_path
+from rps_pin.task.paths.events import PathCheck
 from rps_pin.task.paths.findings import GRAZE
+from rps_pin.trajectories.path import Trajectory
 
 
 def check_command(
+    trajectory: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="TRAJECTORY",
+            help="A CSV or YAML file, in place of the helix.",
+            show_default=False,
+        ),
+    ] = None,
     robot: common.RobotOption = "sokolov",
     radius: helix.RadiusOption = helix.DEFAULT_RADIUS,
     pitch: helix.PitchOption = helix.DEFAULT_PITCH,
@@ -24,11 +37,14 @@ def check_command(
         float,
         typer.Option(help="Distance to a singularity (0 to 1) below which a path grazes it."),
     ] = GRAZE,
+    mechanism: tasks.MechanismOption = None,
     as_json: common.JsonOption = False,
 ) -> None:
-    """Check a helix for singularities that it crosses or grazes, and limits that it leaves.
+    """Check a path for singularities that it crosses or grazes, and limits that it leaves.
 
-    Each event is located to a nanosecond. No force is computed.
+    That is a helix of a 3-RPS, or a trajectory file; with **--mechanism**, a trajectory of the
+    coordinates of its task. Each event is located to a nanosecond, or to 1e-10 of the duration. Of
+    a mechanism, speeds and forces of the actuators are checked too.
 
     Exit status: 0 the path is clear; 1 it is not; 2 wrong usage.
 
@@ -39,12 +55,38 @@ def check_command(
     - `rps-pin check --radius 0.075 --pitch 0.05` crosses two singularities
 
     - `rps-pin check --radius 0.075 --pitch 0.05 --branch -` crosses none
+
+    - `rps-pin check path.csv --mechanism stewart` columns time_s, x_m, ..., rz_rad
     """
+    if mechanism is not None:
+        if trajectory is None:
+            told = "a mechanism has no helix: give a trajectory file"
+            raise typer.BadParameter(told, param_hint="TRAJECTORY")
+        _of_task(mechanism, trajectory, threshold, as_json)
+        return
     machine = common.load_robot(robot)
-    path = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
+    path: Trajectory
+    if trajectory is None:
+        path = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
+    else:
+        path = load_trajectory(trajectory, machine)
     found = check_path(machine, path, threshold=threshold)
+    _tell(found, {"robot": machine.parameters.name}, as_json)
+
+
+def _of_task(mechanism: Path, trajectory: Path, threshold: float, as_json: bool) -> None:
+    from rps_pin.task.path_check import check_path as check_task_path
+    from rps_pin.task.trajectory_file import load_task_trajectory
+
+    task = tasks.load_task(mechanism)
+    path = load_task_trajectory(trajectory, task)
+    found = check_task_path(task, path, threshold=threshold)
+    _tell(found, {"mechanism": task.mechanism.name}, as_json)
+
+
+def _tell(found: PathCheck, of: dict[str, str], as_json: bool) -> None:
     if as_json:
-        common.print_json(_plain(found) | {"robot": machine.parameters.name, "ok": found.ok})
+        common.print_json(_plain(found) | of | {"ok": found.ok})
     else:
         common.text_console(soft_wrap=True).print(str(found))
     raise typer.Exit(not found.ok)

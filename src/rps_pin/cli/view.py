@@ -1,4 +1,4 @@
-"""``rps-pin view``: a 3-RPS in the browser, on this machine only."""
+"""``rps-pin view``: a 3-RPS or any mechanism in the browser, on this machine only."""
 
 from __future__ import annotations
 
@@ -24,10 +24,19 @@ from rps_pin.cli.mechanism_options import (
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.printing import PlainConsole, say
 from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.errors import InputError
+from rps_pin.rps.motion.trajectory_file import load_trajectory
+from rps_pin.rps.robot import RPSRobot
 
 
 def view_command(
+    trajectory: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="TRAJECTORY",
+            help="A CSV or YAML file of poses, or of the task's coordinates of a mechanism.",
+            show_default=False,
+        ),
+    ] = None,
     robot: common.RobotOption = "sokolov",
     pose: Annotated[
         common.Three | None,
@@ -62,8 +71,10 @@ def view_command(
     mechanism: Annotated[
         Path | None,
         typer.Option(
+            "--mechanism",
+            "-m",
             metavar="FILE|NAME",
-            help="With **--interactive**: any mechanism instead of a 3-RPS.",
+            help="Any mechanism instead of a 3-RPS: its home, or a trajectory of its task.",
             autocompletion=names_or_files(mechanism_names),
         ),
     ] = None,
@@ -74,7 +85,7 @@ def view_command(
         int | None, typer.Option(help="Port of the server; default: a free one.")
     ] = None,
 ) -> None:
-    """Show a 3-RPS in the browser: a pose, or the helix in a loop.
+    """Show a 3-RPS in the browser: a pose, a trajectory, or the helix; or any mechanism.
 
     Starts a Meshcat server for this machine only, prints its address, and runs until Ctrl-C. With
     **--html**, **--png** or **--video** it writes files instead. With **--interactive** it serves a
@@ -89,30 +100,39 @@ def view_command(
     - `rps-pin view --png robot.png --time 2.6 --background white`
 
     - `rps-pin view --interactive --mechanism delta`
+
+    - `rps-pin view path.csv --mechanism stewart` columns time_s, x_m, ..., rz_rad
     """
+    _refuse_both(pose is not None, trajectory is not None, mechanism is not None, interactive)
     if pose is not None:
         common.doubt_pose("--pose", pose)
     if interactive:
         loaded = None if mechanism is None else load_mechanism(mechanism, ignore_limits, accuracy)
         _interact(robot, pose, loaded, package_path, port, layers)
         return
-    if mechanism is not None:
-        raise InputError("--mechanism goes with --interactive; see rps-pin simulate for its motion")
     # Meshcat and its server are for this command only.
     from rps_pin.viewer import save_html, save_png, save_video, show
 
-    machine = common.load_robot(robot)
-    check_outputs([file for file in (html, png, video) if file is not None], overwrite)
-    chosen = chosen_layers(layers, machine.mechanism)
+    inputs = [file for file in (trajectory, mechanism) if file is not None]
+    outputs = [file for file in (html, png, video) if file is not None]
+    check_outputs(outputs, overwrite, inputs=inputs)
+    machine: RPSRobot | ClosedLoopModel
+    motion: Any
+    if mechanism is not None:
+        loaded = load_mechanism(mechanism, ignore_limits, accuracy)
+        machine, motion, drawn = _of_mechanism(loaded, package_path, trajectory)
+    else:
+        machine, drawn = common.load_robot(robot), {}
+        curve = (radius, pitch, height, branch, duration)
+        motion = pose or _of_robot(machine, trajectory, curve)
+    tree = machine.mechanism if isinstance(machine, RPSRobot) else machine
+    chosen = chosen_layers(layers, tree) | drawn
     sides = chosen_size(size)
-    motion: Any = pose
-    if pose is None:
-        motion = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     if html is not None:
         save_html(html, machine, motion, **chosen)
         say(f"wrote {html}")
     picture: dict[str, Any] = {"size": sides, "background": background}
-    picture["layers"] = chosen["layers"]
+    picture |= drawn | {"layers": chosen["layers"]}
     if png is not None:
         save_png(png, machine, motion, time=time, **picture)
         say(f"wrote {png}")
@@ -128,6 +148,36 @@ def view_command(
             view.play()
     except KeyboardInterrupt:
         say("\nended")
+
+
+def _refuse_both(pose: bool, trajectory: bool, mechanism: bool, interactive: bool) -> None:
+    """Refuse options that do not go together, of which these are given."""
+    if pose and (trajectory or mechanism):
+        other = "a mechanism" if mechanism else "a trajectory"
+        raise typer.BadParameter(f"it does not go with {other}", param_hint="--pose")
+    if trajectory and interactive:
+        raise typer.BadParameter("the panel takes no trajectory", param_hint="TRAJECTORY")
+
+
+def _of_mechanism(
+    loaded: tuple[ClosedLoopModel, Path], package_path: list[Path] | None, trajectory: Path | None
+) -> tuple[ClosedLoopModel, Any, dict[str, Any]]:
+    """Return a mechanism, a motion of its task or None for its home, and its shapes."""
+    mechanism, file = loaded
+    shapes, missing = shapes_of(file, mechanism, package_path)
+    print_notes([*mechanism.notes, *missing])
+    if trajectory is None:
+        return mechanism, None, {"visual": shapes}
+    from rps_pin.task.trajectory_file import load_task_trajectory
+
+    return mechanism, load_task_trajectory(trajectory, mechanism.task), {"visual": shapes}
+
+
+def _of_robot(machine: RPSRobot, trajectory: Path | None, curve: tuple[Any, ...]) -> Any:
+    """Return the trajectory of a file, or a helix."""
+    if trajectory is not None:
+        return load_trajectory(trajectory, machine)
+    return helix.chosen_helix(machine, *curve)
 
 
 def _interact(

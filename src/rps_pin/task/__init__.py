@@ -13,6 +13,7 @@ from rps_pin.task.paths.limits import Cone
 from rps_pin.task.polytope import Ball, Polytope
 from rps_pin.task.singularity import SingularityMeasures
 from rps_pin.task.task import Task
+from rps_pin.task.trajectory_file import load_task_trajectory
 
 __all__ = [
     "Ball",
@@ -26,4 +27,5 @@ __all__ = [
     "Task",
     "TaskState",
     "check_path",
+    "load_task_trajectory",
 ]
