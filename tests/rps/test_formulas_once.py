@@ -69,7 +69,7 @@ TRACES = {
     "sin(x) / x": (  # a speed profile is a sine of its own
         r"\bsin\((\w+)\) / \1\b",
         # joints of any mechanism are a layer below
-        {"rps.kernels.tilt_functions", "rps.motion.speed_profile", "codegen.expressions.joints"},
+        {"rps.kernels.tilt_functions", "task.motion.speed_profile", "codegen.expressions.joints"},
     ),
     "(1 - cos(x)) / x^2": (r"\(1(\.0)? - \S*cos\((\w+)\)\) / \2", set[str]()),
     "Eq. 1 in a leg's plane": (

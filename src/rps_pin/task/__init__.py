@@ -7,6 +7,8 @@ of any mechanism, single and in batches, and `Task.compile` does so in generated
 
 from rps_pin.task.loads import Payload
 from rps_pin.task.maps import TaskState
+from rps_pin.task.motion.limits import MotionLimits
+from rps_pin.task.motion.time_optimal import time_optimal
 from rps_pin.task.path_check import check_path
 from rps_pin.task.paths.events import LimitEvent, PathCheck, SingularityEvent
 from rps_pin.task.paths.limits import Cone
@@ -19,6 +21,7 @@ __all__ = [
     "Ball",
     "Cone",
     "LimitEvent",
+    "MotionLimits",
     "PathCheck",
     "Payload",
     "Polytope",
@@ -28,4 +31,5 @@ __all__ = [
     "TaskState",
     "check_path",
     "load_task_trajectory",
+    "time_optimal",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +11,13 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.codegen.engine.batches import Errors, by_samples
+
+
+class Forces(NamedTuple):
+    """Of inverse dynamics."""
+
+    tau: Array
+    """The actuators' forces, shape (..., na)."""
 
 
 class PinocchioEngine:
@@ -68,6 +75,16 @@ class PinocchioEngine:
     def mass_matrix(self, q: ArrayLike, errors: Errors = "raise") -> Array:
         """Return the reduced mass matrix, (..., m, m)."""
         return self._each(self._mechanism.mass_matrix, (q,), (self._count, self._count), errors)
+
+    def inverse_dynamics(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, errors: Errors = "raise"
+    ) -> Forces:
+        """Return the actuators' forces of motions, (..., na)."""
+
+        def answer(q: Array, v: Array, a: Array) -> Array:
+            return self._mechanism.inverse_dynamics(q, v, a).tau
+
+        return Forces(self._each(answer, (q, v, a), (self._count,), errors))
 
     @staticmethod
     def _each(

@@ -144,6 +144,11 @@ class TaskMaps:
         compiled._by_actuators = self.mechanism.compile(functions=functions, **options)
         return compiled
 
+    @property
+    def is_compiled(self) -> bool:
+        """Whether it is in generated code, with batches."""
+        return not isinstance(self._by_actuators, PinocchioEngine)
+
     # Positions ------------------------------------------------------------------------------------
 
     def at(self, q: ArrayLike, near: ArrayLike | None = None, *, errors: Errors = "raise") -> Array:

@@ -102,6 +102,30 @@ class Task(TaskMaps):
         tau_ = self._rows(tau, self._actuated.size, "tau")
         return np.asarray(np.einsum("...ij,...i->...j", self.jacobian(q, errors=errors), tau_))
 
+    def actuator_forces(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, errors: Errors = "raise"
+    ) -> Array:
+        """Return the actuators' forces of a motion of all joints, shape (..., na), N or N m.
+
+        Those of the mechanism's `inverse_dynamics`, in batches; in generated code if compiled.
+
+        Parameters
+        ----------
+        q, v, a
+            As `state` returns them, shapes (..., nq), (..., nv) and (..., nv).
+
+        Raises
+        ------
+        RPSPinError
+            As `ClosedLoopModel.inverse_dynamics`.
+        """
+        state = (
+            self._rows(q, self._nq, "q"),
+            self._rows(v, self._nv, "v"),
+            self._rows(a, self._nv, "a"),
+        )
+        return np.asarray(self._by_actuators.inverse_dynamics(*state, **options_of(errors)).tau)
+
     def twist_map(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
         """Return E, shape (..., 6, m): the output frame's twist is E x'.
 

@@ -3,70 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rps_pin.errors import InfeasibleError, InputError, LimitExcess, ParameterError
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.curve_dynamics import CurveDynamics
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_refusal import PathWords, require_clear
+from rps_pin.task.motion import curves
 from rps_pin.trajectories.curve import Curve
-from rps_pin.trajectories.path import PathSample
 
-#: Points of a curve at which its derivatives and its holding forces are checked.
-_POINTS = 4001
-#: First and second derivatives are zero below these parts of the largest first derivative.
-_NO_TANGENT, _NO_CURVATURE = 1e-6, 1e-2
 #: Width of the brackets of `check_path`, over the curve's length.
 _BRACKET = 1e-9
 
 
-@dataclass(frozen=True)
-class _AsTrajectory:
-    """A curve as a trajectory, with the parameter u for the time."""
-
-    curve: Curve
-
-    @property
-    def duration(self) -> float:
-        return self.curve.length
-
-    def sample(self, t: ArrayLike) -> PathSample:
-        return PathSample(*self.curve.at(t))
-
-
 def ends_at_rest(robot: RPSRobot, curve: Curve) -> tuple[bool, bool]:
-    """Return at which ends the rate u' must be zero: where the curve has a tangent.
-
-    Without a tangent the robot is at rest at any rate, if the second derivative is not zero.
-
-    Raises
-    ------
-    InputError
-        If first and second derivatives of the curve are zero at some point: the rate of the
-        shortest time is infinite there.
-    """
-    u = np.linspace(0.0, curve.length, _POINTS)
-    _, first, second = curve.at(u)
+    """Return at which ends the rate u' must be zero; see `rps_pin.task.motion.curves`."""
     size = np.array([1 / robot.parameters.platform_radius, 1.0, 1.0])
-    tangent = np.linalg.norm(first * size, axis=-1)
-    curvature = np.linalg.norm(second * size, axis=-1) * curve.length
-    longest = tangent.max()
-    if not longest > 0:
-        raise InputError(f"the pose is the same all along {curve!r}: nothing moves")
-    without = tangent <= _NO_TANGENT * longest
-    still = without & (curvature <= _NO_CURVATURE * longest)
-    if still.any():
-        raise InputError(
-            f"the curve stands still at u = {u[np.argmax(still)]:.6g} of {curve.length:.6g}: its "
-            "first and second derivatives vanish there, and u' would have to be infinite. A "
-            "trajectory that rests in its own time is no curve to scale: give the curve it runs "
-            "along, with a tangent everywhere (of a spline, its poses without times)"
-        )
-    return not without[0], not without[-1]
+    return curves.ends_at_rest(curve, size)
 
 
 def require_clear_curve(robot: RPSRobot, curve: Curve, limits: ActuatorLimits) -> None:
@@ -94,7 +49,7 @@ def require_clear_curve(robot: RPSRobot, curve: Curve, limits: ActuatorLimits) -
                 "both"
             ) from None
     words = PathWords("curve", "u", "", 9)
-    require_clear(robot, _AsTrajectory(curve), tolerance=_BRACKET * curve.length, words=words)
+    require_clear(robot, curves.AsTrajectory(curve), tolerance=_BRACKET * curve.length, words=words)
 
 
 def infeasible(dynamics: CurveDynamics) -> InfeasibleError:
@@ -103,7 +58,7 @@ def infeasible(dynamics: CurveDynamics) -> InfeasibleError:
     If holding is possible at every point, so is a motion that is slow enough, also with friction.
     """
     limit = dynamics.limits.force
-    u = np.linspace(0.0, dynamics.curve.length, _POINTS)
+    u = np.linspace(0.0, dynamics.curve.length, curves.POINTS)
     holding = dynamics.terms(u).holding
     place, leg = np.unravel_index(int(np.abs(holding).argmax()), holding.shape)
     force, actuator = float(holding[place, leg]), f"actuator {leg + 1}"

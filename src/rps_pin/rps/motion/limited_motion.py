@@ -1,25 +1,17 @@
-"""Motions at the limits of their actuators, as `time_optimal` returns them."""
+"""Motions of the 3-RPS at the limits of its actuators, as `time_optimal` returns them."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike
+from rps_pin.rps.motion.curve_dynamics import SIDES, CurveDynamics
+from rps_pin.task.motion.curve_dynamics import ACTIVE
+from rps_pin.task.motion.limited_motion import LimitedMotion as AnyLimitedMotion
+from rps_pin.task.motion.speed_profile import SpeedProfile
 
-from rps_pin.arrays import Bools
-from rps_pin.errors import InputError
-from rps_pin.rps.motion.curve_dynamics import CurveDynamics, LimitUse
-from rps_pin.rps.motion.speed_profile import SpeedProfile
-from rps_pin.trajectories.curve import TimedCurve
-
-#: A limit counts as reached within this part of it.
-ACTIVE = 1e-3
-
-#: Names of the limits, in the order of `LimitUse.sides`.
-SIDES = tuple(f"actuator {leg} {what}" for what in ("push", "pull", "speed") for leg in (1, 2, 3))
+__all__ = ["ACTIVE", "SIDES", "LimitedMotion"]
 
 
-class LimitedMotion(TimedCurve):
-    """A motion along a curve in the shortest time, made by `time_optimal`.
+class LimitedMotion(AnyLimitedMotion):
+    """A motion of the 3-RPS along a curve in the shortest time, made by `time_optimal`.
 
     Attributes
     ----------
@@ -33,49 +25,6 @@ class LimitedMotion(TimedCurve):
         The limits of its actuators.
     """
 
-    law: SpeedProfile
-
     def __init__(self, dynamics: CurveDynamics, law: SpeedProfile) -> None:
-        super().__init__(dynamics.curve, law)
+        super().__init__(dynamics, law)
         self.robot, self.limits = dynamics.robot, dynamics.limits
-        self._dynamics = dynamics
-
-    def __repr__(self) -> str:
-        return f"LimitedMotion({self.curve!r}, {self.law!r})"
-
-    def use(self, t: ArrayLike) -> LimitUse:
-        """Return forces and speeds over their limits at times of shape (...), s.
-
-        Raises
-        ------
-        InputError
-            If a time lies outside the motion.
-        """
-        return self._dynamics.use(self.sample(t))
-
-    def active(self, t: ArrayLike, within: float = ACTIVE) -> Bools:
-        """Return which limits are reached at times of shape (...), s; shape (..., 9), as `SIDES`.
-
-        Raises
-        ------
-        InputError
-            If a time lies outside the motion, or `within` is not between 0 and 1.
-        """
-        if not 0 < within < 1:
-            raise InputError(f"within = {within}: it must be between 0 and 1")
-        reached: Bools = self.use(t).sides >= 1 - within
-        return reached
-
-    def shares(self, within: float = ACTIVE, samples: int = 10_001) -> dict[str, float]:
-        """Return the share of the time at each limit, and at none (``"none"``)."""
-        reached = self.active(np.linspace(0.0, self.duration, samples), within)
-        found = dict(zip(SIDES, reached.mean(axis=0).tolist(), strict=True))
-        return found | {"none": float((~reached.any(axis=-1)).mean())}
-
-    def report(self) -> str:
-        """Return the duration, and the share of the time at each limit, as text."""
-        shares = self.shares().items()
-        return "\n".join(
-            [f"{self.duration:.6g} s, {len(self.law.bump)} pieces; at a limit to {ACTIVE:.1%}:"]
-            + [f"  {name:<17} {share:7.2%} of the time" for name, share in shares if share > 0]
-        )

@@ -1,8 +1,9 @@
 """The shortest time along a curve that a robot's actuators allow.
 
-With forces F = m u'' + c u'^2 + g + friction, and speeds d_u u' (see `curve_dynamics`), limits of
-forces and speeds are linear in u'' and u'^2, and the shortest time is a convex program (see
-`fastest_profile`), which is solved repeatedly (see `time_search`).
+With forces F = m u'' + c u'^2 + g + friction, and speeds d u' (see
+`rps_pin.task.motion.curve_dynamics`), limits of forces and speeds are linear in u'' and u'^2, and
+the shortest time is a convex program (see `fastest_profile`), which is solved repeatedly (see
+`time_search`).
 
 A motion is returned only if `RPSRobot.actuator_forces` and the legs' speeds keep the limits to
 `KEPT`, within the pieces of its time law and at some 20,000 times.
@@ -11,47 +12,26 @@ A motion is returned only if `RPSRobot.actuator_forces` and the legs' speeds kee
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from functools import partial
 
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, shown
-from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.loads import checked_wrench
 from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.curve_dynamics import CurveDynamics
-from rps_pin.rps.motion.curve_refusal import ends_at_rest, require_clear_curve
+from rps_pin.rps.motion.curve_refusal import ends_at_rest, infeasible, require_clear_curve
 from rps_pin.rps.motion.limited_motion import LimitedMotion
-from rps_pin.rps.motion.time_search import KEPT, MOST_ROUNDS, TimeSearch
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.trajectories.curve import Curve, CurveSample
+from rps_pin.task.motion.curves import curve_of
+from rps_pin.task.motion.time_search import INTERVALS, KEPT, Progress, TimeSearch
+from rps_pin.trajectories.curve import Curve
 from rps_pin.trajectories.path import Trajectory
 from rps_pin.validation import whole_number
 
 __all__ = ["INTERVALS", "KEPT", "time_optimal"]
 
-Progress = Callable[[Iterable[int]], Iterable[int]]
 
-#: Pieces at first.
-INTERVALS = 100
-
-
-@dataclass(frozen=True)
-class _OwnTime:
-    """A trajectory as a curve: u is its own time."""
-
-    trajectory: Trajectory
-
-    @property
-    def length(self) -> float:
-        return self.trajectory.duration
-
-    def at(self, u: ArrayLike) -> CurveSample:
-        return CurveSample(*self.trajectory.sample(u))
-
-
-@refuses_other_kinds
 def time_optimal(
     robot: RPSRobot,
     path: Curve | Trajectory,
@@ -101,15 +81,13 @@ def time_optimal(
     """
     bounds = _checked_limits(ActuatorLimits.of(robot.parameters) if limits is None else limits)
     whole_number(intervals, "intervals", least=8)
-    curve = _curve_of(path)
+    curve = curve_of(path)
     load = None if wrench is None else checked_wrench(wrench, ())
     rest = ends_at_rest(robot, curve)
     require_clear_curve(robot, curve, bounds)
-    search = TimeSearch(CurveDynamics(robot, curve, bounds, load), rest, int(intervals))
-    for _ in progress(range(MOST_ROUNDS)):
-        if search.advance():
-            return search.motion()
-    raise search.failure()
+    dynamics = CurveDynamics(robot, curve, bounds, load)
+    search = TimeSearch(dynamics, rest, int(intervals), partial(infeasible, dynamics))
+    return LimitedMotion(dynamics, search.run(progress))
 
 
 # What is given ------------------------------------------------------------------------------------
@@ -129,15 +107,3 @@ def _checked_limits(limits: ActuatorLimits) -> ActuatorLimits:
             "limits=ActuatorLimits(force=...), or a robot with an actuator_force_limit"
         )
     return limits
-
-
-def _curve_of(path: object) -> Curve:
-    for candidate in (path, getattr(path, "curve", None)):
-        if hasattr(candidate, "at") and hasattr(candidate, "length"):
-            return candidate
-    if hasattr(path, "sample") and hasattr(path, "duration"):
-        return _OwnTime(path)
-    raise InputError(
-        f"path = {shown(path)}: it must be a curve (length, at), have one (curve), or be a "
-        "trajectory (duration, sample)"
-    )

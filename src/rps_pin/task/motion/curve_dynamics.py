@@ -1,0 +1,226 @@
+"""What is bounded along a curve, by the curve's parameter u and its rates.
+
+Along a curve x(u), forces and accelerations are
+
+    y = m(u) u'' + c(u) u'^2 + g(u) + friction(u, u'),
+
+the *levels*, and speeds are d(u) u'. Reversing the motion changes the sign of friction, and leaves
+the other parts as they are: this separates the two.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rps_pin.arrays import Array, Bools, Indices
+from rps_pin.trajectories.curve import Curve
+from rps_pin.trajectories.path import PathSample
+
+#: A limit counts as reached within this part of it.
+ACTIVE = 1e-3
+#: Relative step of the rate in the slope of friction: errors of about its square.
+_STEP = 1e-5
+#: Places along a curve where its size is looked for.
+_PLACES = 33
+#: Forces at rest below this part of the limit are rounding.
+_NO_WEIGHT = 1e-6
+
+
+class CurveLimits(NamedTuple):
+    """Least and largest of each quantity, shape (2, n) each; without any, (2, 0); or infinite."""
+
+    force: Array
+    """Of na actuators."""
+    acceleration: Array
+    """Of the actuators."""
+    coordinate_acceleration: Array
+    """Of m coordinates."""
+    speed: Array
+    """Of the actuators; the least are negative, the largest positive."""
+    coordinate_speed: Array
+    """Of the coordinates; the least are negative, the largest positive."""
+
+    @property
+    def levels(self) -> Array:
+        """Of forces and accelerations, shape (2, k)."""
+        return np.concatenate(self[:3], axis=-1)
+
+    @property
+    def speeds(self) -> Array:
+        """Of speeds, shape (2, l)."""
+        return np.concatenate(self[3:], axis=-1)
+
+
+class LimitUse(NamedTuple):
+    """Quantities over their limits: 1 is at the limit. Empty without limits, zero at infinite ones.
+
+    Levels count from the middle of their limits, so that -1 is at the least of them.
+    """
+
+    force: Array
+    """Of the actuators, shape (..., na); positive pushes out."""
+    acceleration: Array
+    """Of the actuators, shape (..., na)."""
+    coordinate_acceleration: Array
+    """Of the coordinates, shape (..., m)."""
+    speed: Array
+    """Of the actuators, shape (..., na); positive is out."""
+    coordinate_speed: Array
+    """Of the coordinates, shape (..., m)."""
+
+    @property
+    def sides(self) -> Array:
+        """Use of each limit: k largest levels, k least, l speeds either way, (..., 2 k + l)."""
+        level = np.concatenate(self[:3], axis=-1)
+        speed = np.concatenate(self[3:], axis=-1)
+        return np.concatenate([level, -level, np.abs(speed)], axis=-1)
+
+    @property
+    def most(self) -> Array:
+        """The largest of them, shape (...)."""
+        most: Array = self.sides.max(axis=-1)
+        return most
+
+
+class CurveTerms(NamedTuple):
+    """Terms of levels and speeds at points of a curve; the units of these and the curve's unit."""
+
+    inertia: Array
+    """m: levels by u'', shape (..., k)."""
+    velocity_product: Array
+    """c: levels by u'^2, shape (..., k)."""
+    holding: Array
+    """g: levels at rest, against gravity and the wrench, shape (..., k)."""
+    speed_slope: Array
+    """d: speeds by u', shape (..., l)."""
+
+
+class CurveDynamics:
+    """Levels and speeds of what moves along a curve; a subclass knows what that is.
+
+    Attributes
+    ----------
+    curve : Curve
+        The curve.
+    bounds : CurveLimits
+        Limits of levels and speeds.
+    sides : tuple of str
+        Names of the limits, in the order of `LimitUse.sides`.
+    has_friction : bool
+        Whether there is any.
+    times : int
+        At how many times a motion is checked at last.
+    """
+
+    times = 20_001
+
+    def __init__(
+        self, curve: Curve, bounds: CurveLimits, sides: tuple[str, ...], has_friction: bool
+    ) -> None:
+        self.curve = curve
+        self.bounds = bounds
+        self.sides = sides
+        self.has_friction = has_friction
+        low, high = bounds.levels
+        limited = np.isfinite(high)
+        #: Middle and half of the range of each level, shape (k,); zero and infinite without limits.
+        self.middle = np.where(limited, high + low, 0.0) / 2
+        self.half = np.where(limited, high - low, np.inf) / 2
+        #: u'^2 and u'' at which forces of inertia are of the size of the weight, 1/s^2.
+        self._square = self._size_of_square()
+
+    # What a subclass knows ------------------------------------------------------------------------
+
+    def place(self, u: Array) -> Any:
+        """Return what `levels` and `speed_slopes` take for parameters of shape (...)."""
+        raise NotImplementedError
+
+    def levels(self, place: Any, rate: Array, acceleration: Array) -> Array:
+        """Return forces and accelerations at u' and u'' of shape (...), shape (..., k)."""
+        raise NotImplementedError
+
+    def speed_slopes(self, place: Any) -> Array:
+        """Return d, speeds by u', shape (..., l)."""
+        raise NotImplementedError
+
+    # What follows ---------------------------------------------------------------------------------
+
+    @property
+    def limited(self) -> Bools:
+        """Which sides have a limit, in their order, shape (2 k + l,)."""
+        levels = np.isfinite(self.half)
+        return np.concatenate([levels, levels, np.isfinite(self.bounds.speeds[1])])
+
+    def terms(self, u: Array) -> CurveTerms:
+        """Return the terms at parameters of shape (...)."""
+        place, square, still = self.place(u), self._square, np.zeros_like(u)
+        rate = still + np.sqrt(square)
+        holding = self.levels(place, still, still)
+        there, back = self.levels(place, rate, still), self.levels(place, -rate, still)
+        return CurveTerms(
+            (self.levels(place, still, still + square) - holding) / square,
+            ((there + back) / 2 - holding) / square,
+            holding,
+            self.speed_slopes(place),
+        )
+
+    def friction(self, u: Array, square: Array) -> tuple[Array, Array]:
+        """Return levels of friction at u'^2 of shape (...), and their slope by u'^2, (..., k)."""
+        place, rate = self.place(u), np.sqrt(square)
+        more = self._friction(place, rate * (1 + _STEP))
+        less = self._friction(place, rate * (1 - _STEP))
+        # d/d(r^2) = (d/dr) / (2 r), and (d/dr) is the difference over 2 _STEP r
+        over = 4 * _STEP * square[..., None]
+        slope = np.divide(more - less, over, out=np.zeros_like(more), where=over > 0)
+        return self._friction(place, rate), slope
+
+    def use_along(self, u: Array, square: Array, acceleration: Array) -> LimitUse:
+        """Return levels and speeds over their limits at parameters, u'^2 and u'' of shape (...)."""
+        place, rate = self.place(u), np.sqrt(square)
+        levels = self.levels(place, rate, acceleration)
+        return self.use_of(levels, self.speed_slopes(place) * rate[..., None])
+
+    def use_of(self, levels: Array, speeds: Array) -> LimitUse:
+        """Return levels (..., k) and speeds (..., l) over their limits."""
+        level = np.split((levels - self.middle) / self.half, _ends(self.bounds[:3]), axis=-1)
+        speed = np.split(self.speed_over_limit(speeds), _ends(self.bounds[3:]), axis=-1)
+        return LimitUse(*level, *speed)
+
+    def speed_over_limit(self, speeds: Array) -> Array:
+        """Return speeds (..., l) over the limits of their directions, with their signs."""
+        least, largest = self.bounds.speeds
+        over: Array = np.where(speeds < 0, speeds / -least, speeds / largest)
+        return over
+
+    def sample(self, u: Array, square: Array, acceleration: Array) -> PathSample:
+        """Return the motion at parameters, u'^2 and u'' of shape (...)."""
+        x, first, second = self.curve.at(u)
+        rate = first * np.sqrt(square)[..., None]
+        change = first * acceleration[..., None] + second * square[..., None]
+        return PathSample(x, rate, change)
+
+    def _friction(self, place: Any, rate: Array) -> Array:
+        still = np.zeros_like(rate)
+        return (self.levels(place, rate, still) - self.levels(place, -rate, still)) / 2
+
+    def _size_of_square(self) -> float:
+        u = np.linspace(0.0, self.curve.length, _PLACES)
+        place, still, count = self.place(u), np.zeros(_PLACES), self.bounds.force.shape[-1]
+        holding = self.levels(place, still, still)[:, :count]
+        inertia = self.levels(place, still, still + 1.0)[:, :count] - holding
+        largest = float(np.abs(inertia).max(initial=0.0))
+        weight = float(np.abs(holding).max(initial=0.0))
+        limit = float(self.half[:count].min(initial=math.inf))
+        if math.isfinite(limit) and weight < _NO_WEIGHT * limit:
+            weight = limit
+        square = weight / largest if largest > 0 else 1.0
+        return square if 0 < square < math.inf else 1.0
+
+
+def _ends(parts: Sequence[Array]) -> Indices:
+    """Return where parts of shapes (2, n) end in an array of all, without the last."""
+    return np.cumsum([part.shape[-1] for part in parts])[:-1]
