@@ -128,8 +128,8 @@ class CurveDynamics:
         low, high = bounds.levels
         limited = np.isfinite(high)
         #: Middle and half of the range of each level, shape (k,); zero and infinite without limits.
-        self.middle = np.where(limited, high + low, 0.0) / 2
-        self.half = np.where(limited, high - low, np.inf) / 2
+        self.middle = (np.where(limited, high, 0.0) + np.where(limited, low, 0.0)) / 2
+        self.half = (high - low) / 2
         #: u'^2 and u'' at which forces of inertia are of the size of the weight, 1/s^2.
         self._square = self._size_of_square()
 
