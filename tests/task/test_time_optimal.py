@@ -29,6 +29,7 @@ from rps_pin.errors import (
 from rps_pin.rps import ActuatorLimits
 from rps_pin.rps import time_optimal as rps_time_optimal
 from rps_pin.task import MotionLimits, Task, time_optimal
+from rps_pin.task.motion import task_dynamics
 from rps_pin.task.motion.limited_motion import LimitedMotion
 from rps_pin.task.motion.time_search import KEPT
 from rps_pin.trajectories.point_to_point import LineCurve
@@ -306,7 +307,8 @@ def test_friction_in_the_joints_is_overcome() -> None:
     assert found.duration > 1.01 * time_optimal(robots.compiled("five_bar"), line).duration
 
 
-def test_pinocchio_finds_the_same() -> None:
+def test_pinocchio_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(task_dynamics, "_FEW_TIMES", 101)
     slow, fast = robots.task("five_bar"), robots.compiled("five_bar")
     line = LineCurve(slow.home, slow.home + np.array([0.02, 0.01]))
     found = [time_optimal(task, line, intervals=8) for task in (slow, fast)]
