@@ -9,6 +9,7 @@ list the keys that are possible.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -325,6 +326,8 @@ def _scalar_fault(node: ScalarNode) -> str:
         return f"a number of {len(value)} digits is too long"
     if kind in ("int", "float") and not _NUMBER.fullmatch(value):
         return f"{shown(value)} is not a number of YAML"
+    if kind == "float" and value[-1] in "0123456789." and math.isinf(float(value)):
+        return f"{shown(value)} is too large for a number; .inf is infinite"
     if any("\ud800" <= letter <= "\udfff" for letter in value):
         return f"{shown(value)} has half a character (a surrogate)"
     return ""

@@ -187,8 +187,7 @@ _PARAMETERS = YamlMutator(
     required={
         *("base_radius", "platform_radius", "platform_mass", "platform_inertia"),
         *("leg_mass", "leg_com", "leg_inertia"),
-    },
-    infinite={"actuator_force_limit", "actuator_speed_limit", "spherical_cone_limit", 0, 1},
+    }
 )
 _PRESETS = ROOT / "src" / "rps_pin" / "rps" / "presets"
 _TRAJECTORY = YamlMutator(

@@ -15,6 +15,7 @@ from rps_pin import ClosedLoopModel, ForceDistribution, RPSParameters, RPSRobot
 from rps_pin.control import Gains, RealTimeRobot
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.paper import lagrange_forces
+from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.workspace import leg_grid, load_workspace, save_workspace, workspace
 from rps_pin.trajectories import read_csv
 from tests.cli.commands import rps_pin
@@ -152,3 +153,40 @@ def test_an_output_below_a_file_is_refused_before_the_work(tmp_path: Path) -> No
     ended = rps_pin("reproduce", "--quick", "--output", "a_file", folder=tmp_path)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert "a_file is a file: " in ended.stderr
+
+
+@pytest.mark.parametrize(("name", "slip"), [("angle", "anglee"), ("conditioning", "condtioning")])
+def test_a_workspace_with_a_misspelt_field(name: str, slip: str, tmp_path: Path) -> None:
+    parameters, file = RPSParameters.from_preset("micro"), tmp_path / "w.h5"
+    save_workspace(workspace(parameters, leg_grid(parameters, 3)), file)
+    with h5py.File(file, "r+") as opened:
+        opened["rotation"] = [np.nan]  # the user's own
+    load_workspace(file)
+    with h5py.File(file, "r+") as opened:
+        opened.move(name, slip)
+    with pytest.raises(InputError, match=rf"no field '{slip}' \(did you mean {name}\?\)"):
+        load_workspace(file)
+
+
+@pytest.mark.parametrize("complete", ["x", "False", 1.0, np.nan])
+def test_a_workspace_is_complete_by_a_boolean_alone(complete: Any, tmp_path: Path) -> None:
+    parameters, file = RPSParameters.from_preset("micro"), tmp_path / "w.h5"
+    save_workspace(workspace(parameters, leg_grid(parameters, 3)), file)
+    with h5py.File(file, "r+") as opened:
+        opened.attrs["complete"] = complete
+    with pytest.raises(InputError, match="does not hold a complete"):
+        load_workspace(file)
+
+
+@pytest.mark.parametrize("number", ["1e400", "-1.0e+999"])
+def test_yaml_numbers_that_overflow_are_not_infinite(number: str, tmp_path: Path) -> None:
+    file = tmp_path / "path.yaml"
+    text = (
+        "kind: point_to_point\nstart: [0.21, 0, 0]\nend: [0.235, 0.1, 0]\nmax_rate: [0.1, 1, {}]\n"
+    )
+    micro = RPSRobot.from_preset("micro")
+    file.write_text(text.format(".inf"), "utf-8")
+    assert np.isfinite(load_trajectory(file, micro).duration)
+    file.write_text(text.format(number), "utf-8")
+    with pytest.raises(InputError, match=r"line 4: .* is too large for a number; \.inf is infin"):
+        load_trajectory(file, micro)

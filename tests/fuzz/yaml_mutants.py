@@ -58,12 +58,10 @@ class YamlMutator:
     ----------
     required
         Keys without which the mapping that they are in must be refused.
-    infinite
-        Keys whose number may be infinite.
     """
 
-    def __init__(self, required: Collection[str] = (), infinite: Collection[str] = ()) -> None:
-        self._required, self._infinite = set(required), set(infinite)
+    def __init__(self, required: Collection[str] = ()) -> None:
+        self._required = set(required)
         self._usual: list[Callable[[Any, Random], None]] = [
             *[_other_value] * 6,
             *(_dropped, _doubled, _moved, _renamed, _nested, _from_elsewhere),
@@ -84,11 +82,7 @@ class YamlMutator:
         return content, why
 
     def _no_number(self, root: Any, rng: Random) -> str:
-        places = [
-            (where, key)
-            for where, key in _places(root)
-            if type(where[key]) in (int, float) and key not in self._infinite
-        ]
+        places = [(where, key) for where, key in _places(root) if type(where[key]) in (int, float)]
         if not places:
             return ""
         where, key = rng.choice(places)

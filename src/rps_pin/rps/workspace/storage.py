@@ -20,6 +20,7 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
 
@@ -27,7 +28,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, shown
 from rps_pin.files import whole_file
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
@@ -55,6 +56,8 @@ _FIELDS = {
 ALL_FIELDS = tuple(_FIELDS)
 #: Values of one axis at most, in a file that is read.
 LONGEST_AXIS = 1_000_000
+#: How alike a misspelt name is to the right one, by `difflib`.
+_ALIKE = 0.8
 _VECTORS = ("pose", "position", "length", "angle")
 
 
@@ -163,6 +166,8 @@ def save_workspace(
 def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> Workspace:
     """Read a workspace, or a block of its grid, from an HDF5 file.
 
+    Datasets of names that are no field's are not read.
+
     Parameters
     ----------
     path
@@ -174,14 +179,17 @@ def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> 
     ------
     InputError
         If there is no such file, or it does not hold a complete workspace: shapes that fit the
-        axes, finite numbers, no singular point inside, all of them in the file itself.
+        axes, finite numbers, no singular point inside, all of them in the file itself, no name of
+        a field misspelt.
     """
     planes, rows = block or WHOLE
     try:
         if Path(path).exists() and not Path(path).is_file():
             raise InputError(f"cannot read the workspace {path}: it is not a regular file")
         with h5py.File(path, "r") as file:
-            if file.attrs.get("format") != FORMAT or not file.attrs.get("complete", False):
+            complete = file.attrs.get("complete")
+            ended = isinstance(complete, np.bool_) and complete
+            if file.attrs.get("format") != FORMAT or not ended:
                 raise InputError(f"{path} does not hold a complete '{FORMAT}'")
             kind = str(file.attrs["grid"])
             axes = [_dataset(file, f"axis_{i}", None) for i in (1, 2, 3)]
@@ -194,6 +202,7 @@ def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> 
             missing = {"reason", "pose"} - set(file)
             if missing:
                 raise InputError(f"{path} has no dataset {', '.join(sorted(missing))}")
+            _refuse_misspelt(file)
             stored = {
                 name: _dataset(file, name, shape)[planes, rows]
                 for name in ALL_FIELDS
@@ -216,6 +225,15 @@ def load_workspace(path: str | os.PathLike[str], block: Block | None = None) -> 
     if (fields.determinant[reason == 0] == 0).any():
         raise InputError(f"cannot read the workspace {path}: determinant is 0 at a point inside")
     return Workspace(parameters, grid, start, least, fields)
+
+
+def _refuse_misspelt(file: h5py.File) -> None:
+    """Refuse a name like that of a field which the file lacks; others are their owner's."""
+    lacking = [name for name in ALL_FIELDS if name not in file]
+    for name in file:
+        meant = get_close_matches(name, lacking, n=1, cutoff=_ALIKE)
+        if name not in ALL_FIELDS and meant:
+            raise InputError(f"no field {shown(name)} (did you mean {meant[0]}?)")
 
 
 def _dataset(file: h5py.File, name: str, grid: tuple[int, ...] | None) -> h5py.Dataset:
