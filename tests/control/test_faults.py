@@ -204,7 +204,6 @@ def test_faults_of_readings_leave_targets_alone(pair: tuple[Fault, tuple[int, in
         ({"duration": -1.0}, "fault duration = -1.0"),
         ({"duration": math.nan}, "fault duration = nan"),
         ({"leg": 0}, "fault leg = 0: it must be a whole number"),
-        ({"leg": 4}, "fault leg = 4: legs are 1, 2 and 3"),
         ({"leg": "one"}, "fault leg = 'one'"),
         ({"kind": "jump"}, "fault size = 0.0: a size, in m, is for a jump only"),
         ({"kind": "jump", "size": math.nan}, "fault size = nan"),
@@ -213,7 +212,7 @@ def test_faults_of_readings_leave_targets_alone(pair: tuple[Fault, tuple[int, in
         ({"kind": "target"}, "an offset is for a fault of the target only"),
         ({"offset": (1e-3, 0.0, 0.0)}, "an offset is for a fault of the target only"),
         ({"kind": "target_nan", "offset": (0.0, 0.1, 0.0)}, "of the target only"),
-        ({"kind": "target", "offset": (1e-3, 0.0)}, r"fault offset has shape \(2,\)"),
+        ({"kind": "target", "offset": ((1e-3, 0.0),)}, r"fault offset has shape \(1, 2\)"),
         (
             {"kind": "target", "offset": (0.0, math.nan, 0.0)},
             "offset is not finite: entry 1 is nan",
@@ -245,3 +244,18 @@ def test_words() -> None:
     jump = Fault("jump", 1.0, 0.5, leg=3, size=-2e-3)
     assert str(jump) == "jump of leg 3 by -0.002 m from t = 1 s for 0.5 s"
     assert "by (0.1, 0.0, 0.2) m, rad, rad" in str(Fault("target", 0.0, offset=(0.1, 0.0, 0.2)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"leg": 4}, "fault leg = 4: legs are 1, 2 and 3"),
+        ({"kind": "target", "offset": (1e-3, 0.0)}, "the pose has 3 coordinates"),
+    ],
+)
+def test_what_does_not_fit_the_robot_is_refused(changes: dict[str, Any], said: str) -> None:
+    """Of another robot it may: a fault has no robot of its own."""
+    fault = Fault(**({"kind": "nan", "start": 0.0} | changes))
+    with pytest.raises(InputError, match=said):
+        fault.check(3, 3)
+    fault.check(6, len(fault.offset))

@@ -43,7 +43,8 @@ def test_gains_are_three_numbers_each_and_fixed() -> None:
     [
         ((-1.0, 1.0), "gain proportional"),
         ((1.0, np.nan), "gain derivative"),
-        ((1.0, [1.0, 2.0]), "shape"),
+        (([1.0, 2.0, 3.0], [1.0, 2.0]), "shape"),
+        (([[1.0]], 2.0), "shape"),
         ((1.0, 0.0, 1.0), "needs a derivative"),
         (("x", 0.0), "gain proportional"),
     ],

@@ -38,12 +38,12 @@ def control_command(
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
-    """Run a control loop against a simulated 3-RPS that differs from the controller's model.
+    """Run a control loop against a simulated robot that differs from the controller's model.
 
-    The file has the robot, trajectory, controller, plant (wrong masses, friction, encoders, delay)
-    and faults. Output: **report.md** with gains, margins, errors in micrometres and microradians
-    and statuses, **loop.csv** (every tick), figures, **summary.json**, and **viewer.html**, the
-    motion in 3D.
+    The file has the robot (a 3-RPS, or a mechanism with a task), trajectory, controller, plant
+    (wrong masses, friction, encoders, delay) and faults. Output: **report.md** with gains, margins,
+    errors in micrometres and microradians and statuses, **loop.csv** (every tick), figures,
+    **summary.json**, and **viewer.html**, the motion in 3D.
 
     Exit status: 0 done, also if the controller stopped; 1 it cannot be run, or not to the end (the
     error says why); 2 wrong usage; 130 Ctrl-C. What was run before the end is written.
@@ -52,42 +52,45 @@ def control_command(
 
     - `rps-pin control docs/scenarios/micro_helix.yaml`
     """
-    from rps_pin.control.simulation.loop_run import COLUMNS, write_loop_csv
-    from rps_pin.control.simulation.loop_summary import LoopSummary, status_name
+    from rps_pin.control.simulation.loop_run import columns_of, write_loop_csv
+    from rps_pin.control.simulation.loop_summary import status_name, summary_of
     from rps_pin.control.simulation.report import report
     from rps_pin.control.simulation.scenario import load_scenario
+    from rps_pin.rps.robot import RPSRobot
 
     loaded = load_scenario(scenario)
-    name = loaded.model.parameters.name
+    name = loaded.name
+    robot = "3-RPS" if isinstance(loaded.machine, RPSRobot) else "mechanism"
     folder = output or Path(f"{scenario.stem}-control")
     files = [folder / file for file in ("report.md", "loop.csv", "summary.json")]
     results = [*files, *figures_in(folder, "tracking", "forces"), folder / "viewer.html"]
     check_outputs(results, overwrite, inputs=[scenario], renewed=True)
     console = common.text_console(as_json)
-    common.tell_size("loop.csv", loaded.duration / loaded.entry.period, COLUMNS)
+    common.tell_size("loop.csv", loaded.duration / loaded.entry.period, columns_of(*loaded.sizes))
     run, broken = _run(loaded, console)
     window = loaded.entry.settle if run.time[-1] > loaded.entry.settle else 0.0
-    summary = LoopSummary.of(run, begin=window)
+    summary = summary_of(run, begin=window)
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
         from rps_pin.plots import save_figure
         from rps_pin.plots.control import plot_loop_forces, plot_tracking
         from rps_pin.viewer import Motion
 
-        title = f"3-RPS {name}, {scenario.name}"
+        title = f"{robot} {name}, {scenario.name}"
         write_loop_csv(files[1], run)
         write_text(files[2], json.dumps(summary.as_dict(), indent=2) + "\n")
         write_text(files[0], report(title, loaded, run, summary, _CAPTIONS))
         files += save_figure(plot_tracking(run, begin=window), folder, "tracking")
         files += save_figure(plot_loop_forces(run, begin=window), folder, "forces")
-        model = loaded.machine.mechanism.model
+        mechanism = loaded.machine.mechanism
+        model = mechanism.model
         motion = Motion(model, run.time, run.configuration, forces=run.applied)
-        files.append(write_page(folder, loaded.machine, motion, title))
+        files.append(write_page(folder, loaded.subject, motion, title))
     if as_json:
         common.print_json({"scenario": scenario} | summary.as_dict() | {"files": files})
     else:
         console.print(
-            f"3-RPS [bold]{escape(name)}[/], {escape(str(scenario))}, from {window:g} s on",
+            f"{robot} [bold]{escape(name)}[/], {escape(str(scenario))}, from {window:g} s on",
             markup=True,
         )
         console.print(summary.table())

@@ -1,7 +1,8 @@
-"""Control of the 3-RPS: a status in each tick instead of exceptions, and no growing memory.
+"""Control of the 3-RPS, and of any mechanism with a task: a status in each tick, no exceptions.
 
 - `loop`: the laws `ComputedTorque` and `PDControl` with `Gains`, `PacedTrajectory`, `LoopClock`
-- `estimator`: `RealTimeRobot`, state estimate and inverse dynamics for other laws
+- `estimator`: `RealTimeRobot`, state estimate and inverse dynamics for other laws; `any_task`:
+  `TaskEstimate`, that of a task
 - `loop_margins`: stability margins for the tuning
 - `simulation`: `Plant` with `Encoders`, `ServoDrives`, `wrong_parameters` and `Fault`; `run_loop`
   gives a `LoopRun`, `LoopSummary` its figures; `load_scenario` reads YAML files
@@ -9,6 +10,7 @@
 The robot itself is in `rps_pin.rps`; `rps_pin.viewer.server.live_view` displays a running loop.
 """
 
+from rps_pin.control.any_task.estimate import TaskEstimate
 from rps_pin.control.estimator.effective_inertia import effective_inertia
 from rps_pin.control.estimator.output_arrays import Answers
 from rps_pin.control.estimator.real_time_robot import RealTimeRobot
@@ -23,7 +25,7 @@ from rps_pin.control.margins import loop_margins
 from rps_pin.control.simulation.encoders import Encoders
 from rps_pin.control.simulation.faults import Fault
 from rps_pin.control.simulation.loop_run import LoopRun, run_loop, write_loop_csv
-from rps_pin.control.simulation.loop_summary import LoopSummary
+from rps_pin.control.simulation.loop_summary import LoopSummary, TaskSummary
 from rps_pin.control.simulation.plant import Plant
 from rps_pin.control.simulation.scenario import load_scenario
 from rps_pin.control.simulation.servo_drives import ServoDrives
@@ -45,6 +47,8 @@ __all__ = [
     "RealTimeRobot",
     "ServoDrives",
     "Status",
+    "TaskEstimate",
+    "TaskSummary",
     "effective_inertia",
     "load_scenario",
     "loop_margins",

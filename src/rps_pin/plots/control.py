@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools
 from rps_pin.control.loop.status import Status
 from rps_pin.control.simulation.loop_run import LoopRun
 from rps_pin.control.simulation.loop_summary import TrackingErrors, status_name
@@ -34,6 +34,8 @@ def plot_tracking(
 ) -> Figure:
     """Draw the errors (actual minus target) of centre (um), orientation (urad) and legs (um).
 
+    Of a task: of its lengths (um), of its angles (urad), and the distance to a singularity.
+
     Parameters
     ----------
     run
@@ -48,8 +50,11 @@ def plot_tracking(
     InputError
         If there are not three axes.
     """
-    errors, here = TrackingErrors.of(run), run.time >= begin
+    here = run.time >= begin
     time = run.time[here]
+    if run.task is not None:
+        return _plot_task_errors(run, axes, here)
+    errors = TrackingErrors.of(run)
     with matplotlib.rc_context(STYLE):
         centre, turn, legs = three_axes(axes, "Errors: actual minus target")
         plot_legs(centre, time, 1e6 * errors.centre[here], ("$p_x$", "$p_y$", "$p_z$"))
@@ -87,20 +92,43 @@ def plot_loop_forces(
     time = run.time[here]
     with matplotlib.rc_context(STYLE):
         forces, distance, statuses = three_axes(axes, "Forces and statuses of the controller")
-        limit = run.parameters.actuator_force_limit
-        labels = ("$F_1$", "$F_2$", "$F_3$")
-        plot_legs(forces, time, run.applied[here], labels, drawstyle="steps-post")
-        if np.abs(run.applied).max() > 0.5 * limit:
-            for side in (-limit, limit):
-                forces.axhline(side, color="black", linewidth=0.8, linestyle=":")
-        forces.set_ylabel("force (N)")
+        if run.parameters is None:
+            for force, (name, _, unit) in zip(run.applied[here].T, run.of_actuators, strict=True):
+                forces.plot(time, force, drawstyle="steps-post", label=f"{name} ({unit})")
+        else:
+            labels = ("$F_1$", "$F_2$", "$F_3$")
+            plot_legs(forces, time, run.applied[here], labels, drawstyle="steps-post")
+            limit = run.parameters.actuator_force_limit
+            if np.abs(run.applied).max() > 0.5 * limit:
+                for side in (-limit, limit):
+                    forces.axhline(side, color="black", linewidth=0.8, linestyle=":")
+        forces.set_ylabel("force (N)" if run.task is None else "force")
         forces.legend(**_LEGEND)
         distance.plot(time, run.type_ii[here], color="black")
         top = 1.1 * float(run.type_ii[here].max(initial=0.1))
-        distance.set(ylim=(0.0, top), ylabel="distance to\ntype II (1)")
+        where = "type II" if run.task is None else "singularity"
+        distance.set(ylim=(0.0, top), ylabel=f"distance to\n{where} (1)")
         _draw_statuses(statuses, run)
         _finish((forces, distance, statuses), time)
     return figure_of(forces)
+
+
+def _plot_task_errors(run: LoopRun, axes: Sequence[Axes] | None, here: Bools) -> Figure:
+    """Draw the errors of a task's coordinates."""
+    time, errors = run.time[here], 1e6 * (run.pose - run.target)[here]
+    with matplotlib.rc_context(STYLE):
+        lengths, angles, distance = three_axes(axes, "Errors: actual minus target")
+        for error, (name, unit) in zip(errors.T, run.of_pose, strict=True):
+            (lengths if unit == "m" else angles).plot(time, error, label=name)
+        lengths.set_ylabel("lengths (µm)")
+        angles.set_ylabel("angles (µrad)")
+        distance.plot(time, run.type_ii[here], color="black")
+        distance.set(ylim=(0.0, None), ylabel="distance to\nsingularity (1)")
+        for own in (lengths, angles):
+            if own.lines:
+                own.legend(**_LEGEND)
+        _finish((lengths, angles, distance), time)
+    return figure_of(lengths)
 
 
 def _draw_statuses(axes: Axes, run: LoopRun) -> None:

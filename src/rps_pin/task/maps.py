@@ -11,6 +11,7 @@ and a(x) is continued within an assembly mode. K does not exist at a type I sing
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import deepcopy
 from functools import cached_property, partial
 from typing import Any, NamedTuple, Self
 
@@ -96,9 +97,30 @@ class TaskMaps:
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(type(self), **self._options), (self.mechanism,)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return one with scratch memory of its own; generated code serves both."""
+        copied: Self = _call_reduced(self.__reduce__(), memo)
+        if self.compiled:
+            copied._by_task, copied._by_actuators = self._by_task, self._by_actuators
+        return copied
+
     def __repr__(self) -> str:
         of = f"frame {self._x.frame!r}: " if self._x.frame else "joints "
         return f"{type(self).__name__}({of}{', '.join(self.coordinates)}; {self.mechanism!r})"
+
+    def interpreted(self) -> Self:
+        """Return the same task by the Pinocchio engine."""
+        copied: Self = _call_reduced(self.__reduce__(), {})
+        return copied
+
+    def with_mechanism(self, mechanism: ClosedLoopModel) -> Self:
+        """Return the same coordinates of another mechanism, one with other masses as an example."""
+        return type(self)(mechanism, **self._options)
+
+    @property
+    def compiled(self) -> bool:
+        """Whether generated code computes the maps: see `compile`."""
+        return not isinstance(self._by_task, PinocchioEngine)
 
     @property
     def frame(self) -> str | None:
@@ -276,9 +298,8 @@ class TaskMaps:
         RPSPinError
             As `to_actuators`.
         """
-        _ = self.of_actuators  # or refuse
         q = self.mechanism.home if near is None else self._rows(near, self._nq, "near")
-        found = self._by_actuators.complete(a, q, **_continued(within_limits, errors))
+        found = self.configuration_of(a, q, within_limits=within_limits, errors=errors)
         about = self.at(q) if any(self.angular) else None
         failed = np.isnan(found[..., :1])
         if not failed.any():
@@ -374,6 +395,65 @@ class TaskMaps:
         """Return x' of velocities (..., nv) that keep the loops closed, shape (..., m)."""
         forward = self._frame_rows(q, errors)
         return np.asarray(np.einsum("...ij,...j->...i", forward, self._rows(v, self._nv, "v")))
+
+    # From the actuators ---------------------------------------------------------------------------
+
+    def configuration_of(
+        self,
+        a: ArrayLike,
+        near: ArrayLike | None = None,
+        *,
+        within_limits: bool = True,
+        errors: Errors = "raise",
+    ) -> Array:
+        """Return the closed configurations of actuators' positions, (..., nq); see `to_task`."""
+        _ = self.of_actuators  # or refuse
+        q = self.mechanism.home if near is None else self._rows(near, self._nq, "near")
+        found = self._by_actuators.complete(a, q, **_continued(within_limits, errors))
+        return np.asarray(found)
+
+    def velocity_of(self, q: ArrayLike, speed: ArrayLike, *, errors: Errors = "raise") -> Array:
+        """Return the velocities of all joints that actuators' speeds make, shape (..., nv).
+
+        Parameters
+        ----------
+        q
+            Closed configurations, shape (..., nq).
+        speed
+            Of the actuators, shape (..., na), m/s or rad/s.
+
+        Raises
+        ------
+        SingularityError
+            If they do not determine the motion here.
+        """
+        return np.asarray(self._by_actuators.velocity(q, speed, **options_of(errors)))
+
+    def actuator_forces(
+        self,
+        q: ArrayLike,
+        rate: ArrayLike,
+        acceleration: ArrayLike,
+        *,
+        errors: Errors = "raise",
+    ) -> Array:
+        """Return the actuators' forces of motions of the task, shape (..., na), N or N m.
+
+        Parameters
+        ----------
+        q
+            Closed configurations, shape (..., nq).
+        rate, acceleration
+            Of the task's coordinates, shape (..., m) each.
+
+        Raises
+        ------
+        SingularityError
+            If the forces or the motion are not determined here.
+        """
+        state = self.motion(q, rate, acceleration, errors=errors)
+        forces = self._by_actuators.inverse_dynamics(*state, **options_of(errors))
+        return np.asarray(forces.tau)
 
     # Parts ----------------------------------------------------------------------------------------
 
@@ -493,6 +573,11 @@ class TaskMaps:
         if not np.isfinite(found).all():
             raise InputError(f"{name} holds numbers that are not finite")
         return found
+
+
+def _call_reduced(reduced: tuple[Any, ...], memo: dict[int, Any]) -> Any:
+    make, arguments = reduced
+    return make(*deepcopy(arguments, memo))
 
 
 def options_of(errors: Errors) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from rps_pin.arrays import Array
 from rps_pin.control.estimator.leg_geometry import LegGeometry, leg_geometry
 from rps_pin.control.estimator.leg_jacobian import leg_jacobian
 from rps_pin.control.estimator.robot_state import robot_state
+from rps_pin.control.robots import Robot, task_of
 from rps_pin.errors import SingularityError, UnreachableError
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.robot import RPSRobot
@@ -69,8 +70,8 @@ class TaskSpaceInertia:
 
 
 @refuses_other_kinds
-def effective_inertia(robot: RPSRobot, pose: ArrayLike, *, space: str = "actuator") -> Array:
-    """Return the inertia of each error of a control law in a pose, shape (3,).
+def effective_inertia(robot: Robot, pose: ArrayLike, *, space: str = "actuator") -> Array:
+    """Return the inertia of each error of a control law in a pose, shape (m,).
 
     Argument of `Gains.times`, which gives a law that commands forces the stiffness of one that
     commands accelerations. It is the diagonal of the inertia matrix: the coupling between the
@@ -79,22 +80,28 @@ def effective_inertia(robot: RPSRobot, pose: ArrayLike, *, space: str = "actuato
     Parameters
     ----------
     robot
-        The robot, with its payload.
+        The robot, with its payload; an `RPSRobot`, a `Task`, or a `ClosedLoopModel` that has one.
     pose
-        Shape (3,), m and rad.
+        Shape (m,), m and rad; of a task in the assembly mode of home.
     space
-        ``"actuator"``: of the legs, kg. ``"task"``: of (z, tilt_x, tilt_y), kg and kg m^2.
+        ``"actuator"``: of the legs, kg. ``"task"``: of (z, tilt_x, tilt_y), kg and kg m^2. Of a
+        task: of the actuators and of the coordinates.
 
     Raises
     ------
     InputError
         If the pose has another shape, or there is no such space.
-    UnreachableError
-        If a leg has no length in the pose.
+    UnreachableError, ClosureError
+        If the pose is out of reach.
     SingularityError
         If the pose is singular, in actuator space.
     """
     choice(space, "space", ("actuator", "task"))
+    if not isinstance(robot, RPSRobot):
+        task = task_of(robot)
+        q = task.configuration(real_vector(pose, task.size, "pose"))
+        mass = task.mass_matrix(q) if space == "task" else task.mechanism.mass_matrix(q)
+        return mass.diagonal().copy()
     p = robot.parameters
     z, tilt_x, tilt_y = real_vector(pose, 3, "pose").tolist()
     geometry = leg_geometry((z, tilt_x, tilt_y), p.base_radius, p.platform_radius)

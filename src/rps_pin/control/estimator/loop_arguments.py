@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.rps.kinematics.tracking import Triple
 
 #: Three numbers; None where they are missing.
@@ -61,3 +62,19 @@ def _number(value: Any) -> float:
     if isinstance(value, _NO_NUMBERS):
         raise TypeError
     return float(value)
+
+
+def floats(values: Numbers, count: int) -> Array | None:
+    """Return finite numbers, shape (count,), by the rules of `three_floats`; None otherwise."""
+    try:
+        rows: Any = values
+        if isinstance(values, np.ndarray):
+            rows = values.tolist() if values.dtype.kind in "fiu" else None
+        elif isinstance(values, _NO_ROWS):
+            return None
+        found = [one if type(one) is float else _number(one) for one in rows]
+    except Exception:  # of whatever object
+        return None
+    if len(found) != count or not all(map(math.isfinite, found)):
+        return None
+    return np.array(found)

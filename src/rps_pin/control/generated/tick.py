@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from rps_pin.codegen.units import Kernel, Routine, Unit
+from rps_pin.control.estimator.leg_formulas import LegFormulas
 from rps_pin.control.estimator.leg_geometry import (
     LegGeometry,
     closure_determinant,
@@ -23,13 +24,13 @@ from rps_pin.control.estimator.state_estimate import (
     geometry_of_legs,
     moving,
 )
-from rps_pin.control.laws import Dynamics, Feedback, computed_torque, pd_control, pid
+from rps_pin.control.laws import Dynamics, Feedback, computed_torque, pd_control
 from rps_pin.control.loop import status as flags
-from rps_pin.control.loop.filters import backward_difference, low_pass, mean
 from rps_pin.control.loop.force_limits import recovered_pace
 from rps_pin.control.loop.force_limits import within_limits as forces_within
 from rps_pin.control.loop.limits import none_beyond, within_limits
 from rps_pin.control.loop.setpoints import Setpoint, all_below
+from rps_pin.control.loop.vectors import backward_difference, low_pass, mean, pid
 from rps_pin.numerics.elementary import Number, select_all
 from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, kernel, symbols
 from rps_pin.rps.generated.forces import TERMS, terms_of
@@ -257,7 +258,13 @@ def _control(
         * (abs(closure_determinant(state.geometry, g, h)) > numbers["stop"])
     )
     after: dict[str, Any] = {}
-    force = law(state, setpoint, h, _feedback(numbers, memory, reading, after), _dynamics(numbers))
+    force = law(
+        state,
+        setpoint,
+        LegFormulas(h),
+        _feedback(numbers, memory, reading, after),
+        _dynamics(numbers),
+    )
     regular = regular * (abs(sum(force)) < math.inf) * forces_within(force, numbers["force_limit"])
     return Tick(
         regular,

@@ -20,12 +20,12 @@ delay limit it), damping 1, and as much integral action as the uncertainty of th
 
 from __future__ import annotations
 
-from rps_pin.control.estimator.leg_jacobian import leg_speed
+from typing import Any
+
 from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.laws import computed_torque
 from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.setpoints import Setpoint
-from rps_pin.rps.kinematics.tracking import Triple
 
 
 class ComputedTorque(Controller):
@@ -49,10 +49,14 @@ class ComputedTorque(Controller):
         # A class of its own may have another law.
         return f"computed_torque_{self.space}" if type(self) is ComputedTorque else ""
 
-    def _law(self, state: StateEstimate, setpoint: Setpoint) -> Triple | None:
+    def _law(self, state: StateEstimate, setpoint: Setpoint) -> Any:
         return computed_torque(
-            self._in_task_space, state, setpoint, self._h, self._pid, self._solve
+            self._in_task_space, state, setpoint, self._model, self._pid, self._solve
         )
 
-    def _command_error(self, state: StateEstimate, force: Triple, acceleration: Triple) -> Triple:
-        return acceleration if self._in_task_space else leg_speed(state.jacobian, acceleration)
+    def _command_error(self, state: StateEstimate, force: Any, acceleration: Any) -> Any:
+        return (
+            acceleration
+            if self._in_task_space
+            else self._model.speed_of_rate(state.jacobian, acceleration)
+        )

@@ -23,42 +23,40 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import fields
-from typing import Any, Literal, get_args
+from typing import Any, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.control.estimator.effective_inertia import TaskSpaceInertia
-from rps_pin.control.estimator.leg_geometry import LegGeometry, closure_determinant, leg_geometry
-from rps_pin.control.estimator.leg_jacobian import leg_jacobian
+from rps_pin.control.any_task.model import TaskModel
+from rps_pin.control.estimator.leg_model import LegModel
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time
-from rps_pin.control.estimator.real_time_robot import RealTimeRobot
-from rps_pin.control.estimator.robot_state import robot_state
 from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.generated.code import NOT_REGULAR, GeneratedTick
 from rps_pin.control.generated.engine import Compiled, generated_tick
 from rps_pin.control.generated.proof import Ticked
-from rps_pin.control.laws import pid
 from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SetpointRateFilter
 from rps_pin.control.loop.force_limits import LEAST_PACE, ForceLimits, recovered_pace
 from rps_pin.control.loop.gains import Gains
 from rps_pin.control.loop.setpoints import Setpoint, Setpoints
 from rps_pin.control.loop.status import STATUSES, Status
+from rps_pin.control.model import ControlModel
+from rps_pin.control.robots import Robot, force_limits, task_of
 from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.one_thread import guarded, one_thread
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.validation import choice, numbers, positive_number, real, whole_number
+from rps_pin.task import Task
+from rps_pin.validation import choice, positive_number, real, whole_number
 
 Space = Literal["actuator", "task"]
 
 _NO_RESULT = flags.BAD_INPUT | flags.JUMP | flags.NOT_CONVERGED
-_ZERO = (0.0, 0.0, 0.0)
 
 
 @one_thread("_guard", besides=("tick",), properties=("status_text",))
@@ -68,9 +66,12 @@ class Controller(DeepCopied, ABC):
     Parameters
     ----------
     robot
-        The controller's model of the robot, with payload and friction.
+        The controller's model of the robot, with payload and friction: an `RPSRobot`; or a `Task`
+        with as many actuators as coordinates, or a `ClosedLoopModel` that has one. What is said of
+        legs and of the pose holds for the actuators and the coordinates of a task.
     near
-        The pose at the start, shape (3,), m and rad; also the first setpoint, at rest.
+        The pose at the start, shape (m,), m and rad; also the first setpoint, at rest. Of a task in
+        the assembly mode of home.
     gains
         Of the law, in its units.
     space
@@ -80,22 +81,24 @@ class Controller(DeepCopied, ABC):
     cut_off
         Of the filter of leg speeds that are not measured, Hz; infinite for none.
     force_limit
-        Of the actuators, N: one or three; default: the robot's.
+        Of the actuators, N or N m: one or na; default: the robot's.
     near_singular
-        `SingularityMeasures.type_ii` below which the status has `Status.NEAR_SINGULAR`, and targets
-        are refused, 0 to 1.
+        `SingularityMeasures.type_ii` (of a task `distance`) below which the status has
+        `Status.NEAR_SINGULAR`, and targets are refused, 0 to 1.
     stop_singular
         Distance below which the controller stops; less than `near_singular`.
     largest_jump
         Largest difference of a leg length from its prediction, m for each tick since the last good
-        reading; default: 1.2 times what the actuators' speed limit allows. A constant encoder error
+        reading; default: 1.2 times what the actuators' speed limit allows (of a task at most 0.05
+        rad, or characteristic lengths). A constant encoder error
         above most_lost + 1 times this stops the controller; a smaller one is accepted in the end,
         after `Status.JUMP`.
     most_lost
         Number of missing or refused readings in a row before the controller stops.
     compiled
         ``"auto"``: regular ticks are computed by generated code, if it is there or can be built
-        (`rps_pin.control.generated`); True: `CompileError` if not; False: interpreted.
+        (`rps_pin.control.generated`); True: `CompileError` if not; False: interpreted. Of a task:
+        True: by `Task.compile`, ``"auto"``: as the task is.
 
     Attributes
     ----------
@@ -103,12 +106,12 @@ class Controller(DeepCopied, ABC):
         Whether generated code runs.
     engine : str
         What runs: its compiler, or why there is none.
-    forces : (3,) array
-        Command to the actuators, N, of the last tick. Before the first, the forces that hold the
-        robot at rest.
-    robot : RPSRobot
+    forces : (na,) array
+        Command to the actuators, N or N m, of the last tick. Before the first, the forces that hold
+        the robot at rest.
+    robot
         As given.
-    estimate : RealTimeRobot
+    estimate : RealTimeRobot or TaskEstimate
         The state estimate: pose, rate, `type_ii`.
     pace : float
         Pace of the target, 0.05 to 1 of its own speed: below 1 while and shortly after actuators
@@ -122,10 +125,12 @@ class Controller(DeepCopied, ABC):
     ------
     InputError
         If an argument has the wrong shape or type, or is out of its range.
-    UnreachableError
-        If a leg has no length in the pose.
+    UnreachableError, ClosureError
+        If the pose is out of reach.
     SingularityError
         If the pose is nearer to a singularity than `near_singular`.
+    MechanismError
+        If a mechanism has no task, or not as many actuators as coordinates.
     CompileError
         If there is no generated code, with ``compiled=True``.
     """
@@ -135,7 +140,7 @@ class Controller(DeepCopied, ABC):
     @refuses_other_kinds
     def __init__(
         self,
-        robot: RPSRobot,
+        robot: Robot,
         near: ArrayLike,
         gains: Gains,
         *,
@@ -145,11 +150,10 @@ class Controller(DeepCopied, ABC):
         force_limit: ArrayLike | None = None,
         near_singular: float = 0.05,
         stop_singular: float = 0.01,
-        largest_jump: float | None = None,
+        largest_jump: ArrayLike | None = None,
         most_lost: int = 3,
         compiled: Compiled = "auto",
     ) -> None:
-        p = robot.parameters
         period = positive_number(period, "period", "s")
         if not isinstance(gains, Gains):
             raise InputError(f"gains must be Gains, not {type(gains).__name__}")
@@ -161,34 +165,41 @@ class Controller(DeepCopied, ABC):
         self.space = choice(space or self._default_space, "space", get_args(Space))
         self._in_task_space = self.space == "task"
         self._most_lost = whole_number(most_lost, "most_lost", 0)
-        jump = 1.2 * p.actuator_speed_limit * period if largest_jump is None else largest_jump
         self.robot = robot
-        self.estimate = RealTimeRobot(
+        self._model: ControlModel = model_of(
             robot,
             near,
+            compiled,
             period=period,
             cut_off=cut_off,
             near_singular=near_singular,
-            largest_jump=jump,
-            compiled=False,
+            largest_jump=largest_jump,
         )
+        self._vectors, self.estimate = self._model.vectors, self._model.estimate
         self._guard = self.estimate.guard
-        self.period, self.gains = period, gains
-        self._gains = gains.rows
+        self.period, self.gains = period, gains.of(self._model.size)
+        of = self._vectors.of
+        kp, kd, ki = self.gains.rows
+        self._gains = of(kp), of(kd), of(ki)
+        self._tracking_rate = of([1.0 / time for time in self.gains.tracking_time])
         self._elapsed = period
-        self._tracking_rate = tuple(1.0 / time for time in gains.tracking_time)
-        self._g, self._h = float(p.base_radius), float(p.platform_radius)
-        self._setpoints = Setpoints(p, near_singular)
-        self._limits = ForceLimits(_force_limit(robot, force_limit))
-        self._inertia = TaskSpaceInertia(robot)
-        self._rate_filter = SetpointRateFilter(cut_off)
+        self._setpoints = Setpoints(self._model, near_singular)
+        self._limits = ForceLimits(tuple(force_limits(robot, force_limit).tolist()))
+        self._rate_filter = SetpointRateFilter(cut_off, self._vectors)
         self._near, self._stop = near_singular, stop_singular
-        self.forces: Array = np.zeros(3)
+        self.forces: Array = np.zeros(self._model.size)
         self._generated: GeneratedTick | None = None
         self._speed_measured = False
         self.reset(near)
+        self._use_generated(compiled)
+
+    def _use_generated(self, compiled: Compiled) -> None:
+        """Let generated code compute regular ticks of the 3-RPS, if there is any."""
+        if isinstance(self._model, TaskModel):
+            self.engine = self._model.engine
+            return
         law, answers = self._generated_law, (*self.estimate.answers[:5], self.forces)
-        own = period, self._rate_filter.share, self._take
+        own = self.period, self._rate_filter.share, self._take
         self._generated, self.engine = generated_tick(
             *(compiled, law, self._proven),
             lambda library: GeneratedTick(law, library, answers, *own),
@@ -200,14 +211,15 @@ class Controller(DeepCopied, ABC):
     @property
     def compiled(self) -> bool:
         """Whether generated code runs."""
+        if isinstance(self._model, TaskModel):
+            return self._model.task.compiled
         return self._generated is not None
 
     def reset(self, near: ArrayLike) -> None:
         """Start again at rest in a pose. Raises as the constructor does."""
         self.estimate.reset(near)
         geometry = self.estimate.state.geometry
-        determinant = closure_determinant(geometry, self._g, self._h)
-        nearest = min(abs(determinant), self.estimate.type_ii)
+        nearest = min(abs(self._model.determinant(geometry)), self.estimate.type_ii)
         if nearest < self._near:
             message = (
                 f"the pose to start from is too near a singularity: type_ii {nearest:.3g}, at "
@@ -215,13 +227,13 @@ class Controller(DeepCopied, ABC):
             )
             raise SingularityError(message, 1 / max(nearest, 1e-300), 1 / self._near)
         self._setpoints.reset(geometry)
-        self._integral: Triple = _ZERO
+        self._integral: Any = self._vectors.zero
         self._rate_filter.reset()
         self._stop_reason = ""
         self._rest: Setpoint | None = None
         self._pace = 1.0
         self.status = Status.OK
-        self._wanted: Triple = _ZERO
+        self._wanted: Any = self._vectors.zero
         self._send(self._limits.clipped(self._weight()))
         self._to_generated_code()
 
@@ -240,12 +252,13 @@ class Controller(DeepCopied, ABC):
         Parameters
         ----------
         length
-            Leg lengths, shape (3,), m; None if the reading is missing.
+            Leg lengths, shape (3,), m (positions of a task's actuators, (na,)); None if the reading
+            is missing.
         target
-            Pose, rate and acceleration, (3,) each, as `Trajectory.sample` returns them; None for
+            Pose, rate and acceleration, (m,) each, as `Trajectory.sample` returns them; None for
             the last valid one.
         speed
-            Leg speeds, shape (3,), m/s; default: filtered differences of the lengths.
+            Their speeds, likewise; default: filtered differences of the lengths.
         dt
             Time since the last call, s; default: the period.
 
@@ -269,10 +282,16 @@ class Controller(DeepCopied, ABC):
     @guarded("_guard")
     def _tick(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
         """Do the same in Python."""
-        status = self._ticked(length, target, speed, dt)
+        status = self._computed(length, target, speed, dt)
         if self._generated is not None and self.estimate.age == 0 and not self._stop_reason:
             self._hand_over()
         return status
+
+    def _computed(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
+        if isinstance(self._model, LegModel):
+            return self._ticked(length, target, speed, dt)
+        with np.errstate(all="ignore"):  # of arrays, whose largest floats overflow
+            return self._ticked(length, target, speed, dt)
 
     def _ticked(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
         estimate = self.estimate
@@ -285,18 +304,18 @@ class Controller(DeepCopied, ABC):
         if self._stop_reason:
             return self._stopped(number, elapsed)
         self._speed_measured = speed is not None
-        state: StateEstimate | None = estimate.state
+        state: Any = estimate.state
         if not valid:
             if estimate.age > self._most_lost:
                 reason = f"{estimate.age} readings in a row were refused"
                 return self._stopped(number, elapsed, reason)
-            state = self._extrapolated(estimate.state, estimate.elapsed)
-        if state is None or self._near_singular(state):
+            state = self._model.extrapolated(estimate.state, estimate.elapsed)
+        if state is None or self._model.near_singular(state, self._stop):
             reason = f"near a type II singularity: type_ii less than {self._stop:.3g}"
             return self._stopped(number | flags.NEAR_SINGULAR, elapsed, reason)
         self._elapsed = elapsed
         force = self._law(state, self._setpoints.current)
-        if force is None or not math.isfinite(force[0] + force[1] + force[2]):
+        if force is None or not math.isfinite(sum(force)):
             reason = "the law gave no finite forces"
             return self._stopped(number | flags.NOT_CONVERGED, elapsed, reason)
         if not self._limits.within(force):
@@ -331,11 +350,11 @@ class Controller(DeepCopied, ABC):
         return ""
 
     @abstractmethod
-    def _law(self, state: StateEstimate, setpoint: Setpoint) -> Triple | None:
+    def _law(self, state: StateEstimate, setpoint: Setpoint) -> Any:
         """Return the law's forces, N, or None; it calls `_pid` once, and `_solve`."""
 
     @abstractmethod
-    def _command_error(self, state: StateEstimate, force: Triple, acceleration: Triple) -> Triple:
+    def _command_error(self, state: StateEstimate, force: Any, acceleration: Any) -> Any:
         """Return the change of the command, in its unit, by changes of force and acceleration."""
 
     @property
@@ -349,7 +368,7 @@ class Controller(DeepCopied, ABC):
         if self.status & Status.SATURATED:
             messages.append(
                 "an actuator is at its limit: the forces of the law are "
-                f"({', '.join(f'{f:.6g}' for f in self._wanted)}) N"
+                f"({', '.join(f'{f:.6g}' for f in self._wanted)}) {self._force_unit}"
             )
         if self.status & Status.STOPPED:
             messages.append(f"stopped: {self._stop_reason}; reset to continue")
@@ -372,7 +391,7 @@ class Controller(DeepCopied, ABC):
 
     def _numbers(self) -> dict[str, Any]:
         """Return what generated code takes of this object: `CONTROL_NUMBERS`."""
-        (kp, kd, ki), terms = self._gains, self.robot.force_terms
+        (kp, kd, ki), terms = self._gains, cast("RPSRobot", self.robot).force_terms
         return {
             **self.estimate.numbers(),
             **{one.name: getattr(terms, one.name) for one in fields(terms)},
@@ -392,7 +411,7 @@ class Controller(DeepCopied, ABC):
                 "target_rate": current.rate,
                 "target_acceleration": current.acceleration,
                 "integral": self._integral,
-                "last_rate": self._rate_filter.last or _ZERO,
+                "last_rate": self._rate_filter.last or self._vectors.zero,
                 "filtered_rate": self._rate_filter.speed,
                 "pace": self._pace,
             }
@@ -402,7 +421,7 @@ class Controller(DeepCopied, ABC):
         """Set the state from generated code's memory."""
         assert self._generated is not None
         self.estimate.take(memory)
-        geometry = leg_geometry(memory["target_pose"], self._g, self._h)
+        geometry = self._model.geometry(memory["target_pose"], None)
         assert geometry is not None  # of a regular tick
         target = Setpoint(geometry, memory["target_rate"], memory["target_acceleration"])
         self._setpoints.follow(target)
@@ -413,71 +432,57 @@ class Controller(DeepCopied, ABC):
 
     # Inner workings -------------------------------------------------------------------------------
 
-    def _pid(self, e: Triple, wanted: Triple, rate: Triple) -> Triple:
+    def _pid(self, e: Any, wanted: Any, rate: Any) -> Any:
         """Return `pid` with e' = wanted - rate; the wanted rate passes the speeds' filter."""
-        elapsed = self._elapsed
+        elapsed, vectors = self._elapsed, self._vectors
         if not self._speed_measured and elapsed > 0.0:
             wanted = self._rate_filter.after(wanted, elapsed)
-        (w1, w2, w3), (v1, v2, v3) = wanted, rate
-        e_rate = (w1 - v1, w2 - v2, w3 - v3)
-        command, self._integral = pid(e, e_rate, self._integral, self._gains, elapsed)
+        e_rate = vectors.difference(wanted, rate)
+        command, self._integral = vectors.pid(e, e_rate, self._integral, self._gains, elapsed)
         return command
 
-    def _solve(self, geometry: LegGeometry, rate: Triple, acceleration: Triple) -> Triple | None:
+    def _solve(self, geometry: Any, rate: Any, acceleration: Any) -> Any:
         """Return the actuator forces of a motion, None if they are not determined."""
-        solved = self.estimate.dynamics.solve(robot_state(geometry, rate, acceleration, self._h))
-        return None if solved is None else (solved[9], solved[10], solved[11])
+        return self._model.forces(geometry, rate, acceleration)
 
-    def _limited(self, force: Triple, state: StateEstimate, elapsed: float) -> Triple:
+    def _limited(self, force: Any, state: Any, elapsed: float) -> Any:
         """Return the limited forces nearest in effect; back-calculate integral and pace."""
         self._wanted = force
-        mass = self._inertia.of(state.geometry)
+        mass = self._model.mass(state.geometry)
         limited = self._limits.nearest(force, mass, state.jacobian, self._setpoints.current.rate)
-        (f1, f2, f3), (g1, g2, g3) = limited.force, force
         pace = self._pace * (1.0 + elapsed * limited.pace_rate)
         self._pace = max(LEAST_PACE, min(1.0, pace))
-        (i1, i2, i3), (w1, w2, w3) = self._integral, self._tracking_rate
-        short = (f1 - g1, f2 - g2, f3 - g3)
-        m1, m2, m3 = self._command_error(state, short, limited.acceleration_error)
-        # I' = Ki e + (command error) / T_t
-        self._integral = (i1 + elapsed * w1 * m1, i2 + elapsed * w2 * m2, i3 + elapsed * w3 * m3)
+        short = self._vectors.difference(limited.force, force)
+        missing = self._command_error(state, short, limited.acceleration_error)
+        self._integral = self._vectors.unwound(
+            self._integral, missing, self._tracking_rate, elapsed
+        )
         return limited.force
 
-    def _extrapolated(self, state: StateEstimate, time: float) -> StateEstimate | None:
-        """Return the state after a time at the last rate."""
-        (z, wx, wy), (dz, dwx, dwy) = state.geometry.pose, state.rate
-        pose = (z + time * dz, wx + time * dwx, wy + time * dwy)
-        geometry = leg_geometry(pose, self._g, self._h)
-        if geometry is None:
-            return None
-        return StateEstimate(geometry, state.rate, state.speed, leg_jacobian(geometry, self._h))
-
-    def _near_singular(self, state: StateEstimate) -> bool:
-        """Return whether a determinant, 1 at most, is below the limit for stopping."""
-        determinant = closure_determinant(state.geometry, self._g, self._h)
-        return not (abs(state.jacobian.determinant) > self._stop < abs(determinant))
-
-    def _weight(self) -> Triple:
+    def _weight(self) -> Any:
         """Return the forces that hold the weight at the estimated pose.
 
         Near a singularity, where these grow without bound, those at the setpoint.
         """
         state = self.estimate.state
-        near = self._near_singular(state)
+        near = self._model.near_singular(state, self._stop)
         geometry = self._setpoints.current.geometry if near else state.geometry
-        return self._solve(geometry, _ZERO, _ZERO) or _ZERO
+        zero = self._vectors.zero
+        force = self._solve(geometry, zero, zero)
+        return zero if force is None or not math.isfinite(sum(force)) else force
 
     def _stopped(self, number: int, elapsed: float, reason: str = "") -> Status:
         """Stop, or stay stopped: hold the first pose estimated since, else the weight."""
         self._stop_reason = self._stop_reason or reason
         state, force = self.estimate.state, None
-        if number & _NO_RESULT or self._near_singular(state):
+        if number & _NO_RESULT or self._model.near_singular(state, self._stop):
             self._rest = None
         else:
-            self._rest = self._rest or Setpoint(state.geometry, _ZERO, _ZERO)
+            zero = self._vectors.zero
+            self._rest = self._rest or Setpoint(state.geometry, zero, zero)
             self._elapsed = elapsed
             force = self._law(state, self._rest)
-        if force is None or not math.isfinite(force[0] + force[1] + force[2]):
+        if force is None or not math.isfinite(sum(force)):
             self._rest, force = None, self._weight()
         if not self._limits.within(force):
             number |= flags.SATURATED
@@ -489,19 +494,25 @@ class Controller(DeepCopied, ABC):
         self.status = status = STATUSES[number | flags.STOPPED]
         return status
 
-    def _send(self, force: Triple) -> None:
-        out = self.forces
-        out[0], out[1], out[2] = force
+    def _send(self, force: Any) -> None:
+        self.forces[:] = force
+
+    @property
+    def _force_unit(self) -> str:
+        return "N" if isinstance(self._model, LegModel) else "N or N m"
 
 
-def _force_limit(robot: RPSRobot, given: ArrayLike | None) -> Triple:
-    """Return the force limit of each actuator, N."""
-    limit = numbers(
-        robot.parameters.actuator_force_limit if given is None else given,
-        "force_limit",
-        "positive, one number or three",
-    )
-    if limit.shape not in ((), (3,)) or not (limit > 0).all():
-        raise InputError(f"force_limit = {limit.tolist()}: it must be positive, one or three")
-    one, two, three = np.broadcast_to(limit, 3).tolist()
-    return one, two, three
+def model_of(robot: Robot, near: ArrayLike, compiled: Compiled, **settings: Any) -> ControlModel:
+    """Return what a controller knows of a robot; raises as `Controller`."""
+    if isinstance(robot, RPSRobot):
+        return LegModel(robot, near, **settings)
+    return TaskModel(_own(task_of(robot), compiled), near, **settings)
+
+
+def _own(task: Task, compiled: Compiled) -> Task:
+    """Return a task with scratch memory of its own, in generated code if that is asked for."""
+    if not (isinstance(compiled, str | bool) and compiled in ("auto", True, False)):
+        raise InputError(f'compiled = {shown(compiled)}: it must be "auto", True or False')
+    if compiled is True and not task.compiled:
+        return task.compile(functions=("kinematics", "closing", "dynamics"))
+    return deepcopy(task) if compiled or not task.compiled else task.interpreted()

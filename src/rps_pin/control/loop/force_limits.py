@@ -28,9 +28,9 @@ import numpy as np
 import proxsuite
 
 from rps_pin.arrays import Array
+from rps_pin.control.any_task.motion import TaskJacobian
 from rps_pin.control.estimator.leg_jacobian import LegJacobian
 from rps_pin.numerics.elementary import Number, less, select
-from rps_pin.rps.kinematics.tracking import Triple
 
 #: Least pace of a target.
 LEAST_PACE = 0.05
@@ -46,9 +46,9 @@ _AT_REST = 1e-18
 class LimitedForces(NamedTuple):
     """Forces within the limits and the effect of limiting them."""
 
-    force: Triple
-    """f, N; within the limits exactly."""
-    acceleration_error: Triple
+    force: Any
+    """f, N, a tuple; within the limits exactly."""
+    acceleration_error: Any
     """B (f - f*): change of the pose's acceleration, m/s^2, rad/s^2."""
     pace_rate: float
     """Relative rate of change of the pace, 1/s; negative: slower."""
@@ -62,10 +62,12 @@ def recovered_pace(pace: Number, elapsed: Number) -> Number:
     return pace + (1.0 - pace) * select(less(share, 1.0), share, 1.0)
 
 
-def within_limits(force: Triple, limit: Triple) -> Number:
+def within_limits(force: Any, limit: Any) -> Number:
     """Return whether no force is beyond its limit."""
-    (f1, f2, f3), (l1, l2, l3) = force, limit
-    return (abs(f1) <= l1) * (abs(f2) <= l2) * (abs(f3) <= l3)
+    found: Number = True
+    for f, most in zip(force, limit, strict=True):
+        found = found * (abs(f) <= most)
+    return found
 
 
 class ForceLimits:
@@ -77,13 +79,14 @@ class ForceLimits:
         Of each actuator, N; positive, infinite for none.
     """
 
-    def __init__(self, limit: Triple) -> None:
+    def __init__(self, limit: tuple[float, ...]) -> None:
         self.limit = limit
+        count = len(limit)
         self._size = np.minimum(limit, 1e12)  # finite, for the scaling
-        self._factors = eigenpy.LDLT(3)
+        self._factors = eigenpy.LDLT(count)
         proxqp = proxsuite.proxqp
         self._solved = proxqp.QPSolverOutput.PROXQP_SOLVED
-        self._problem = problem = proxqp.dense.QP(3, 0, 0, True)  # True: bounds on variables
+        self._problem = problem = proxqp.dense.QP(count, 0, 0, True)  # True: bounds on variables
         settings = problem.settings
         settings.eps_abs, settings.eps_rel = _TOLERANCE, 0.0
         settings.max_iter = settings.max_iter_in = _MOST_ITERATIONS
@@ -91,37 +94,34 @@ class ForceLimits:
         # Without it ProxQP accepts a guess that is feasible but not optimal.
         settings.check_duality_gap = True
         settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = _TOLERANCE, 0.0
-        ones = np.ones(3)
-        problem.init(np.eye(3), np.zeros(3), None, None, None, None, None, -ones, ones)
+        ones = np.ones(count)
+        problem.init(np.eye(count), np.zeros(count), None, None, None, None, None, -ones, ones)
         problem.solve()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Give copies scratch memory of their own; there is no state."""
         return type(self), (self.limit,)
 
-    def within(self, force: Triple) -> bool:
+    def within(self, force: Any) -> bool:
         """Return whether forces keep the limits."""
         return bool(within_limits(force, self.limit))
 
-    def clipped(self, force: Triple) -> Triple:
-        """Return forces limited one by one."""
-        one, two, three = (
-            max(-most, min(most, f)) for f, most in zip(force, self.limit, strict=True)
-        )
-        return one, two, three
+    def clipped(self, force: Any) -> Any:
+        """Return forces limited one by one, a tuple."""
+        return tuple([max(-most, min(most, f)) for f, most in zip(force, self.limit, strict=True)])
 
     @np.errstate(all="ignore")  # the largest floats overflow: they neither raise nor warn
     def nearest(
-        self, wanted: Triple, mass: Array, jacobian: LegJacobian, rate: Triple
+        self, wanted: Any, mass: Array, jacobian: LegJacobian | TaskJacobian, rate: Any
     ) -> LimitedForces:
         """Return the limited forces nearest in effect to finite forces beyond the limits.
 
         Parameters
         ----------
         wanted
-            f*, N.
+            f*, N or N m.
         mass
-            M_x, shape (3, 3).
+            M_x, shape (m, m).
         jacobian
             K at the pose.
         rate
@@ -132,19 +132,17 @@ class ForceLimits:
         effect = self._factors.solve(by_pose.T)  # B
         hessian = self._size * (by_pose @ effect) * self._size[:, None]
         share = goal / self._size
-        (d1, d2, d3), (a, b, c) = hessian.diagonal().tolist(), share.tolist()
-        hessian /= (d1 + d2 + d3) * max(1.0, abs(a), abs(b), abs(c))
+        scale = sum(hessian.diagonal().tolist())
+        hessian /= scale * max(1.0, *map(abs, share.tolist()))
         self._problem.update(H=hessian, g=-hessian.dot(share))
         self._problem.solve()
         results = self._problem.results
         found = results.x
         solved = results.info.status == self._solved and math.isfinite(found.sum())
-        f1, f2, f3 = (found * self._size).tolist() if solved else wanted
-        force = self.clipped((f1, f2, f3))
+        force = self.clipped((found * self._size).tolist() if solved else goal.tolist())
         error = effect.dot(np.array(force) - goal)
         direction = np.array(rate)
         momentum = mass.dot(direction)
         energy = float(momentum.dot(direction))
         pace_rate = float(momentum.dot(error)) / energy if energy > _AT_REST else 0.0
-        one, two, three = error.tolist()
-        return LimitedForces(force, (one, two, three), pace_rate, solved)
+        return LimitedForces(force, tuple(error.tolist()), pace_rate, solved)

@@ -1,4 +1,4 @@
-"""Gains of a control law: proportional, derivative and integral, for each of three errors.
+"""Gains of a control law: proportional, derivative and integral, for each error.
 
 Their units depend on the law: see `ComputedTorque` and `PDControl`.
 """
@@ -6,8 +6,8 @@ Their units depend on the law: see `ComputedTorque` and `PDControl`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Self
+from dataclasses import dataclass, field
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,19 +15,18 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.validation import positive_number, read_only, real_array
 
 
 @refuses_other_kinds
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """Gains, one number for all three errors or three numbers each.
+    """Gains, one number for all errors or a number for each: three of the 3-RPS, m of a task.
 
     Parameters
     ----------
     proportional
-        Kp, not negative; shape () or (3,), stored as (3,).
+        Kp, not negative; shape () or (m,), stored as (m,); (3,) where all are of shape ().
     derivative
         Kd, likewise.
     integral
@@ -42,15 +41,22 @@ class Gains:
     proportional: Array | float
     derivative: Array | float
     integral: Array | float = 0.0
+    _alike: bool = field(default=True, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("proportional", "derivative", "integral"):
-            given = real_array(getattr(self, name), f"gain {name}")
-            if given.shape not in ((), (3,)):
-                raise InputError(f"gain {name} has shape {given.shape}; it must be () or (3,)")
+        names = ("proportional", "derivative", "integral")
+        rows = {name: real_array(getattr(self, name), f"gain {name}") for name in names}
+        sizes = [given.size for given in rows.values() if given.ndim == 1 and given.size]
+        count = sizes[0] if sizes else 3
+        for name, given in rows.items():
+            if given.shape not in ((), (count,)):
+                raise InputError(
+                    f"gain {name} has shape {given.shape}; it must be () or ({count},)"
+                )
             if (given < 0).any():
                 raise InputError(f"gain {name} = {given.tolist()}: it must not be negative")
-            object.__setattr__(self, name, read_only(np.broadcast_to(given, 3)))
+            object.__setattr__(self, name, read_only(np.broadcast_to(given, count)))
+        object.__setattr__(self, "_alike", not sizes)
         integral, derivative = np.asarray(self.integral), np.asarray(self.derivative)
         if ((integral > 0) & (derivative == 0)).any():
             raise InputError("an integral gain needs a derivative gain, which provides the damping")
@@ -81,16 +87,32 @@ class Gains:
         Parameters
         ----------
         inertia
-            Shape () or (3,), kg (or kg m^2 for tilts); see `effective_inertia`.
+            Shape () or (m,), kg (or kg m^2 for tilts); see `effective_inertia`.
         """
         factor = real_array(inertia, "inertia")
-        if factor.shape not in ((), (3,)):
-            raise InputError(f"inertia has shape {factor.shape}; it must be () or (3,)")
-        return Gains(self.proportional * factor, self.derivative * factor, self.integral * factor)
+        if factor.ndim > 1 or not factor.size:
+            raise InputError(f"inertia has shape {factor.shape}; it must be () or (m,)")
+        one = self.of(factor.size) if factor.ndim else self
+        return Gains(one.proportional * factor, one.derivative * factor, one.integral * factor)
+
+    def of(self, count: int) -> Gains:
+        """Return the gains of so many errors: one number for all is one for each.
+
+        Raises
+        ------
+        InputError
+            If they are the gains of another number of errors.
+        """
+        rows = [np.asarray(row) for row in (self.proportional, self.derivative, self.integral)]
+        if len(rows[0]) == count:
+            return self
+        if not self._alike:
+            raise InputError(f"the gains are those of {len(rows[0])} errors; there are {count}")
+        return Gains(*(np.full(count, row[0]) for row in rows))
 
     @property
-    def rows(self) -> tuple[Triple, Triple, Triple]:
-        """Kp, Kd and Ki as floats."""
+    def rows(self) -> tuple[Any, Any, Any]:
+        """Kp, Kd and Ki as floats, a tuple each."""
         kp, kd, ki = (
             tuple(np.asarray(one).tolist())
             for one in (self.proportional, self.derivative, self.integral)
@@ -98,14 +120,14 @@ class Gains:
         return kp, kd, ki
 
     @property
-    def tracking_time(self) -> Triple:
+    def tracking_time(self) -> tuple[float, ...]:
         """Time constant of the back-calculation at a force limit, s: sqrt(Kd / Ki).
 
         The geometric mean of the integral time Kp / Ki and the derivative time Kd / Kp (Astrom and
         Hagglund, Advanced PID Control, 2006, 3.5). Infinite without integral.
         """
-        one, two, three = (
+        _, derivative, integral = self.rows
+        return tuple(
             math.sqrt(kd / ki) if ki > 0 else math.inf
-            for kd, ki in zip(self.rows[1], self.rows[2], strict=True)
+            for kd, ki in zip(derivative, integral, strict=True)
         )
-        return one, two, three

@@ -47,14 +47,14 @@ class PacedTrajectory:
         return self.time >= self._trajectory.duration
 
     def target(self) -> PathSample:
-        """Return pose, rate and acceleration now, shape (3,) each; at rest before and after."""
+        """Return pose, rate and acceleration now, shape (m,) each; at rest before and after."""
         path = self._trajectory
         # The first and last moment belong to the trajectory in spite of rounding.
         tolerance = 1e-9 * self._period
         outside = self.time < -tolerance or self.time > path.duration + tolerance
         pose, rate, acceleration = path.sample(min(max(self.time, 0.0), path.duration))
         if outside:
-            return PathSample(pose, np.zeros(3), np.zeros(3))
+            return PathSample(pose, np.zeros_like(pose), np.zeros_like(pose))
         pace = self._pace
         return PathSample(pose, rate * pace, acceleration * pace**2 + rate * self._pace_rate)
 

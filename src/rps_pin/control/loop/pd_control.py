@@ -26,14 +26,13 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.control.estimator.effective_inertia import effective_inertia
-from rps_pin.control.estimator.leg_jacobian import wrench_of_force
 from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.laws import Compensation, pd_control
 from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.gains import Gains
 from rps_pin.control.loop.setpoints import Setpoint
+from rps_pin.control.robots import Robot
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.rps.kinematics.tracking import Triple
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import choice
 
@@ -59,7 +58,7 @@ class PDControl(Controller):
     @refuses_other_kinds
     def __init__(
         self,
-        robot: RPSRobot,
+        robot: Robot,
         near: ArrayLike,
         gains: Gains,
         *,
@@ -80,9 +79,9 @@ class PDControl(Controller):
         # A class of its own may have another law.
         return f"pd_control_{self.space}_{self.compensation}" if type(self) is PDControl else ""
 
-    def _law(self, state: StateEstimate, setpoint: Setpoint) -> Triple | None:
+    def _law(self, state: StateEstimate, setpoint: Setpoint) -> Any:
         laws = self._in_task_space, self.compensation
-        return pd_control(*laws, state, setpoint, self._h, self._pid, self._solve)
+        return pd_control(*laws, state, setpoint, self._model, self._pid, self._solve)
 
-    def _command_error(self, state: StateEstimate, force: Triple, acceleration: Triple) -> Triple:
-        return wrench_of_force(state.jacobian, force) if self._in_task_space else force
+    def _command_error(self, state: StateEstimate, force: Any, acceleration: Any) -> Any:
+        return self._model.wrench_of_force(state.jacobian, force) if self._in_task_space else force

@@ -11,7 +11,7 @@ is the quintic whose value and derivatives are g, g', g'' at the start and zero 
 
 from __future__ import annotations
 
-from rps_pin.rps.kinematics.tracking import Triple
+from typing import Any
 
 #: Shortest duration, s.
 SHORTEST = 0.1
@@ -31,7 +31,7 @@ class Rejoining:
         T, s.
     """
 
-    def __init__(self, offset: Triple, rate: Triple, acceleration: Triple, duration: float) -> None:
+    def __init__(self, offset: Any, rate: Any, acceleration: Any, duration: float) -> None:
         T = self._duration = duration
         rows = zip(offset, rate, acceleration, strict=True)
         self._q = [(g, 3 * g + v * T, 6 * g + 3 * v * T + a * T * T / 2) for g, v, a in rows]
@@ -42,7 +42,7 @@ class Rejoining:
         """Remaining time, s."""
         return max(0.0, self._duration - self._elapsed)
 
-    def after(self, elapsed: float) -> tuple[Triple, Triple, Triple] | None:
+    def after(self, elapsed: float) -> tuple[Any, Any, Any] | None:
         """Return the offset and its two derivatives a further time (s) on; None after the end."""
         self._elapsed += elapsed
         T = self._duration
@@ -50,7 +50,7 @@ class Rejoining:
         u = 1.0 - s
         if not u > 0.0:
             return None
-        (x1, v1, a1), (x2, v2, a2), (x3, v3, a3) = [
+        rows = [
             (
                 u * u * u * (q := c0 + (c1 + c2 * s) * s),
                 u * u * (u * (dq := c1 + 2 * c2 * s) - 3 * q) / T,
@@ -58,9 +58,10 @@ class Rejoining:
             )
             for c0, c1, c2 in self._q
         ]
-        return (x1, x2, x3), (v1, v2, v3), (a1, a2, a3)
+        x, v, a = zip(*rows, strict=True)
+        return x, v, a
 
 
 def rejoining_time(distance: float, speed_limit: float) -> float:
-    """Return the duration (s) for the largest leg length difference `distance` (m)."""
+    """Return the duration (s) for the largest difference of positions `distance` (m)."""
     return max(SHORTEST, _SPEED_FACTOR * distance / speed_limit)

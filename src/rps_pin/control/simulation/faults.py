@@ -36,11 +36,11 @@ class Fault:
     duration
         s; default: endless. Half a period affects one tick.
     leg
-        The leg whose reading is affected, 1 to 3; default: all.
+        The leg, or actuator, whose reading is affected, from 1 on; default: all.
     size
-        Of a jump, m.
+        Of a jump, m or rad.
     offset
-        Of a target: m, rad, rad.
+        Of a target, one number for each coordinate: m, rad, rad of the 3-RPS.
 
     Raises
     ------
@@ -54,14 +54,14 @@ class Fault:
     duration: float = math.inf
     leg: int | None = None
     size: float = 0.0
-    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    offset: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         validation.choice(self.kind, "fault kind", get_args(Kind))
         validation.non_negative_number(self.start, "fault start", "s")
         validation.positive_number(self.duration, "fault duration", "s", infinite=True)
-        if self.leg is not None and (validation.whole_number(self.leg, "fault leg") > 3):
-            raise InputError(f"fault leg = {self.leg}: legs are 1, 2 and 3")
+        if self.leg is not None:
+            validation.whole_number(self.leg, "fault leg")
         if self.leg is not None and self.kind not in _LEG_KINDS:
             raise InputError(
                 f"fault leg = {self.leg}: a fault {self.kind!r} has no leg; faults of one leg are: "
@@ -69,11 +69,21 @@ class Fault:
             )
         if (self.kind == "jump") != (validation.finite_number(self.size, "fault size", "m") != 0.0):
             raise InputError(f"fault size = {self.size}: a size, in m, is for a jump only")
-        offset = validation.real_array(self.offset, "fault offset", (3,))
+        offset = validation.fixed_array(self.offset, "fault offset", (None,))
         object.__setattr__(self, "offset", tuple(offset.tolist()))
         if (self.kind == "target") != offset.any():
             raise InputError(
                 f"fault offset = {self.offset}: an offset is for a fault of the target only"
+            )
+
+    def check(self, actuators: int, coordinates: int) -> None:
+        """Raise `InputError` unless a robot has its leg, and as many coordinates."""
+        if self.leg is not None and self.leg > actuators:
+            legs = "1, 2 and 3" if actuators == 3 else f"1 to {actuators}"
+            raise InputError(f"fault leg = {self.leg}: legs are {legs}")
+        if self.kind == "target" and len(self.offset) != coordinates:
+            raise InputError(
+                f"fault offset = {self.offset}: the pose has {coordinates} coordinates"
             )
 
     def on(self, time: float) -> bool:
@@ -126,5 +136,5 @@ class Faults:
             if fault.on(time) and fault.kind == "target":
                 pose = pose + np.array(fault.offset)
             elif fault.on(time) and fault.kind == "target_nan":
-                pose = np.full(3, np.nan)
+                pose = np.full_like(pose, np.nan)
         return pose, rate, acceleration

@@ -14,12 +14,15 @@ from rps_pin.arrays import Array
 from rps_pin.bounds import TICKS, check_size
 from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.paced_trajectory import PacedTrajectory
+from rps_pin.control.robots import task_of
 from rps_pin.control.simulation.faults import Fault, Faults
 from rps_pin.control.simulation.plant import Plant
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.task import Task
 from rps_pin.trajectories.path import PathSample, Trajectory
 from rps_pin.validation import choice, positive_number
 
@@ -43,12 +46,14 @@ class LoopEvent(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LoopRun:
-    """A controlled motion; n ticks.
+    """A controlled motion; n ticks. Of a task with m coordinates where it says 3, na actuators.
 
     Attributes
     ----------
-    parameters : RPSParameters
-        Of the controller's model.
+    parameters : RPSParameters or None
+        Of the controller's model, if that is a 3-RPS.
+    task : Task or None
+        Of the controller's model, if that is not a 3-RPS.
     time : (n,) array
         Of each tick, s.
     target, target_rate : (n, 3) arrays
@@ -57,7 +62,7 @@ class LoopRun:
         `Controller.pace` after each tick.
     pose, rate : (n, 3) arrays
         The plant's true ones.
-    configuration : (n, 13) array
+    configuration : (n, nq) array
         The plant's.
     reading : (n, 3) array
         Lengths that reached the controller, m; NaN where a reading was lost.
@@ -77,7 +82,7 @@ class LoopRun:
         Changes of the status, at most a thousand.
     """
 
-    parameters: RPSParameters
+    parameters: RPSParameters | None
     time: Array
     target: Array
     target_rate: Array
@@ -94,6 +99,24 @@ class LoopRun:
     pace: Array
     gap: Array
     events: tuple[LoopEvent, ...]
+    task: Task | None = None
+
+    @property
+    def of_pose(self) -> tuple[tuple[str, str], ...]:
+        """Name and unit of each coordinate."""
+        if self.task is None:
+            return (("z", "m"), ("tilt_x", "rad"), ("tilt_y", "rad"))
+        return tuple(zip(self.task.coordinates, _units(self.task.angular), strict=True))
+
+    @property
+    def of_actuators(self) -> tuple[tuple[str, str, str], ...]:
+        """Name of each actuator, with the units of its position and of its force."""
+        if self.task is None:
+            return (("1", "m", "N"), ("2", "m", "N"), ("3", "m", "N"))
+        mechanism = self.task.mechanism
+        turning = mechanism.angular_velocities[mechanism.actuated_indices].tolist()
+        forces = ("N m" if one else "N" for one in turning)
+        return tuple(zip(mechanism.actuated, _units(turning), forces, strict=True))
 
     @property
     def distance(self) -> Array:
@@ -163,6 +186,8 @@ def run_loop(
     targets = PacedTrajectory(trajectory, plant.period, settle=settle)
     record = _Record(controller, plant, targets.target(), ticks)
     injected, done = Faults(faults), 0
+    for fault in injected.faults:
+        fault.check(plant.length.size, plant.pose.size)
     try:
         for k in range(ticks):
             time = k * plant.period
@@ -214,7 +239,7 @@ class _Record:
             "pose": plant.pose,
             "rate": plant.rate,
             "configuration": plant.configuration,
-            "reading": np.full(3, np.nan) if reading is None else reading,
+            "reading": np.full_like(plant.length, np.nan) if reading is None else reading,
             "length": plant.length,
             "estimate": controller.estimate.answers.pose,
             "command": controller.forces,
@@ -229,11 +254,19 @@ class _Record:
         """Return the first ticks."""
         events = tuple(event for k, event in self._events if k < ticks)
         rows: dict[str, Any] = {name: rows[:ticks] for name, rows in self.rows.items()}
-        return LoopRun(self._controller.robot.parameters, events=events, **rows)
+        robot = self._controller.robot
+        if isinstance(robot, RPSRobot):
+            return LoopRun(robot.parameters, events=events, **rows)
+        return LoopRun(None, events=events, task=task_of(robot), **rows)
 
 
-#: Of the table that `write_loop_csv` writes.
-COLUMNS = 24
+def columns_of(coordinates: int, actuators: int) -> int:
+    """Return the number of columns of the table that `write_loop_csv` writes."""
+    return 3 + 3 * coordinates + 4 * actuators
+
+
+def _units(angular: Iterable[bool]) -> tuple[str, ...]:
+    return tuple("rad" if one else "m" for one in angular)
 
 
 @refuses_other_kinds
@@ -249,10 +282,10 @@ def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
     """
     columns = {"time_s": run.time}
     for name in ("target", "pose", "estimate"):
-        axes = (f"{name}_{axis}" for axis in ("z_m", "tilt_x_rad", "tilt_y_rad"))
+        axes = (f"{name}_{axis}_{unit}" for axis, unit in run.of_pose)
         columns |= zip(axes, getattr(run, name).T, strict=True)
-    for name, unit in (("reading", "m"), ("length", "m"), ("command", "N"), ("applied", "N")):
-        legs = (f"{name}_{leg}_{unit}" for leg in (1, 2, 3))
+    for name, which in (("reading", 1), ("length", 1), ("command", 2), ("applied", 2)):
+        legs = (f"{name}_{one[0]}_{one[which].replace(' ', '')}" for one in run.of_actuators)
         columns |= zip(legs, getattr(run, name).T, strict=True)
     table = np.column_stack([*columns.values(), run.type_ii, run.status])
     with whole_file(path) as scratch:

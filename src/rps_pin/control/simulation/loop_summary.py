@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from rich.table import Column, Table
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.control.simulation.loop_run import LoopRun
 from rps_pin.errors import InputError
@@ -42,6 +42,8 @@ class TrackingErrors:
     def of(cls, run: LoopRun) -> TrackingErrors:
         """Return the errors of every tick."""
         p = run.parameters
+        if p is None:
+            raise InputError("errors of centre, turn and legs are of a 3-RPS: see TaskSummary")
         h = p.platform_radius
         centre, turned = position(run.target, h), rotation(run.target)
         length, _ = leg_angles_and_lengths(tips(centre, turned, h), p.base_radius)
@@ -106,15 +108,10 @@ class LoopSummary:
         InputError
             If no tick is in the window.
         """
-        here = (run.time >= begin - _ROUNDING) & (run.time < end - _ROUNDING)
-        if not here.any():
-            raise InputError(f"no tick between {begin} and {end} s; the run has {run.time.size}")
+        here = _window(run, begin, end)
         errors = TrackingErrors.of(run)
         centre = 1e6 * np.linalg.norm(errors.centre[here], axis=1)
         turn, length = 1e6 * errors.turn[here], 1e6 * np.abs(errors.length[here])
-        force = run.applied[here]
-        flags = {flag: (run.status & int(flag)) != 0 for flag in Status if flag}
-        occurred = {_name(flag): on for flag, on in flags.items() if on.any()}
         return cls(
             centre_rms=_rms(centre),
             centre_max=float(centre.max()),
@@ -124,14 +121,7 @@ class LoopSummary:
             turn_end=float(turn[-1]),
             length_rms=_rms(length),
             length_max=float(length.max()),
-            force_peak=float(np.abs(force).max()),
-            force_rms=float(np.sqrt((force**2).mean(axis=0)).max()),
-            saturated=float(flags[Status.SATURATED][here].mean()),
-            minimum_type_ii=float(run.type_ii[here].min()),
-            gap=float(run.gap[here].max()),
-            ticks=int(here.sum()),
-            statuses={name: int(on.sum()) for name, on in occurred.items()},
-            first={name: float(run.time[on.argmax()]) for name, on in occurred.items()},
+            **_common(run, here),
         )
 
     @property
@@ -158,16 +148,122 @@ class LoopSummary:
 
     def table(self) -> Table:
         """Return the figures for a terminal."""
-        figures = (Column(name, justify="right") for name in ("RMS", "largest", "at the end"))
-        table = Table("", *figures, "unit")
-        for row in self.rows():
-            table.add_row(*row)
-        table.add_section()
-        table.add_row("ticks at a force limit", f"{self.saturated:.2%}")
-        table.add_row("smallest distance to type II", f"{self.minimum_type_ii:.4g}")
-        for name, count in self.statuses.items():
-            table.add_row(name, f"{count} ticks", f"first at {self.first[name]:.6g} s")
-        return table
+        return _table(self, "smallest distance to type II")
+
+
+@dataclass(frozen=True)
+class TaskSummary:
+    """Figures of a run of a task over a window of time, SI units.
+
+    Attributes
+    ----------
+    names, units
+        Of the task's coordinates.
+    rms, largest, at_end
+        Of the errors of these, actual less target: m or rad.
+    force_peak, force_rms
+        Of the actuators, largest of all, N or N m.
+    saturated, minimum_type_ii, gap, ticks, statuses, first
+        As of `LoopSummary`; `minimum_type_ii` is the least `SingularityMeasures.distance`.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    rms: tuple[float, ...]
+    largest: tuple[float, ...]
+    at_end: tuple[float, ...]
+    force_peak: float
+    force_rms: float
+    saturated: float
+    minimum_type_ii: float
+    gap: float
+    ticks: int
+    statuses: dict[str, int]
+    first: dict[str, float]
+
+    @classmethod
+    def of(cls, run: LoopRun, *, begin: float = 0.0, end: float = np.inf) -> TaskSummary:
+        """Return the figures of the ticks from `begin` to `end`, s, that not included.
+
+        Raises
+        ------
+        InputError
+            If no tick is in the window.
+        """
+        here = _window(run, begin, end)
+        errors = (run.pose - run.target)[here]
+        return cls(
+            names=tuple(name for name, _ in run.of_pose),
+            units=tuple(unit for _, unit in run.of_pose),
+            rms=tuple(np.sqrt((errors**2).mean(axis=0)).tolist()),
+            largest=tuple(np.abs(errors).max(axis=0).tolist()),
+            at_end=tuple(np.abs(errors[-1]).tolist()),
+            **_common(run, here),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures as plain data."""
+        return asdict(self)
+
+    def rows(self) -> list[list[str]]:
+        """Return name, RMS, largest, last and unit of the errors and forces."""
+        small = {"m": "um", "rad": "urad"}
+        errors = zip(self.names, self.units, self.rms, self.largest, self.at_end, strict=True)
+        rows = [
+            [f"error of {name}", *(f"{1e6 * value:.4g}" for value in values), small[unit]]
+            for name, unit, *values in errors
+        ]
+        force = f"{self.force_rms:.4g}", f"{self.force_peak:.4g}"
+        return [*rows, ["force of an actuator", *force, "", "N or N m"]]
+
+    def table(self) -> Table:
+        """Return the figures for a terminal."""
+        return _table(self, "smallest distance to a singularity")
+
+
+def summary_of(
+    run: LoopRun, *, begin: float = 0.0, end: float = np.inf
+) -> LoopSummary | TaskSummary:
+    """Return the summary of a run: of a 3-RPS, or of a task."""
+    kind = LoopSummary if run.task is None else TaskSummary
+    return kind.of(run, begin=begin, end=end)
+
+
+def _window(run: LoopRun, begin: float, end: float) -> Bools:
+    here = (run.time >= begin - _ROUNDING) & (run.time < end - _ROUNDING)
+    if not here.any():
+        raise InputError(f"no tick between {begin} and {end} s; the run has {run.time.size}")
+    return np.asarray(here)
+
+
+def _common(run: LoopRun, here: Bools) -> dict[str, Any]:
+    """Return the figures that runs of all robots have."""
+    force = run.applied[here]
+    flags = {flag: (run.status & int(flag)) != 0 for flag in Status if flag}
+    occurred = {_name(flag): on for flag, on in flags.items() if on.any()}
+    return {
+        "force_peak": float(np.abs(force).max()),
+        "force_rms": float(np.sqrt((force**2).mean(axis=0)).max()),
+        "saturated": float(flags[Status.SATURATED][here].mean()),
+        "minimum_type_ii": float(run.type_ii[here].min()),
+        "gap": float(run.gap[here].max()),
+        "ticks": int(here.sum()),
+        "statuses": {name: int(on.sum()) for name, on in occurred.items()},
+        "first": {name: float(run.time[on.argmax()]) for name, on in occurred.items()},
+    }
+
+
+def _table(summary: LoopSummary | TaskSummary, distance: str) -> Table:
+    figures = (Column(name, justify="right") for name in ("RMS", "largest", "at the end"))
+    table = Table("", *figures, "unit")
+    for row in summary.rows():
+        table.add_row(*row)
+    table.add_section()
+    table.add_row("ticks at a force limit", f"{summary.saturated:.2%}")
+    table.add_row(distance, f"{summary.minimum_type_ii:.4g}")
+    for name, count in summary.statuses.items():
+        table.add_row(name, f"{count} ticks", f"first at {summary.first[name]:.6g} s")
+    return table
 
 
 def status_name(number: int) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rps_pin.control.simulation.loop_run import LoopRun
-from rps_pin.control.simulation.loop_summary import LoopSummary, status_name
+from rps_pin.control.simulation.loop_summary import LoopSummary, TaskSummary, status_name
 from rps_pin.control.simulation.scenario import Scenario
 from rps_pin.errors import InputError
 from rps_pin.plain_text import plain
@@ -17,7 +17,11 @@ _MOST_SHOWN = 50
 
 
 def report(
-    title: str, scenario: Scenario, run: LoopRun, summary: LoopSummary, figures: Mapping[str, str]
+    title: str,
+    scenario: Scenario,
+    run: LoopRun,
+    summary: LoopSummary | TaskSummary,
+    figures: Mapping[str, str],
 ) -> str:
     """Return the report.
 
@@ -33,7 +37,7 @@ def report(
     entry = scenario.entry
     lines = [
         *(f"# {html.escape(plain(title))}", ""),
-        f"Robot {html.escape(plain(scenario.model.parameters.name))}; {run.time.size} ticks of "
+        f"Robot {html.escape(plain(scenario.name))}; {run.time.size} ticks of "
         f"{1e3 * entry.period:g} ms, the first {entry.settle:g} s at rest.",
         "",
     ]
@@ -50,9 +54,10 @@ def report(
     lines += [f"## Errors, over {summary.ticks} ticks", ""]
     lines += ["| | RMS | largest | at the end | |", "|---|---:|---:|---:|---|"]
     lines += [f"| {' | '.join(row)} |" for row in summary.rows()]
+    where = "type II" if run.task is None else "a singularity"
     lines += [
         "",
-        f"Ticks at a force limit: {summary.saturated:.2%}. Smallest distance to type II: "
+        f"Ticks at a force limit: {summary.saturated:.2%}. Smallest distance to {where}: "
         f"{summary.minimum_type_ii:.4g}. Largest gap of the plant's loops: {summary.gap:.2g} m.",
         "",
     ]
@@ -77,7 +82,7 @@ def _margins(scenario: Scenario) -> str:
         return f"Margins are not available: {error}."
 
 
-def _statuses(run: LoopRun, summary: LoopSummary) -> list[str]:
+def _statuses(run: LoopRun, summary: LoopSummary | TaskSummary) -> list[str]:
     lines = [
         f"- {name}: {count} ticks, first at {summary.first[name]:.6g} s"
         for name, count in summary.statuses.items()

@@ -6,8 +6,9 @@
     plant: {masses: 1.2, delay: 1, encoder_resolution: 5.0e-8}
     faults: [{kind: lost, start: 1.5, duration: 0.0005}]
 
-`rps_pin.control.simulation.scenario_schema` lists all keys; those of the controller and the plant
-are arguments of their classes.
+With ``mechanism: FILE`` in place of ``robot`` it is that of a mechanism with a task: see
+`task_scenario`. `rps_pin.control.simulation.scenario_schema` lists all keys; those of the
+controller and the plant are arguments of their classes.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from rps_pin.config import YamlFile, read_config
+from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.config import YamlFile, read_yaml
 from rps_pin.control.estimator.effective_inertia import effective_inertia
 from rps_pin.control.loop.computed_torque import ComputedTorque
 from rps_pin.control.loop.controller import Controller
@@ -30,13 +33,20 @@ from rps_pin.control.simulation.faults import Fault
 from rps_pin.control.simulation.loop_run import LoopRun, run_loop
 from rps_pin.control.simulation.plant import Plant
 from rps_pin.control.simulation.scenario_schema import Machine, ScenarioEntry
+from rps_pin.control.simulation.task_scenario import (
+    TaskScenarioEntry,
+    changed,
+    task_of_file,
+    task_trajectory,
+)
 from rps_pin.control.simulation.wrong_parameters import wrong_parameters
-from rps_pin.errors import InputError
+from rps_pin.errors import CompileError, InputError
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.motion.trajectory_file import described_trajectory, load_trajectory
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.robot_file import load_robot
+from rps_pin.task import Task
 from rps_pin.trajectories.path import Trajectory
 
 _OF_LAW = {"law", "bandwidth", "damping", "integral", "gains", "model", "speeds", "paced"}
@@ -51,9 +61,9 @@ class Scenario:
     ----------
     entry : ScenarioEntry
         The file's values.
-    model : RPSRobot
+    model : RPSRobot or Task
         The controller's model of the robot.
-    machine : RPSRobot
+    machine : RPSRobot or Task
         The plant's robot.
     trajectory : Trajectory
         The setpoints.
@@ -63,16 +73,16 @@ class Scenario:
         In the file's order.
     """
 
-    entry: ScenarioEntry
-    model: RPSRobot
-    machine: RPSRobot
+    entry: ScenarioEntry | TaskScenarioEntry
+    model: RPSRobot | Task
+    machine: RPSRobot | Task
     trajectory: Trajectory
     gains: Gains
     faults: tuple[Fault, ...]
 
     @property
     def begin(self) -> Any:
-        """The trajectory's first pose, shape (3,)."""
+        """The trajectory's first pose, shape (m,)."""
         return self.trajectory.sample(0.0).pose
 
     @property
@@ -86,12 +96,41 @@ class Scenario:
         entry = self.entry.controller
         settings = entry.model_dump(exclude=_OF_LAW, exclude_none=True)
         law = ComputedTorque if entry.law == "computed_torque" else PDControl
-        return law(self.model, self.begin, self.gains, period=self.entry.period, **settings)
+        return law(self._loop_model, self.begin, self.gains, period=self.entry.period, **settings)
+
+    @cached_property
+    def _loop_model(self) -> RPSRobot | Task:
+        """The controller's model, of a task in generated code if that can be had."""
+        if isinstance(self.model, RPSRobot):
+            return self.model
+        try:
+            return self.model.compile(functions=("kinematics", "closing", "dynamics"))
+        except (CompileError, ImportError):
+            return self.model
+
+    @property
+    def sizes(self) -> tuple[int, int]:
+        """Number of coordinates and of actuators."""
+        return len(self.begin), self.machine.mechanism.actuated_indices.size
+
+    @property
+    def subject(self) -> RPSRobot | ClosedLoopModel:
+        """What moves: the plant's robot or mechanism."""
+        machine = self.machine
+        return machine if isinstance(machine, RPSRobot) else machine.mechanism
+
+    @property
+    def name(self) -> str:
+        """Of the robot."""
+        if isinstance(self.model, RPSRobot):
+            return self.model.parameters.name
+        return self.model.mechanism.name or "mechanism"
 
     def plant(self) -> Plant:
         """Return a new plant."""
         entry = self.entry.plant
-        settings = entry.model_dump(include={"delay", "substeps"}, exclude_none=True)
+        some = {"delay", "substeps", "force_limit"}
+        settings = entry.model_dump(include=some, exclude_none=True)
         encoders = Encoders(entry.encoder_resolution, entry.encoder_noise, entry.seed)
         return Plant(
             self.machine, self.begin, period=self.entry.period, encoders=encoders, **settings
@@ -121,7 +160,8 @@ class Scenario:
             raise InputError("margins of gains in N/m need an inertia, which is not given")
         (kp, *_), (kd, *_), (ki, *_) = rows = (gains or self.gains).rows
         if any(len(set(row)) > 1 for row in rows):
-            raise InputError("the margins of one axis need gains that are equal for all three")
+            all_ = "three" if len(rows[0]) == 3 else str(len(rows[0]))
+            raise InputError(f"the margins of one axis need gains that are equal for all {all_}")
         period, delay = self.entry.period, self.entry.plant.delay or 0
         cut_off = None if entry.speeds == "measured" else entry.cut_off or 100.0
         return loop_margins(kp, kd, ki, period=period, delay=delay, cut_off=cut_off)
@@ -138,8 +178,11 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
     RPSPinError
         If the robot or the trajectory cannot be made.
     """
-    file, entry = read_config(path, "scenario", ScenarioEntry)
+    file = read_yaml(path, "scenario file")
     folder = Path(path).parent
+    if "mechanism" in file.values:
+        return _of_mechanism(file, folder)
+    entry = file.validated(ScenarioEntry, "a scenario")
     nominal = load_robot(entry.robot, folder)
     model = _changed(file, nominal, entry.controller.model, ("controller", "model"))
     machine = _changed(file, nominal, entry.plant, ("plant",))
@@ -149,12 +192,33 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
         trajectory = load_trajectory(folder / entry.trajectory, nominal)
     else:
         trajectory = described_trajectory(file.part("trajectory"), folder, nominal)
+    gains = _gains(entry, model, trajectory)
+    return Scenario(entry, model, machine, trajectory, gains, _faults(file, entry, 3, 3))
+
+
+def _of_mechanism(file: YamlFile, folder: Path) -> Scenario:
+    """Return the scenario of a mechanism with a task."""
+    entry = file.validated(TaskScenarioEntry, "a scenario")
+    nominal = task_of_file(file, folder, entry.mechanism)
+    model = changed(nominal, entry.controller.model.masses)
+    machine = changed(nominal, entry.plant.masses)
+    trajectory = task_trajectory(file, folder, nominal)
+    actuators = nominal.mechanism.actuated_indices.size
+    with file.at("controller"):
+        gains = _gains(entry, model, trajectory).of(nominal.size)
+    faults = _faults(file, entry, actuators, nominal.size)
+    return Scenario(entry, model, machine, trajectory, gains, faults)
+
+
+def _faults(
+    file: YamlFile, entry: ScenarioEntry | TaskScenarioEntry, actuators: int, coordinates: int
+) -> tuple[Fault, ...]:
     faults = []
     for number, one in enumerate(entry.faults):
         with file.at("faults", number):
             faults.append(Fault(**one.model_dump(exclude_none=True)))
-    gains = _gains(entry, model, trajectory)
-    return Scenario(entry, model, machine, trajectory, gains, tuple(faults))
+            faults[-1].check(actuators, coordinates)
+    return tuple(faults)
 
 
 def _changed(
@@ -165,7 +229,7 @@ def _changed(
         return RPSRobot(wrong_parameters(nominal.parameters, **changes))
 
 
-def _placed(entry: ScenarioEntry) -> Gains | None:
+def _placed(entry: ScenarioEntry | TaskScenarioEntry) -> Gains | None:
     """Return the gains placed by a bandwidth, which command accelerations."""
     given = entry.controller
     if given.bandwidth is None:
@@ -174,7 +238,9 @@ def _placed(entry: ScenarioEntry) -> Gains | None:
     return Gains.placed(given.bandwidth, **settings)
 
 
-def _gains(entry: ScenarioEntry, model: RPSRobot, trajectory: Trajectory) -> Gains:
+def _gains(
+    entry: ScenarioEntry | TaskScenarioEntry, model: RPSRobot | Task, trajectory: Trajectory
+) -> Gains:
     given, placed = entry.controller, _placed(entry)
     if placed is None:
         assert given.gains is not None  # by the schema
