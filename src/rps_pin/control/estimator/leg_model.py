@@ -82,7 +82,7 @@ class LegModel(LegFormulas):
 
     def near_singular(self, state: StateEstimate, least: float) -> bool:
         """Return whether a determinant, 1 at most, is below a limit."""
-        determinant = self.determinant(state.geometry)
+        determinant = closure_determinant(state.geometry, self._g, self._radius)
         return not (abs(state.jacobian.determinant) > least < abs(determinant))
 
     def rejoining_time(self, held: LegGeometry, target: LegGeometry) -> float:

@@ -176,6 +176,7 @@ class Controller(DeepCopied, ABC):
             largest_jump=largest_jump,
         )
         self._vectors, self.estimate = self._model.vectors, self._model.estimate
+        self._quiet = isinstance(self._model, LegModel)  # floats overflow without a warning
         self._guard = self.estimate.guard
         self.period, self.gains = period, gains.of(self._model.size)
         of = self._vectors.of
@@ -282,14 +283,13 @@ class Controller(DeepCopied, ABC):
     @guarded("_guard")
     def _tick(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
         """Do the same in Python."""
-        status = self._computed(length, target, speed, dt)
+        ticked = self._ticked if self._quiet else self._quietly
+        status = ticked(length, target, speed, dt)
         if self._generated is not None and self.estimate.age == 0 and not self._stop_reason:
             self._hand_over()
         return status
 
-    def _computed(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
-        if isinstance(self._model, LegModel):
-            return self._ticked(length, target, speed, dt)
+    def _quietly(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> Status:
         with np.errstate(all="ignore"):  # of arrays, whose largest floats overflow
             return self._ticked(length, target, speed, dt)
 
@@ -495,11 +495,13 @@ class Controller(DeepCopied, ABC):
         return status
 
     def _send(self, force: Any) -> None:
-        self.forces[:] = force
+        out = self.forces
+        for i, one in enumerate(force):  # faster than by a slice
+            out[i] = one
 
     @property
     def _force_unit(self) -> str:
-        return "N" if isinstance(self._model, LegModel) else "N or N m"
+        return "N" if self._quiet else "N or N m"
 
 
 def model_of(robot: Robot, near: ArrayLike, compiled: Compiled, **settings: Any) -> ControlModel:
