@@ -125,9 +125,17 @@ def test_mistakes_are_told_with_their_line(tmp_path: Path, line: str, words: str
     [
         ("urdf/ankle.yaml", "urdf/none.yaml", "line 1: mechanism = .*no such file"),
         ("urdf/ankle.yaml", "urdf/gripper.yaml", "line 1: .*has no task"),
-        ("point_to_point", "helix", "line 2: kind = 'helix': .*point_to_point, spline, csv"),
+        (
+            "point_to_point",
+            "helix",
+            "line 2: kind: .*'helix' is not one; .*point_to_point, spline, csv",
+        ),
         ("end: [0.05, -0.03]", "end: [0.05]", "line 2: "),
-        ("start: [0.0, 0.0], end: [0.05, -0.03]", "start: [0.0], end: [0.1]", "2 coordinates"),
+        (
+            "start: [0.0, 0.0], end: [0.05, -0.03]",
+            "start: [0.0], end: [0.1]",
+            "line 2: 1 numbers for the 2 coordinates",
+        ),
         ("end: [0.05, -0.03]", "final: [0.05, -0.03]", "line 2: unknown key 'final'"),
         ("bandwidth: 15.0", "gains: {{proportional: [1.0, 2.0, 3.0], derivative: 1.0}}", "errors"),
         ("bandwidth: 15.0", "bandwidth: -1.0", "line 3: controller.bandwidth"),

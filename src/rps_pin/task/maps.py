@@ -429,32 +429,6 @@ class TaskMaps:
         """
         return np.asarray(self._by_actuators.velocity(q, speed, **options_of(errors)))
 
-    def actuator_forces(
-        self,
-        q: ArrayLike,
-        rate: ArrayLike,
-        acceleration: ArrayLike,
-        *,
-        errors: Errors = "raise",
-    ) -> Array:
-        """Return the actuators' forces of motions of the task, shape (..., na), N or N m.
-
-        Parameters
-        ----------
-        q
-            Closed configurations, shape (..., nq).
-        rate, acceleration
-            Of the task's coordinates, shape (..., m) each.
-
-        Raises
-        ------
-        SingularityError
-            If the forces or the motion are not determined here.
-        """
-        state = self.motion(q, rate, acceleration, errors=errors)
-        forces = self._by_actuators.inverse_dynamics(*state, **options_of(errors))
-        return np.asarray(forces.tau)
-
     # Parts ----------------------------------------------------------------------------------------
 
     def _refuse_wrong_count(self) -> None:

@@ -83,7 +83,26 @@ def load_task_trajectory(path: str | os.PathLike[str], task: Task) -> Trajectory
         return read_csv(path, task)
     if suffix not in (".yaml", ".yml"):
         raise InputError(f"trajectory file {path}: its name must end in .csv, .yaml or .yml")
-    file = read_yaml(path, "trajectory file")
+    return described_task_trajectory(read_yaml(path, "trajectory file"), Path(path).parent, task)
+
+
+def described_task_trajectory(file: YamlFile, folder: Path, task: Task) -> Trajectory:
+    """Return the trajectory that a YAML file, or a part of one, describes.
+
+    Parameters
+    ----------
+    file
+        The file.
+    folder
+        The folder that file names in it are relative to.
+    task
+        The task.
+
+    Raises
+    ------
+    InputError
+        As `load_task_trajectory`.
+    """
     kind = file.values.get("kind")
     if not isinstance(kind, str) or kind not in _KINDS:
         given = "is missing" if kind is None else f"{shown(kind)} is not one"
@@ -93,7 +112,7 @@ def load_task_trajectory(path: str | os.PathLike[str], task: Task) -> Trajectory
     described = file.validated(_KINDS[kind], f"a {kind} trajectory")
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return _made(file, described, Path(path).parent, task)
+            return _made(file, described, folder, task)
     except ArithmeticError as error:
         raise InputError(f"{file.place(('kind',))}: numbers too large or small: {error}") from None
 

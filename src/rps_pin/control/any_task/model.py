@@ -108,7 +108,8 @@ class TaskModel:
     def forces(self, geometry: TaskGeometry, rate: Array, acceleration: Array) -> Array | None:
         """Return the actuator forces of a motion, None if they are not determined."""
         try:
-            return self.task.actuator_forces(geometry.configuration, rate, acceleration)
+            state = self.task.motion(geometry.configuration, rate, acceleration)
+            return self.task.actuator_forces(*state)
         except REFUSED:
             return None
 

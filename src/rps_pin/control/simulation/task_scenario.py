@@ -5,14 +5,13 @@
     controller: {law: computed_torque, bandwidth: 15.0}
     plant: {masses: 1.2, delay: 1}
 
-Trajectories are in the task's coordinates: a CSV file, or ``point_to_point``, ``spline`` or ``csv``
-with the keys that they have for the 3-RPS.
+Trajectories are those of `rps_pin.task.trajectory_file`: a file's name, or its keys.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import pinocchio as pin
 from pydantic import Field
@@ -27,11 +26,8 @@ from rps_pin.control.simulation.scenario_schema import (
 )
 from rps_pin.errors import InputError
 from rps_pin.task import Task
-from rps_pin.trajectories.csv_file import read_csv
+from rps_pin.task.trajectory_file import described_task_trajectory, load_task_trajectory
 from rps_pin.trajectories.path import Trajectory
-from rps_pin.trajectories.point_to_point import point_to_point
-from rps_pin.trajectories.spline import spline
-from rps_pin.trajectories.time_laws import Profile
 
 Row = Annotated[list[Finite], Field(min_length=1)]
 OneOrMore = NonNegative | Annotated[list[NonNegative], Field(min_length=1)]
@@ -90,41 +86,6 @@ class TaskScenarioEntry(Entry):
     duration: Positive | None = None
 
 
-class _Timed(Entry):
-    duration: Positive | None = None
-    profile: Profile | None = None
-
-
-class TaskPointToPoint(_Timed):
-    """See `rps_pin.trajectories.point_to_point`."""
-
-    kind: Literal["point_to_point"]
-    start: Row
-    end: Row
-
-
-class TaskSpline(_Timed):
-    """See `rps_pin.trajectories.spline`."""
-
-    kind: Literal["spline"]
-    poses: list[Row]
-    times: list[Finite] | None = None
-
-
-class TaskCsv(Entry):
-    """See `rps_pin.trajectories.read_csv`; the file is named from the scenario's folder."""
-
-    kind: Literal["csv"]
-    file: Text
-
-
-_KINDS: dict[str, type[Entry]] = {
-    "point_to_point": TaskPointToPoint,
-    "spline": TaskSpline,
-    "csv": TaskCsv,
-}
-
-
 def task_of_file(file: YamlFile, folder: Path, name: str) -> Task:
     """Return the task of the mechanism that a scenario names.
 
@@ -179,34 +140,5 @@ def task_trajectory(file: YamlFile, folder: Path, task: Task) -> Trajectory:
     """
     given = file.values["trajectory"]
     if isinstance(given, str):
-        with file.at("trajectory"):
-            return _fitting(read_csv(folder / given, task), task)
-    part = file.part("trajectory")
-    kind = part.values.get("kind")
-    if kind not in _KINDS:
-        raise InputError(
-            f"{part.place(('kind',))}: kind = {kind!r}: of a mechanism's trajectory it is one of: "
-            f"{', '.join(_KINDS)}"
-        )
-    keys = part.validated(_KINDS[kind], "a trajectory").model_dump(exclude_none=True)
-    with part.at("kind"):
-        return _fitting(_made(kind, keys, folder, task), task)
-
-
-def _made(kind: str, keys: dict[str, Any], folder: Path, task: Task) -> Trajectory:
-    del keys["kind"]
-    if kind == "csv":
-        return read_csv(folder / keys["file"], task)
-    if kind == "spline":
-        return spline(**keys)
-    return point_to_point(**keys)
-
-
-def _fitting(trajectory: Trajectory, task: Task) -> Trajectory:
-    count = len(trajectory.sample(0.0).pose)
-    if count != task.size:
-        raise InputError(
-            f"poses of {count} numbers; the task has {task.size} coordinates: "
-            f"{', '.join(task.coordinates)}"
-        )
-    return trajectory
+        return load_task_trajectory(folder / given, task)
+    return described_task_trajectory(file.part("trajectory"), folder, task)
