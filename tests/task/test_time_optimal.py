@@ -31,8 +31,10 @@ from rps_pin.rps import time_optimal as rps_time_optimal
 from rps_pin.task import MotionLimits, Task, time_optimal
 from rps_pin.task.motion import task_dynamics
 from rps_pin.task.motion.limited_motion import LimitedMotion
+from rps_pin.task.motion.task_dynamics import TaskDynamics
 from rps_pin.task.motion.time_search import KEPT
 from rps_pin.trajectories.point_to_point import LineCurve
+from rps_pin.trajectories.spline import ChordSpline
 from tests.task import robots
 from tests.worst import worst
 
@@ -271,6 +273,46 @@ def test_the_3_rps_without_its_closed_forms(force: float) -> None:
         np.testing.assert_allclose(found.sample(t).pose, expected.sample(t).pose, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", robots.GENERATED)
+def test_any_robot_along_a_curve_through_poses(name: str) -> None:
+    """Of the actuators' own speeds, and a few times the forces that holding takes."""
+    task, (x, q) = robots.compiled(name), robots.poses(name)
+    mechanism, index = task.mechanism, task.mechanism.actuated_indices
+    still = np.zeros((len(q), mechanism.model.nv))
+    force = 5 * np.abs(task.actuator_forces(q, still, still)).max()
+    limits = MotionLimits(force=force)
+    found = time_optimal(task, ChordSpline(x[:3]), limits=limits, near=q[0], intervals=30)
+    motion = found.sample(np.sort(np.random.default_rng(7).uniform(0, found.duration, 60)))
+    state = task.motion(task.follow(motion.pose, near=q[0]), motion.rate, motion.acceleration)
+    tau = [mechanism.inverse_dynamics(*one).tau for one in zip(*state, strict=True)]
+    uses = [np.abs(tau) / force, np.abs(state.v[:, index]) / mechanism.model.velocityLimit[index]]
+    most = np.concatenate(uses, axis=1).max(axis=1)
+    assert worst(most) <= 1 + KEPT
+    assert (most >= 1 - 1e-3).mean() >= 0.95
+    assert found.shares()["none"] <= 6e-3
+
+
+def test_more_actuators_than_coordinates_share_the_force() -> None:
+    """Forces are those of least norm, under a wrench too."""
+    mechanism = robots.task("five_bar").mechanism
+    more = mechanism.with_actuated(["left_joint", "left_arm_joint", "right_joint"])
+    task, wrench = Task(more, "left_tip", ["x", "z"]), np.array([2.0, 0.0, -5.0, 0.0, 0.0, 0.0])
+    line = LineCurve(task.home, task.home + np.array([0.02, 0.01]))
+    bounds = MotionLimits(force=10.0, speed=5.0).of(task)
+    along = TaskDynamics(task, line, bounds, wrench, None)
+    u = np.array([0.1, 0.5, 0.9])
+    square, change = np.array([1.0, 2.0, 3.0]), np.array([5.0, -4.0, 2.0])
+    use = along.use_along(u, square, change)
+    terms = along.terms(u)
+    by_terms = terms.inertia * change[:, None] + terms.velocity_product * square[:, None]
+    state = task.state(*along.sample(u, square, change))
+    for i, one in enumerate(zip(*state, strict=True)):
+        tau = more.inverse_dynamics(*one, wrenches={"left_tip": wrench}).tau
+        np.testing.assert_allclose(use.force[i] * 10.0, tau, atol=1e-9)
+        np.testing.assert_allclose(by_terms[i] + terms.holding[i], tau, atol=1e-9)
+    np.testing.assert_allclose(use.speed * 5.0, state.v[:, more.actuated_indices], atol=1e-12)
+
+
 def test_a_wrench_is_held_along_the_way() -> None:
     task, wrench = robots.compiled("stewart"), np.array([30.0, -50.0, -400.0, 5.0, -8.0, 3.0])
     line = LineCurve(task.home, task.home + LINES["stewart"])
@@ -343,6 +385,8 @@ def test_bad_arguments_are_refused(options: dict[str, Any], message: str) -> Non
 
 
 def test_other_paths_are_refused() -> None:
+    with pytest.raises(InputError, match="task"):
+        time_optimal(RPSRobot.from_preset("micro"), ALONG)  # type: ignore[arg-type]
     limits = MotionLimits(force=1.0)
     with pytest.raises(InputError, match="it must be a curve"):
         time_optimal(slide(), 3.0, limits=limits)  # type: ignore[arg-type]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, MechanismError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.motion.curves import curve_of, ends_at_rest
 from rps_pin.task.motion.limited_motion import LimitedMotion
 from rps_pin.task.motion.limits import MotionLimits
@@ -24,6 +25,7 @@ from rps_pin.validation import real_array, whole_number
 __all__ = ["KEPT", "time_optimal"]
 
 
+@refuses_other_kinds
 def time_optimal(
     task: Task,
     path: Curve | Trajectory,
