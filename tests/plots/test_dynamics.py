@@ -13,7 +13,7 @@ from rps_pin.plots import plot_force_causes, plot_sizing
 from rps_pin.rps.dynamics.force_causes import ForceCauses, force_causes
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.dynamics.sizing import size_trajectory
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, SizingSheet
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits, SizingSheet
 
 Array = NDArray[np.float64]
 

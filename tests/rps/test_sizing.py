@@ -19,7 +19,7 @@ from rps_pin.rps.dynamics.sizing import (
     size_trajectory,
     time_above,
 )
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, SizingSheet
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits, SizingSheet
 from rps_pin.trajectories.path import PathSample
 
 Array = NDArray[np.float64]

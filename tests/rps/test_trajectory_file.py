@@ -14,9 +14,9 @@ from numpy.testing import assert_array_equal
 
 from rps_pin import InputError, RPSPinError, RPSRobot, helix
 from rps_pin.config import read_yaml
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.motion.trajectory_schema import KINDS
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits
 from rps_pin.trajectories import circle, lissajous, point_to_point, spline
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.path import Trajectory

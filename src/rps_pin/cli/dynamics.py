@@ -20,9 +20,9 @@ from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.dynamics.motion_csv import COLUMNS
 from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 from rps_pin.rps.dynamics.sizing import size_actuators
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits
 from rps_pin.trajectories.path import end_states
 from rps_pin.validation import finite_number
 

@@ -518,6 +518,11 @@ class ClosedLoopModel:
         options = self._options()
         return type(self)(model, self.closures, self.actuated, home=self._home, **options)
 
+    def without_effects(self) -> ClosedLoopModel:
+        """Return the same mechanism without damping, friction and springs of joints."""
+        options = self._options() | {"effects": None}
+        return type(self)(self.model, self.closures, self.actuated, home=self._home, **options)
+
     def _with(
         self, closures: Sequence[Closure], actuated: Sequence[str], home: ArrayLike | None = None
     ) -> ClosedLoopModel:

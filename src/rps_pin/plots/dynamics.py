@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from rps_pin.errors import InputError
 from rps_pin.plots.style import STYLE, figure_of, legend_above, new_axes, plot_legs, three_axes
 from rps_pin.rps.dynamics.force_causes import ForceCauses
-from rps_pin.rps.dynamics.sizing_sheet import SizingSheet
+from rps_pin.task.sizing.sizing_sheet import SizingSheet
 from rps_pin.validation import real_array
 
 #: Okabe and Ito's colours for the causes, told apart by colour-blind readers; and hatches, so that
@@ -114,7 +114,8 @@ def _stacks(axes: Axes, time: np.ndarray, parts: dict[str, np.ndarray]) -> None:
 
 def _limit_box(axes: Axes, sheet: SizingSheet) -> None:
     """Draw what limits there are: a box, or two lines where one side is open."""
-    force, speed, power = sheet.limits.force, sheet.limits.speed, sheet.limits.power
+    limits = sheet.limits_of(0)
+    force, speed, power = limits.force, limits.speed, limits.power
     look: dict[str, Any] = {"color": "black", "linewidth": 1.0}
     if np.isfinite(force) and np.isfinite(speed):
         corner = (-speed, -force)

@@ -11,7 +11,6 @@ from rps_pin.rps.dynamics.force_causes import ForceCauses, force_causes
 from rps_pin.rps.dynamics.joint_reactions import JointReactions, joint_reactions
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.dynamics.sizing import size_motion, size_trajectory
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits, SizingSheet
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
 from rps_pin.rps.kinematics.conversions import (
     angles_from_pose,
@@ -42,6 +41,7 @@ from rps_pin.rps.singularity.surface import singular_surface
 from rps_pin.rps.urdf import build_urdf
 from rps_pin.task import SingularityMeasures
 from rps_pin.task.paths.events import LimitEvent, PathCheck, SingularityEvent
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits, SizingSheet
 
 __getattr__ = moved_names(
     __name__,

@@ -14,12 +14,18 @@ from rps_pin.task.paths.events import LimitEvent, PathCheck, SingularityEvent
 from rps_pin.task.paths.limits import Cone
 from rps_pin.task.polytope import Ball, Polytope
 from rps_pin.task.singularity import SingularityMeasures
+from rps_pin.task.sizing.force_causes import TaskForceCauses, force_causes
+from rps_pin.task.sizing.motion_run import TaskMotion, run_motion
+from rps_pin.task.sizing.sizing import JointLoad, TaskSizing, size_motion, size_trajectory
+from rps_pin.task.sizing.sizing_sheet import DriveLimits
 from rps_pin.task.task import Task
 from rps_pin.task.trajectory_file import load_task_trajectory
 
 __all__ = [
     "Ball",
     "Cone",
+    "DriveLimits",
+    "JointLoad",
     "LimitEvent",
     "MotionLimits",
     "PathCheck",
@@ -28,8 +34,15 @@ __all__ = [
     "SingularityEvent",
     "SingularityMeasures",
     "Task",
+    "TaskForceCauses",
+    "TaskMotion",
+    "TaskSizing",
     "TaskState",
     "check_path",
+    "force_causes",
     "load_task_trajectory",
+    "run_motion",
+    "size_motion",
+    "size_trajectory",
     "time_optimal",
 ]

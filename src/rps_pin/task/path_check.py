@@ -38,6 +38,7 @@ def check_path(
     wrench: ArrayLike | None = None,
     tolerance: float | None = None,
     threshold: float = GRAZE,
+    actuators: bool = True,
     least_steps: int = 250,
     max_step: float = 0.02,
 ) -> PathCheck:
@@ -66,6 +67,8 @@ def check_path(
         than this apart count as a graze.
     threshold
         A smallest distance below this is a graze. Distances are those of `SingularityMeasures`.
+    actuators
+        Whether speeds and forces of the actuators are checked.
     least_steps, max_step
         How dense the path is sampled: at least so many steps, each of at most so much of every
         coordinate over the characteristic length. See the module's text for what that guarantees.
@@ -89,7 +92,7 @@ def check_path(
     loads = Loads(task, payload, wrench)
     if loads.wrench is not None and loads.wrench.ndim != 1:
         raise InputError(f"wrench has shape {loads.wrench.shape}; along a path it must be (6,)")
-    path = TaskSignals(task, trajectory, tolerance, cones=cones, loads=loads)
+    path = TaskSignals(task, trajectory, tolerance, cones=cones, loads=loads, actuators=actuators)
     steps = whole_number(least_steps, "least_steps")
     times = sample_times(path, steps, positive_number(max_step, "max_step"))
     times = path.follow(times, near)

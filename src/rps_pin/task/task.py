@@ -18,7 +18,7 @@ from rps_pin.errors import InputError, MechanismError, SingularityError
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE
 from rps_pin.task import polytope
 from rps_pin.task.maps import TaskMaps, options_of
-from rps_pin.task.paths.limits import JointLimits, PositionLimits
+from rps_pin.task.paths.limits import JointRooms, PositionLimits
 from rps_pin.task.singularity import SingularityMeasures
 from rps_pin.validation import numbers
 
@@ -318,7 +318,7 @@ class Task(TaskMaps):
 
     def position_limits(self) -> PositionLimits:
         """Return the limits of positions that a path is checked against; see `check_path`."""
-        return JointLimits(self.mechanism)
+        return JointRooms(self.mechanism)
 
     # Parts ----------------------------------------------------------------------------------------
 

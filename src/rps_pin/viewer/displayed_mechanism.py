@@ -13,8 +13,9 @@ from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import InputError
-from rps_pin.rps.dynamics.motion_run import MotionRun, sample_times
+from rps_pin.rps.dynamics.motion_run import MotionRun
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.task.sizing.motion_run import sample_times
 from rps_pin.validation import real_vector
 from rps_pin.viewer.motion import Motion
 

@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from rps_pin import RPSRobot
 from rps_pin.errors import InfeasibleError
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.time_optimal import time_optimal
 from rps_pin.rps.motion.time_search import KEPT
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits
 from rps_pin.trajectories.curve import CurveSample
 from rps_pin.trajectories.point_to_point import LineCurve
 from rps_pin.trajectories.spline import ChordSpline

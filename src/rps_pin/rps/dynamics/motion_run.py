@@ -12,17 +12,15 @@ from numpy.typing import ArrayLike
 from scipy.integrate import trapezoid
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, SingularityError, shown
+from rps_pin.errors import SingularityError
 from rps_pin.rps.kinematics.legs import PoseLegs, legs_of_pose
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_refusal import require_clear
 from rps_pin.task.paths.events import PathCheck
+from rps_pin.task.sizing.motion_run import sample_times
 from rps_pin.trajectories.path import Trajectory
-from rps_pin.validation import real
 
 Progress = Callable[[Iterable[int]], Iterable[int]]
-
-_MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -243,19 +241,6 @@ def crossed_singularity(before: float, after: float, robot: RPSRobot) -> Singula
         math.inf,
         robot.mechanism.max_condition,
     )
-
-
-def sample_times(duration: float, sample_rate: float) -> Array:
-    """Return times from 0 at a rate (Hz), and the duration itself as the last one, s."""
-    if not 0 < real(sample_rate) < math.inf:
-        raise InputError(f"sample rate = {shown(sample_rate)}: it must be a positive number of Hz")
-    if duration * sample_rate > _MOST_SAMPLES:
-        raise InputError(
-            f"{sample_rate:g} Hz for {duration:g} s would be {duration * sample_rate:.3g} samples; "
-            f"at most {_MOST_SAMPLES} are possible"
-        )
-    count = math.ceil(duration * sample_rate - 1e-9)
-    return np.append(np.arange(count) / sample_rate, duration)
 
 
 def _actuator_summary(run: MotionRun, leg: int) -> ActuatorSummary:

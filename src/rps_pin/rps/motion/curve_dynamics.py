@@ -6,12 +6,12 @@ import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.rps.dynamics.friction import has_friction
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.kinematics.rates import leg_jacobians
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.task.motion.curve_dynamics import CurveDynamics as AnyCurveDynamics
 from rps_pin.task.motion.curve_dynamics import CurveLimits, LimitUse
 from rps_pin.task.motion.curve_dynamics import CurveTerms as AnyCurveTerms
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits
 from rps_pin.trajectories.curve import Curve, CurveSample
 from rps_pin.trajectories.path import PathSample
 

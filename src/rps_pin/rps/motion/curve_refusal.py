@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from rps_pin.errors import InfeasibleError, InputError, LimitExcess, ParameterError
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.curve_dynamics import CurveDynamics
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_refusal import PathWords, require_clear
 from rps_pin.task.motion import curves
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits
 from rps_pin.trajectories.curve import Curve
 
 #: Width of the brackets of `check_path`, over the curve's length.

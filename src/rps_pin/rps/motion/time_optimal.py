@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, shown
 from rps_pin.rps.dynamics.loads import checked_wrench
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.curve_dynamics import CurveDynamics
 from rps_pin.rps.motion.curve_refusal import ends_at_rest, infeasible, require_clear_curve
 from rps_pin.rps.motion.limited_motion import LimitedMotion
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.task.motion.curves import curve_of
 from rps_pin.task.motion.time_search import INTERVALS, KEPT, Progress, TimeSearch
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits
 from rps_pin.trajectories.curve import Curve
 from rps_pin.trajectories.path import Trajectory
 from rps_pin.validation import whole_number

@@ -23,9 +23,9 @@ import numpy as np
 
 from rps_pin.config import YamlFile, read_yaml
 from rps_pin.errors import InputError, shown
-from rps_pin.rps.dynamics.sizing_sheet import ActuatorLimits
 from rps_pin.rps.motion.trajectory_schema import Fastest, validated
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.helix import helix
 from rps_pin.trajectories.path import Trajectory

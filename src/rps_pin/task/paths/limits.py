@@ -81,7 +81,7 @@ class PositionLimits(Protocol):
         ...
 
 
-class JointLimits:
+class JointRooms:
     """The limits of a mechanism's joints that have as many coordinates as velocities."""
 
     def __init__(self, mechanism: ClosedLoopModel) -> None:
@@ -114,7 +114,7 @@ class JointLimits:
         return room, self._sign * v[:, self._v]
 
 
-class ConeLimits:
+class ConeRooms:
     """Cones; the room is that of the angle's cosine, which is smooth."""
 
     def __init__(self, mechanism: ClosedLoopModel, cones: Sequence[Cone]) -> None:

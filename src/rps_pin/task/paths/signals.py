@@ -23,7 +23,7 @@ from rps_pin.task.loads import Loads
 from rps_pin.task.maps import TaskState
 from rps_pin.task.paths.events import SingularityEvent
 from rps_pin.task.paths.findings import Signal, checked_samples, checked_times
-from rps_pin.task.paths.limits import Cone, ConeLimits
+from rps_pin.task.paths.limits import Cone, ConeRooms
 from rps_pin.task.task import Task
 from rps_pin.trajectories.path import Trajectory
 
@@ -50,15 +50,18 @@ class TaskSignals:
         *,
         cones: Sequence[Cone] = (),
         loads: Loads | None = None,
+        actuators: bool = True,
     ) -> None:
         self._task, self._trajectory = task, trajectory
         self._loads = Loads(task) if loads is None else loads
         self.duration, self.tolerance = checked_times(trajectory, tolerance)
         self.scale = task.scale / task.characteristic_length
         self.end: SingularityEvent | None = None
-        self._positions = task.position_limits(), ConeLimits(task.mechanism, cones)
+        self._positions = task.position_limits(), ConeRooms(task.mechanism, cones)
         speeds = _actuators(task, "velocityLimit", "speed", ("m/s", "rad/s"))
         forces = _actuators(task, "effortLimit", "force", ("N", "N m"))
+        if not actuators:
+            speeds = forces = ()
         self.limits = (*(s for one in self._positions for s in one.signals), *speeds, *forces)
         self._actuated = task.mechanism.actuated_indices
         self._speeds, self._forces = (_sides(task, signals) for signals in (speeds, forces))

@@ -1,7 +1,8 @@
 """Sizing sheet: demands of a motion on the actuators and their limits, as data and as text.
 
 Work is counted from the actuator's side: force times speed is positive where the actuator drives
-its leg, negative where the leg drives the actuator (regenerated).
+its leg, negative where the leg drives the actuator (regenerated). Of actuators that turn, forces
+are torques, N m, lengths angles, rad, and speeds rad/s.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import io
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from rich.console import Console
 from rich.table import Table
@@ -18,13 +19,26 @@ from rich.text import Text
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.rps.parameters import RPSParameters
+
+
+class _HasLimits(Protocol):
+    @property
+    def actuator_force_limit(self) -> float: ...
+
+    @property
+    def actuator_speed_limit(self) -> float: ...
+
+    @property
+    def leg_length_limits(self) -> tuple[float, float]: ...
 
 
 @refuses_other_kinds
 @dataclass(frozen=True)
 class ActuatorLimits:
     """Limits of one actuator; infinity where there is no limit."""
+
+    least: ClassVar[float] = 0.0
+    position_names: ClassVar[tuple[str, str]] = ("shortest leg", "longest leg")
 
     force: float = math.inf
     """Push or pull, N."""
@@ -41,11 +55,14 @@ class ActuatorLimits:
             if not value > 0:
                 raise InputError(f"{name} limit = {value}: it must be positive")
         low, high = self.length
-        if not 0 <= low < high:
-            raise InputError(f"length limits = {self.length}: they must be 0 <= shortest < longest")
+        if not self.least <= low < high:
+            least = "0 <= " if self.least == 0 else ""
+            raise InputError(
+                f"length limits = {self.length}: they must be {least}shortest < longest"
+            )
 
     @classmethod
-    def of(cls, parameters: RPSParameters, *, power: float = math.inf) -> ActuatorLimits:
+    def of(cls, parameters: _HasLimits, *, power: float = math.inf) -> ActuatorLimits:
         """Return the limits in a robot's parameters; they have none of power."""
         return cls(
             parameters.actuator_force_limit,
@@ -53,6 +70,18 @@ class ActuatorLimits:
             power,
             parameters.leg_length_limits,
         )
+
+
+@refuses_other_kinds
+@dataclass(frozen=True)
+class DriveLimits(ActuatorLimits):
+    """Limits of an actuated joint, whose position may be negative; N m, rad/s, rad if it turns."""
+
+    least: ClassVar[float] = -math.inf
+    position_names: ClassVar[tuple[str, str]] = ("lowest position", "highest position")
+
+    length: tuple[float, float] = (-math.inf, math.inf)
+    """Lowest and highest position, m or rad."""
 
 
 class Margin(NamedTuple):
@@ -78,7 +107,7 @@ class ActuatorSizing:
     """Demands on one actuator. Peaks are magnitudes."""
 
     actuator: int
-    """1 to 3."""
+    """From 1."""
     force_peak: float
     """N."""
     force_peak_time: float
@@ -106,7 +135,11 @@ class ActuatorSizing:
     length_max: float
     """m."""
     margins: tuple[Margin, ...]
-    """Force, speed, power, shortest and longest leg."""
+    """Force, speed, power, shortest and longest leg, or lowest and highest position."""
+    name: str = ""
+    """Of the joint; empty for a leg of the 3-RPS."""
+    angular: bool = False
+    """Whether it turns: forces are torques, N m, and lengths angles, rad."""
 
     @property
     def stroke(self) -> float:
@@ -117,23 +150,28 @@ class ActuatorSizing:
 @refuses_other_kinds
 @dataclass(frozen=True)
 class SizingSheet:
-    """A motion's demands on the three actuators; n samples."""
+    """A motion's demands on the actuators; n samples."""
 
     actuators: tuple[ActuatorSizing, ...]
-    limits: ActuatorLimits
+    limits: ActuatorLimits | tuple[ActuatorLimits, ...]
+    """Of all actuators, or of each."""
     threshold: float
     """Share of the peak force that counts for the duty."""
     time: Array
     """Shape (n,), s."""
     force: Array
-    """Shape (n, 3), N."""
+    """Shape (n, na), N or N m; of the 3-RPS (n, 3)."""
     speed: Array
-    """Shape (n, 3), m/s."""
+    """Shape (n, na), m/s or rad/s."""
 
     @property
     def kept(self) -> bool:
         """Whether every limit is kept."""
         return all(margin.kept for actuator in self.actuators for margin in actuator.margins)
+
+    def limits_of(self, index: int) -> ActuatorLimits:
+        """Return the limits of one actuator, from 0."""
+        return self.limits if isinstance(self.limits, ActuatorLimits) else self.limits[index]
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, strings, lists and dictionaries, as JSON has them.
@@ -182,10 +220,13 @@ class SizingSheet:
 
 def _plain(actuator: ActuatorSizing) -> dict[str, Any]:
     margins = [
-        {name: None if value == math.inf else value for name, value in one.items()}
+        {name: None if value in (math.inf, -math.inf) else value for name, value in one.items()}
         for one in (margin._asdict() | {"kept": margin.kept} for margin in actuator.margins)
     ]
-    return vars(actuator) | {"stroke": actuator.stroke, "margins": margins}
+    plain = vars(actuator) | {"stroke": actuator.stroke, "margins": margins}
+    if not actuator.name:  # the 3-RPS's
+        del plain["name"], plain["angular"]
+    return plain
 
 
 #: Rows of the table: labels, and attributes of `ActuatorSizing`.
