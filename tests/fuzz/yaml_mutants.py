@@ -165,7 +165,7 @@ def _moved(root: Any, rng: Random) -> None:
     (where, key), (target, place) = _chosen(root, rng), _chosen(root, rng)
     where[key], target[place] = target[place], where[key]
     if _is_nested(root):
-        where[key] = 0
+        where[key], target[place] = 0, 1
 
 
 def _from_elsewhere(root: Any, rng: Random) -> None:
