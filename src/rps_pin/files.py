@@ -84,6 +84,21 @@ def opened(path: str | os.PathLike[str], what: str) -> Iterator[BinaryIO]:
         raise InputError(f"cannot read the {what} {os.fspath(path)}: {reason}") from None
 
 
+def is_there(path: str | os.PathLike[str]) -> bool:
+    """Return whether a file or folder exists; unlike `Path`, False where no name can be so long."""
+    return os.path.exists(path)  # noqa: PTH110
+
+
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Return whether a path is a regular file, False as `is_there`."""
+    return os.path.isfile(path)  # noqa: PTH113
+
+
+def is_folder(path: str | os.PathLike[str]) -> bool:
+    """Return whether a path is a folder, False as `is_there`."""
+    return os.path.isdir(path)  # noqa: PTH112
+
+
 def _opener(path: str, flags: int) -> int:
     """Open without waiting for the other end of a FIFO."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

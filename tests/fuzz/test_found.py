@@ -12,10 +12,11 @@ import pytest
 pytest.importorskip("mujoco")
 
 from rps_pin import ClosedLoopModel, ForceDistribution, RPSParameters, RPSRobot
-from rps_pin.control import Gains, RealTimeRobot
+from rps_pin.control import Gains, RealTimeRobot, load_scenario
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.paper import lagrange_forces
 from rps_pin.rps.motion.trajectory_file import load_trajectory
+from rps_pin.rps.robot_file import load_robot
 from rps_pin.rps.workspace import leg_grid, load_workspace, save_workspace, workspace
 from rps_pin.trajectories import read_csv
 from tests.cli.commands import rps_pin
@@ -190,3 +191,21 @@ def test_yaml_numbers_that_overflow_are_not_infinite(number: str, tmp_path: Path
     file.write_text(text.format(number), "utf-8")
     with pytest.raises(InputError, match=r"line 4: .* is too large for a number; \.inf is infin"):
         load_trajectory(file, micro)
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "a/" * 3000])
+def test_names_longer_than_a_system_takes(name: str, tmp_path: Path) -> None:
+    scenario = tmp_path / "scenario.yaml"
+    rest = (
+        "trajectory: {kind: circle, height: 0.22, tilt: 0}\ncontroller: {law: computed_torque, "
+        "bandwidth: 1}\n"
+    )
+    for key in ("robot", "mechanism"):
+        scenario.write_text(f"{key}: {name}\n{rest}", "utf-8")
+        with pytest.raises(InputError, match=r"there is no such file|not a file or a preset"):
+            load_scenario(scenario)
+    with pytest.raises(InputError, match="not a file or a preset"):
+        load_robot(name)
+    for end in ("", ".yaml"):
+        with pytest.raises(InputError, match="File name too long"):
+            ClosedLoopModel.load(name + end)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rps_pin.bounds import YAML, most
 from rps_pin.errors import InputError
+from rps_pin.files import is_there
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 
@@ -28,7 +29,7 @@ def load_robot(name_or_file: str, folder: Path = Path()) -> RPSRobot:
     """
     if name_or_file in RPSParameters.presets():
         return RPSRobot.from_preset(name_or_file)
-    if not (folder / name_or_file).exists():
+    if not is_there(folder / name_or_file):
         raise InputError(
             f"{name_or_file!r} is not a file or a preset; the presets are: "
             f"{', '.join(RPSParameters.presets())}"

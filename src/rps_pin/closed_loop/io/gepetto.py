@@ -31,6 +31,7 @@ from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts, without_positi
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
 from rps_pin.config import Entry, Text, YamlFile, read_yaml
 from rps_pin.errors import InputError, MechanismError, did_you_mean
+from rps_pin.files import is_file, is_folder, is_there
 
 #: The file in such a folder.
 FILE = "robot.yaml"
@@ -62,7 +63,7 @@ def gepetto_urdf(path: Path) -> Path:
         If there is none, or several of other names.
     """
     same = path.with_suffix(".urdf")
-    if same.is_file():
+    if is_file(same):
         return same
     found = sorted(path.parent.glob("*.urdf"))
     if len(found) != 1:
@@ -96,9 +97,9 @@ def parts_from_gepetto(
         If a frame, a joint, or a type is unknown; with the line.
     """
     source = Path(path)
-    if source.is_dir():
+    if is_folder(source):
         source /= FILE
-        if not source.exists():
+        if not is_there(source):
             raise InputError(f"{path} is a folder without {FILE}, so it holds no mechanism")
     file = read_yaml(source, "description of example-parallel-robots")
     description = file.validated(GepettoFile, "a description of example-parallel-robots")

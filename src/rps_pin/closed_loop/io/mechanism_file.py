@@ -52,6 +52,7 @@ from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts, without_positi
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
 from rps_pin.config import YamlFile, read_yaml
 from rps_pin.errors import InputError, MechanismError, shown
+from rps_pin.files import is_folder
 
 #: How far a joint's given coordinates may be from a rotation's (norm of a quaternion, of a cosine
 #: and sine).
@@ -80,7 +81,7 @@ def parts_from_yaml(
         If what it describes does not hold together (unknown frame, joint or kind; a bad URDF or
         MJCF).
     """
-    if Path(path).is_dir():
+    if is_folder(path):
         return parts_from_gepetto(path, within_limits=within_limits is not False)
     file = read_yaml(path, "mechanism file")
     if is_gepetto(file):

@@ -25,6 +25,7 @@ from rps_pin.control.simulation.scenario_schema import (
     GainsEntry,
 )
 from rps_pin.errors import InputError
+from rps_pin.files import is_there
 from rps_pin.task import Task
 from rps_pin.task.trajectory_file import described_task_trajectory, load_task_trajectory
 from rps_pin.trajectories.path import Trajectory
@@ -97,7 +98,7 @@ def task_of_file(file: YamlFile, folder: Path, name: str) -> Task:
         If it does not describe a mechanism with a task.
     """
     path = folder / name
-    if not path.exists():
+    if not is_there(path):
         raise InputError(
             f"{file.place(('mechanism',))}: mechanism = {name!r}: there is no such file"
         )

@@ -14,6 +14,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from rps_pin.errors import InputError
+from rps_pin.files import is_file, is_folder
 
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _URI = re.compile(r"\A([a-z][a-z0-9+.-]+)://(.*)\Z", re.IGNORECASE | re.DOTALL)
@@ -44,7 +45,7 @@ def file_of(name: str, urdf: Path, package_path: Sequence[str | os.PathLike[str]
     if scheme not in ("", "file"):
         raise InputError(f"{name!r}: {scheme}:// is not read, only package:// and files")
     found = urdf.parent / rest
-    if _is_file(found):
+    if is_file(found):
         return found
     raise InputError(f"{name!r}: no file {found}")
 
@@ -55,10 +56,10 @@ def _in_package(
     package, _, inside = rest.partition("/")
     folders = []
     for folder in _folders(package, urdf, package_path):
-        if _is_file(folder / inside):
+        if is_file(folder / inside):
             return folder / inside
         folders.append(folder)
-    if _is_file(urdf.parent / inside):
+    if is_file(urdf.parent / inside):
         return urdf.parent / inside
     if folders:
         raise InputError(f"{name!r}: package {package!r} has no file {inside!r} ({folders[0]})")
@@ -77,11 +78,11 @@ def _folders(
     for folder in (*map(Path, package_path), *above, *_entries("ROS_PACKAGE_PATH")):
         if _is_package(folder, package):
             yield folder
-        yield from (one for one in (folder / package, folder / "src" / package) if one.is_dir())
+        yield from (one for one in (folder / package, folder / "src" / package) if is_folder(one))
         yield from _below(folder, package) if folder not in above else ()
     for variable in ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH"):
         for prefix in _entries(variable):
-            if (prefix / "share" / package).is_dir():
+            if is_folder(prefix / "share" / package):
                 yield prefix / "share" / package
 
 
@@ -99,13 +100,13 @@ def _below(folder: Path, package: str) -> Iterator[Path]:
     for one in inside:
         if one.name != package and _is_package(one, package):
             yield one
-        if (one / package).is_dir():
+        if is_folder(one / package):
             yield one / package
 
 
 def _is_package(folder: Path, package: str) -> bool:
     manifest = folder / "package.xml"
-    if not _is_file(manifest):
+    if not is_file(manifest):
         return folder.name == package
     try:
         with manifest.open("rb") as file:
@@ -114,10 +115,3 @@ def _is_package(folder: Path, package: str) -> bool:
         return folder.name == package
     named = _NAME.search(text)
     return folder.name == package or (named is not None and named[1] == package)
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # a name too long, a link to itself, a null character
-        return False
