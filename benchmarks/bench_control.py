@@ -11,8 +11,8 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from benchmarks.bench_inverse_dynamics import plain
 from benchmarks.latency import motion
-from rps_pin import RPSRobot
-from rps_pin.control import RealTimeRobot
+from rps_pin import ClosedLoopModel, RPSRobot
+from rps_pin.control import ComputedTorque, Gains, RealTimeRobot, Status
 from rps_pin.control.estimator.constrained_forces import ConstrainedForces
 from rps_pin.rps.kinematics.forward_kinematics import EncoderTracker
 from rps_pin.rps.kinematics.rates import leg_jacobians, platform_twist, pose_rate
@@ -75,3 +75,23 @@ def bench_forces_of_a_pose(benchmark: BenchmarkFixture, robot: RPSRobot, role: s
         benchmark(loop.inverse_dynamics, *row)
     else:
         benchmark(lambda: robot.inverse_dynamics(*robot.state(*row)))
+
+
+@pytest.mark.benchmark(group="control, whole tick of a task", warmup=True, min_rounds=30)
+@pytest.mark.parametrize("name", ["ankle", "delta", "stewart"])
+@pytest.mark.parametrize("role", ["generated code", "Pinocchio"])
+def bench_task_tick(benchmark: BenchmarkFixture, name: str, role: str) -> None:
+    """Computed torque of any mechanism; the same forces by both engines."""
+    task = ClosedLoopModel.load(f"urdf/{name}.yaml").task
+    loops = [
+        ComputedTorque(task, task.home, Gains.placed(15.0), compiled=compiled)
+        for compiled in (True, False)
+    ]
+    still = np.zeros(task.size)
+    reading = task.mechanism.home[task.of_actuators]
+    target = task.home + 1e-4, still, still
+    for loop in loops:
+        assert loop.tick(reading, target) == Status.OK
+    np.testing.assert_allclose(loops[0].forces, loops[1].forces, rtol=1e-8, atol=1e-8)
+    benchmark.extra_info["role"] = role
+    benchmark(loops[0 if role == "generated code" else 1].tick, reading, target)

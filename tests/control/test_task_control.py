@@ -11,6 +11,7 @@ import pickle
 import struct
 from collections.abc import Callable
 from functools import cache
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,15 @@ from hypothesis import strategies as st
 
 from rps_pin import ClosedLoopModel
 from rps_pin.arrays import Array
-from rps_pin.control import ComputedTorque, Gains, PDControl, Plant, Status, effective_inertia
+from rps_pin.control import (
+    ComputedTorque,
+    Gains,
+    PDControl,
+    Plant,
+    Status,
+    TaskEstimate,
+    effective_inertia,
+)
 from rps_pin.control.loop.controller import Controller
 from rps_pin.errors import (
     ClosureError,
@@ -28,6 +37,7 @@ from rps_pin.errors import (
     MechanismError,
     RPSPinError,
     SingularityError,
+    ThreadError,
 )
 from rps_pin.task import Task
 from rps_pin.trajectories import point_to_point
@@ -367,6 +377,39 @@ def test_no_tick_raises_for_other_kinds(argument: Any) -> None:
     assert one.tick(reading, None, argument) & Status.BAD_INPUT
     assert one.tick(reading, dt=argument) & Status.BAD_INPUT
     assert np.isfinite(one.forces).all()
+
+
+@given(reading=ROW, speed=st.none() | ROW, dt=st.none() | ANY)
+@settings(deadline=None, max_examples=30)
+def test_no_estimate_raises(reading: Any, speed: Any, dt: float | None) -> None:
+    loop = TaskEstimate(task("ankle"), start("ankle"))
+    length, zero = loop.answers.position.copy(), np.zeros(2)
+    with np.errstate(all="raise"):
+        for _ in range(3):
+            status = loop.estimate(row(reading, length), row(speed, zero), dt=dt)
+            assert status == loop.status
+            assert all(np.isfinite(answer).all() for answer in loop.answers)
+            assert len(loop.status_text) >= 2
+
+
+def test_a_second_thread_is_refused_while_a_tick_runs() -> None:
+    one = ComputedTorque(task("ankle"), start("ankle"), Gains.placed(15.0))
+    assert one._guard.acquire()
+    found: list[BaseException] = []
+
+    def call() -> None:
+        for each in (lambda: one.tick(None), lambda: one.estimate.estimate(None)):
+            try:
+                each()
+            except ThreadError as error:
+                found.append(error)
+
+    thread = Thread(target=call)
+    thread.start()
+    thread.join()
+    one._guard.release()
+    assert len(found) == 2
+    assert one.tick(None) == Status.BAD_INPUT
 
 
 # Copies and arguments -----------------------------------------------------------------------------

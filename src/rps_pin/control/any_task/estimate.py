@@ -17,7 +17,7 @@ from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.control.loop.vectors import arrays
 from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, MechanismError, RPSPinError, SingularityError, shown
-from rps_pin.one_thread import TickGuard
+from rps_pin.one_thread import TickGuard, guarded
 from rps_pin.task import Task
 from rps_pin.validation import numbers, positive_number, real_vector
 
@@ -32,7 +32,8 @@ class TaskEstimate(DeepCopied):
     """State estimate from the actuators' positions, one tick at a time.
 
     As `RealTimeRobot` is for the 3-RPS: no call in the loop raises for the values of its arguments.
-    It returns a `Status`, and where there is no new result the last good one stays.
+    It returns a `Status`, and where there is no new result the last good one stays. An object is
+    for one thread at a time.
 
     Parameters
     ----------
@@ -141,6 +142,7 @@ class TaskEstimate(DeepCopied):
 
     # Each tick ------------------------------------------------------------------------------------
 
+    @guarded("guard")
     def estimate(
         self, length: Numbers, speed: Numbers = None, *, dt: float | None = None
     ) -> Status:
@@ -159,7 +161,8 @@ class TaskEstimate(DeepCopied):
         if not self.elapsed < elapsed < math.inf:
             return self._keep(flags.BAD_INPUT)
         self.elapsed = elapsed
-        return self._read(length, speed, elapsed)
+        with np.errstate(all="ignore"):  # the largest floats overflow
+            return self._read(length, speed, elapsed)
 
     def _read(self, length: Numbers, speed: Numbers, elapsed: float) -> Status:
         self._length = d = floats(length, self._count)
