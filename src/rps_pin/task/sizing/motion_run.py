@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.loads import Loads, Payload
 from rps_pin.task.maps import TaskState
 from rps_pin.task.paths.events import PathCheck
@@ -59,6 +60,7 @@ class TaskMotion:
         return self.force * self.speed
 
 
+@refuses_other_kinds
 def run_motion(
     task: Task,
     trajectory: Trajectory,

@@ -153,6 +153,7 @@ class PoseCurve:
             )
 
 
+@refuses_other_kinds
 class PosePath(TimedCurve):
     """A motion of a frame: a trajectory of a task's coordinates that also has the frame's motion.
 
