@@ -91,7 +91,7 @@ def test_a_name_that_c_does_not_take_gives_way_to_the_file_s(tmp_path: Path) -> 
         (["four_bar", "-o", "c", "--functions", "gap"], 1, "did you mean gaps?"),
         (["four_bar", "-o", "c", "--frames", "gap"], 1, "'gap'"),
         (["four_bar", "-o", "c", "--name", "int"], 1, "a keyword of C"),
-        (["four_bar", "-o", "file"], 1, "file: File exists"),
+        (["four_bar", "-o", "file"], 1, "file is a file: "),
     ],
 )
 def test_mistakes_are_told_and_nothing_is_written(
