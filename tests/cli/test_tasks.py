@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rps_pin import ClosedLoopModel
+from rps_pin.task import Payload, load_task_trajectory, size_trajectory
 from tests.cli.commands import rps_pin
 from tests.worst import worst
 
@@ -122,3 +123,29 @@ def test_options_that_do_not_go_together_are_refused(words, message) -> None:
     done = rps_pin(*words)
     assert done.returncode == 2
     assert message in " ".join(done.stderr.replace("│", " ").split())
+
+
+def test_forces_of_a_path_are_written_and_can_be_read_as_a_path(tmp_path) -> None:
+    file = tmp_path / "d.yaml"
+    file.write_text("kind: point_to_point\nend: {x: 0.1, z: -0.48}\nduration: 0.5\n")
+    given = ("dynamics", str(file), "-m", "delta", "--rate", "100", "--payload", "0.2")
+    done = rps_pin(*given, "-o", str(tmp_path / "out"), "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert [one["name"] for one in told["sizing"]["actuators"]] == [
+        f"arm_{leg}_joint" for leg in (1, 2, 3)
+    ]
+    for name in ("dynamics.csv", "sizing.json", "viewer.html", "force_over_speed.png"):
+        assert (tmp_path / "out" / name).stat().st_size > 100
+    task = ClosedLoopModel.load("urdf/delta.yaml").task
+    again = load_task_trajectory(tmp_path / "out" / "dynamics.csv", task)
+    path = load_task_trajectory(file, task)
+    for t in (0.0, 0.1, 0.25, 0.5):
+        assert worst(again.sample(t).pose - path.sample(t).pose) < 1e-9
+    table = np.genfromtxt(tmp_path / "out" / "dynamics.csv", delimiter=",", names=True)
+    sized = size_trajectory(task, path, 100.0, payload=Payload(0.2))
+    peaks = [one.force_peak for one in sized.actuators]
+    for leg, peak in enumerate(peaks, start=1):
+        assert worst(table[f"arm_{leg}_joint_force_Nm"]) == pytest.approx(peak, rel=1e-12)
+    again = rps_pin(*given, "-o", str(tmp_path / "out"), "--fastest")
+    assert again.returncode == 2

@@ -30,7 +30,7 @@ for _panel, _name, _line in (
     (_ROBOT, "workspace", "Its workspace, with the paper's figures."),
     (_ROBOT, "urdf", "Its URDF."),
     (_MOTION, "helix", "Actuator forces along the paper's helix."),
-    (_MOTION, "dynamics", "Forces of any trajectory; actuator sizing."),
+    (_MOTION, "dynamics", "Forces of any trajectory; sizing."),
     (_MOTION, "check", "Singularities and limits along a path."),
     (_MOTION, "control", "A control loop on a simulated robot."),
     (_ANY, "describe", "Joints, closures, rank, mobility, actuation."),

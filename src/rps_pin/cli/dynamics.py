@@ -1,4 +1,4 @@
-"""``rps-pin dynamics``: the inverse dynamics of a 3-RPS along any trajectory, and its actuators."""
+"""``rps-pin dynamics``: the inverse dynamics along any trajectory, and the actuators."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ import typer
 from rich.markup import escape
 
 from rps_pin.cli import console as common
+from rps_pin.cli import task_options as tasks
 from rps_pin.cli.motion_report import motion_files, print_motion, write_motion
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
+from rps_pin.cli.task_dynamics import dynamics_of_task, refuse_options_of_robots
 from rps_pin.errors import InputError
 from rps_pin.files import write_text
 from rps_pin.rps.dynamics.force_causes import force_causes
@@ -64,16 +66,19 @@ def dynamics_command(
         float | None, typer.Option(metavar="W", help="Power limit of an actuator, W.")
     ] = None,
     rate: common.RateOption = 1000.0,
+    mechanism: tasks.MechanismOption = None,
     output: common.NamedFolderOption = None,
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
-    """Compute the actuator forces of a 3-RPS along a trajectory, and size its actuators.
+    """Compute the actuator forces along a trajectory, and size the actuators.
 
     The trajectory is checked first: if it leaves a limit of the robot or crosses a singularity, the
     error says when and why. Output: **dynamics.csv** (every sample, readable as a trajectory),
     figures of path, lengths, forces, forces by cause and forces over speeds, the sizing sheet
-    (**sizing.json**), and **viewer.html**, the motion in 3D.
+    (**sizing.json**), and **viewer.html**, the motion in 3D. With **--mechanism** the trajectory is
+    one of its task's coordinates, payload and wrench are those of its output frame, and the loads
+    of all joints are printed.
 
     Exit status: 0 done; 1 the robot cannot follow it (the error says why); 2 wrong usage.
 
@@ -84,12 +89,29 @@ def dynamics_command(
     - `rps-pin dynamics circle.yaml --robot micro --payload 0.5 --gravity 9.81 0 0` on a wall
 
     - `rps-pin dynamics circle.yaml --robot micro --fastest`
+
+    - `rps-pin dynamics path.yaml --mechanism delta --payload 0.2`
     """
-    machine = common.load_robot(robot)
     if payload is None and any(payload_centre):
         raise InputError("--payload-centre is the place of a payload: give its mass with --payload")
     for force in wrench or ():
         finite_number(force, "--wrench", "N or N m")
+    if mechanism is not None:
+        refuse_options_of_robots(gravity, power, payload, fastest)
+        load = None if payload is None else Payload(payload, payload_centre)
+        dynamics_of_task(
+            mechanism,
+            trajectory,
+            output,
+            rate=rate,
+            fastest=fastest,
+            overwrite=overwrite,
+            as_json=as_json,
+            payload=load,
+            wrench=wrench,
+        )
+        return
+    machine = common.load_robot(robot)
     if gravity is not None:
         machine = RPSRobot(machine.parameters.replace(gravity=gravity))
     if payload is not None:

@@ -143,6 +143,18 @@ class TaskMaps:
         return 1 / self._units
 
     @property
+    def actuator_columns(self) -> tuple[str, ...]:
+        """Names of the actuators' columns in tables of a motion: positions, speeds and forces."""
+        mechanism = self.mechanism
+        angular = mechanism.angular_velocities[mechanism.actuated_indices]
+        units = (("m", "m_per_s", "N"), ("rad", "rad_per_s", "Nm"))
+        return tuple(
+            f"{name}_{what}_{units[int(turns)][k]}"
+            for k, what in enumerate(("position", "speed", "force"))
+            for name, turns in zip(mechanism.actuated, angular, strict=True)
+        )
+
+    @property
     def home(self) -> Array:
         """Coordinates at the mechanism's home, shape (m,)."""
         return self.at(self.mechanism.home)

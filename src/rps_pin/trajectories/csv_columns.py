@@ -64,7 +64,8 @@ class Columns:
     @classmethod
     def of_task(cls, task: HasCoordinates) -> Columns:
         """Return those of a task's coordinates."""
-        columns = cls(tuple(task.coordinates), tuple(map(bool, task.angular)))
+        others = frozenset(getattr(task, "actuator_columns", ()))
+        columns = cls(tuple(task.coordinates), tuple(map(bool, task.angular)), others)
         counts = [len(_TIMES)]
         counts += [3 * len(_ANGLES if one else _LENGTHS) for one in columns.angular]
         if len(columns.read) < sum(counts):
