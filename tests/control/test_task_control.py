@@ -304,6 +304,35 @@ def test_joints_beyond_their_limits_are_told_and_refused_as_targets() -> None:
     assert "it is beyond its limits; the last valid target is held" in one.status_text
 
 
+def test_it_stops_near_a_singularity_and_refuses_targets_there() -> None:
+    name = "delta"
+    one = ComputedTorque(
+        task(name),
+        start(name),
+        Gains.placed(15.0),
+        near_singular=0.08,
+        stop_singular=0.07,
+        largest_jump=0.05,
+    )
+    heights, zero = np.linspace(0.0, 0.24, 40), np.zeros(3)
+    down = np.column_stack([0 * heights, 0 * heights, -heights]) + start(name)
+    q = plain(name).follow(down)
+    distance = plain(name).singularities(q).distance
+    assert distance[0] > 0.08
+    assert distance[-1] < 0.07
+    target = (down[-1], zero, zero)
+    assert one.tick(q[0][plain(name).of_actuators], target) == Status.TARGET_HELD
+    assert "too near a singularity" in one.status_text
+    one.reset(start(name))
+    for configuration, here in zip(q, distance, strict=True):
+        status = one.tick(configuration[plain(name).of_actuators], None, zero)
+        assert one.estimate.type_ii == pytest.approx(here, rel=1e-9)
+        assert bool(status & Status.NEAR_SINGULAR) == (here < 0.08)
+        assert bool(status & Status.STOPPED) == (here <= 0.07)
+        assert np.isfinite(one.forces).all()
+    assert "stopped: near a type II singularity" in one.status_text
+
+
 # Every float --------------------------------------------------------------------------------------
 
 BITS = st.integers(0, 2**64 - 1).map(lambda bits: struct.unpack("<d", struct.pack("<Q", bits))[0])
