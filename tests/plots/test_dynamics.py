@@ -8,12 +8,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from rps_pin import InputError, RPSParameters, RPSRobot, helix
+from rps_pin import ClosedLoopModel, InputError, RPSParameters, RPSRobot, helix
 from rps_pin.plots import plot_force_causes, plot_sizing
 from rps_pin.rps.dynamics.force_causes import ForceCauses, force_causes
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.dynamics.sizing import size_trajectory
+from rps_pin.task.sizing.sizing import size_trajectory as size_of_task
 from rps_pin.task.sizing.sizing_sheet import ActuatorLimits, SizingSheet
+from rps_pin.trajectories import point_to_point
 
 Array = NDArray[np.float64]
 
@@ -93,3 +95,16 @@ def test_limits_that_there_are_not_are_not_drawn(robot: RPSRobot, limits: Actuat
     assert not own.patches
     labels = [line.get_label() for line in own.get_lines()]
     assert ("limits" in labels) == (limits != ActuatorLimits())
+
+
+def test_sizing_of_a_mechanism_has_its_joints_and_their_units() -> None:
+    for name, unit in (("delta", "torque (N m)"), ("stewart", "force (N)")):
+        task = ClosedLoopModel.load(f"urdf/{name}.yaml").task
+        end = task.home.copy()
+        end[2] += 0.02
+        sheet = size_of_task(task, point_to_point(task.home, end, duration=0.5), 50.0)
+        axes = plot_sizing(sheet).axes[0]
+        assert axes.get_ylabel() == unit
+        labels = axes.get_legend_handles_labels()[1]
+        assert labels[: len(task.mechanism.actuated)] == list(task.mechanism.actuated)
+        assert "limits" in labels

@@ -279,10 +279,12 @@ def test_refusal_names_the_entry_and_the_numbers() -> None:
 @every_set
 def test_quantities_too_large_to_compute_with_are_out_of_reach(names: tuple[str, ...]) -> None:
     if "z_1" in names or names[1] in ("x", "y", "u_z"):
-        wanted = {name: 1e308 if name != "z_2" else -1e308 for name in names}
+        wanted = {name: 1e49 if name != "z_2" else -1e49 for name in names}
         found = poses_from(H, **wanted, errors="mask")
         assert not found.exists.any()
         assert np.isfinite(found.pose).all()
+        with pytest.raises(InputError, match=r"beyond 1e\+50"):
+            poses_from(H, **(wanted | {names[0]: 1e308}), errors="mask")
 
 
 @pytest.mark.parametrize("third", [{}, {"x": 0.0}, {"y": 0.0}, {"beta": 0.1}])

@@ -87,6 +87,9 @@ def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
         if axes is None:
             axes = new_axes(None, (6.4, 4.6))
             figure_of(axes).suptitle("Force and speed of the actuators")
+        named = [one.name for one in sheet.actuators if one.name]
+        if named:
+            return _sizing_of_joints(axes, sheet)
         labels = [f"actuator {one.actuator}" for one in sheet.actuators]
         plot_legs(axes, sheet.speed, sheet.force, labels)
         peak = np.abs(sheet.force).argmax(axis=0)[None]
@@ -110,6 +113,28 @@ def _stacks(axes: Axes, time: np.ndarray, parts: dict[str, np.ndarray]) -> None:
         axes.fill_between(time, above, upper, label=_LABELS.get(name, name), **look)
         axes.fill_between(time, below, lower, **look)
         above, below = upper, lower
+
+
+def _sizing_of_joints(axes: Axes, sheet: SizingSheet) -> Figure:
+    """Draw forces over speeds of joints by their names, and the limits if they have the same."""
+    for k, one in enumerate(sheet.actuators):
+        v, f = sheet.speed[:, k], sheet.force[:, k]
+        (line,) = axes.plot(v, f, label=one.name)
+        most = int(np.abs(f).argmax())
+        axes.plot(v[most], f[most], marker="x", linestyle="", color=line.get_color())
+    limits = [sheet.limits_of(k) for k in range(len(sheet.actuators))]
+    if all((one.force, one.speed) == (limits[0].force, limits[0].speed) for one in limits):
+        _limit_box(axes, sheet)
+    axes.axhline(0.0, color="black", linewidth=0.6)
+    axes.axvline(0.0, color="black", linewidth=0.6)
+    turning = {one.angular for one in sheet.actuators}
+    of_slides, of_turns = ("speed (m/s)", "force (N)"), ("speed (rad/s)", "torque (N m)")
+    both = ("speed (m/s or rad/s)", "force (N or N m)")
+    words = both if len(turning) > 1 else of_turns if turning == {True} else of_slides
+    axes.set_xlabel(words[0])
+    axes.set_ylabel(words[1])
+    legend_above(axes, columns=3)
+    return figure_of(axes)
 
 
 def _limit_box(axes: Axes, sheet: SizingSheet) -> None:
