@@ -1,7 +1,7 @@
 """What a controller knows of its robot: that of the 3-RPS in closed form, or that of any task.
 
-`rps_pin.control.estimator.leg_model.LegModel` is the 3-RPS's, on triples of floats;
-`rps_pin.control.any_task.model.TaskModel` that of a task, on arrays.
+``rps_pin.control.estimator.leg_model.LegModel`` is the 3-RPS's, on triples of floats;
+``rps_pin.control.any_task.model.TaskModel`` that of a task, on arrays.
 """
 
 from __future__ import annotations

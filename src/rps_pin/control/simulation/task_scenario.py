@@ -5,7 +5,7 @@
     controller: {law: computed_torque, bandwidth: 15.0}
     plant: {masses: 1.2, delay: 1}
 
-Trajectories are those of `rps_pin.task.trajectory_file`: a file's name, or its keys.
+Trajectories are those of ``rps_pin.task.trajectory_file``: a file's name, or its keys.
 """
 
 from __future__ import annotations
