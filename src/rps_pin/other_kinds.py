@@ -26,6 +26,8 @@ from rps_pin.validation import numbers
 
 _Public = TypeVar("_Public", bound=Callable[..., Any])
 _NUMBERS: dict[Any, Any] = {float: Real, int: Integral}
+#: `ArrayLike` is a union, which another union takes apart.
+_OF_ARRAYS = frozenset(typing.get_args(ArrayLike))
 _FOREIGN = (AttributeError, TypeError, ValueError, LookupError, ArithmeticError)
 
 
@@ -97,7 +99,10 @@ def fits(value: Any, hint: Any) -> bool:
     if hint is ArrayLike:
         found = _is_numbers(value)
     elif origin in (typing.Union, types.UnionType):
-        found = any(fits(value, one) for one in parts)
+        others = [one for one in parts if one not in _OF_ARRAYS]
+        has_arrays = len(others) < len(parts) and set(parts) >= _OF_ARRAYS
+        found = has_arrays and _is_numbers(value)
+        found = found or any(fits(value, one) for one in (others if has_arrays else parts))
     elif origin is typing.Literal:
         found = any(type(value) is type(one) and value == one for one in parts)
     elif origin is typing.Annotated:

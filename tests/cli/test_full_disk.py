@@ -62,11 +62,14 @@ def check(out: Path, names: list[str], errors: str, reason: str) -> None:
 @contextmanager
 def largest_file(size: int) -> Iterator[None]:
     """Refuse larger files in the block; Python ignores the signal, so that writing fails."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before, writes = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    # Python does not notice that what it compiled was cut off, and cannot import the module again.
+    sys.dont_write_bytecode = True
     try:
         yield
     finally:
+        sys.dont_write_bytecode = writes
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 

@@ -194,7 +194,7 @@ def test_results_are_new_arrays() -> None:
             np.testing.assert_array_equal(call(fast, first), kept, err_msg=name)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e49])
 @pytest.mark.parametrize("argument", ["q", "v", "a", "tau"])
 def test_numbers_that_are_not_finite(argument: str, value: float) -> None:
     """The same error as the Pinocchio engine's, or the same numbers."""

@@ -27,6 +27,7 @@ from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.gains import Gains
 from rps_pin.rps.dynamics.loads import Payload
 from tests.control.conftest import none_built
+from tests.worst import worst
 
 START = (0.223, 0.02, -0.01)
 ROBOT = RPSRobot(
@@ -142,8 +143,8 @@ def ticks_of(controller: Controller, name: str, count: int, draws: Draws) -> Rep
                     raise
                 continue
             report.statuses.update([flag.name for flag in flags if flag in status] or ["OK"])
-            share = max(abs(force) / limit for force in controller.forces.tolist())
-            report.largest = max(report.largest, share)
+            share = worst([force / limit for force in controller.forces.tolist()])
+            report.largest = worst(report.largest, share)
             finite = all(np.isfinite(one).all() for one in controller.estimate.answers)
             if not (share <= 1.0 and finite and 0.05 <= controller.pace <= 1.0 and text):
                 report.faults.append(f"{name}: forces {controller.forces} after tick({given})")

@@ -12,6 +12,7 @@ from rps_pin.arrays import Array
 from rps_pin.control import Encoders, Plant, ServoDrives
 from rps_pin.errors import ClosureError, InputError, MechanismError
 from tests.control.tasks import NAMES, ROBOT, plain, start
+from tests.worst import worst
 
 
 def weight(plant: Plant) -> Array:
@@ -169,8 +170,8 @@ def test_drives_keep_their_limits_of_speed_and_force() -> None:
     for _ in range(30):
         strong.step(goal)
         weak.step(goal)
-        largest = max(largest, np.abs(strong.applied).max())
-        behind = max(behind, np.abs(strong.length - weak.length).max())
+        largest = worst(largest, strong.applied)
+        behind = worst(behind, strong.length - weak.length)
         assert np.abs(weak.applied).max() <= 1.2 * np.abs(slow.applied).max()
     assert largest > 2 * 1.2 * np.abs(slow.applied).max()
     assert behind > 1e-3

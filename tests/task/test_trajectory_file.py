@@ -73,7 +73,7 @@ def test_a_table_is_named_from_the_files_folder(tmp_path) -> None:
         ("kind: [1]", "is not one"),
         ("kind: point_to_point\nend: {q: 1}\nduration: 1", "line 2: the task has no 'q'"),
         ("kind: point_to_point\nend: [1, 2]\nduration: 1", "line 2: 2 numbers for the 3"),
-        ("kind: point_to_point\nend: {z: 1e400}\nduration: 1", "end"),
+        ("kind: point_to_point\nend: {z: 1e400}\nduration: 1", "1e400"),
         ("kind: point_to_point\nend: {z: -0.5}", "duration"),
         ("kind: point_to_point\nend: {z: -0.5}\nduration: 1\nspeed: 3", "speed"),
         ("kind: point_to_point\nend: {}\nduration: 1", "line 1"),

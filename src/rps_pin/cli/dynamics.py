@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from rps_pin.cli import console as common
 from rps_pin.cli import task_options as tasks
+from rps_pin.cli.mechanism_options import AccuracyOption, IgnoreLimitsOption
 from rps_pin.cli.motion_report import motion_files, print_motion, write_motion
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
 from rps_pin.cli.task_dynamics import dynamics_of_task, refuse_options_of_robots
@@ -67,6 +68,8 @@ def dynamics_command(
     ] = None,
     rate: common.RateOption = 1000.0,
     mechanism: tasks.MechanismOption = None,
+    ignore_limits: IgnoreLimitsOption = False,
+    accuracy: AccuracyOption = None,
     output: common.NamedFolderOption = None,
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
@@ -107,6 +110,8 @@ def dynamics_command(
             fastest=fastest,
             overwrite=overwrite,
             as_json=as_json,
+            ignore_limits=ignore_limits,
+            accuracy=accuracy,
             payload=load,
             wrench=wrench,
         )

@@ -15,7 +15,7 @@ from rps_pin.cli.printing import say
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
 
 _HEADERS = ("", "z (m)", "tilt_x (rad)", "tilt_y (rad)", "leg angles (degrees)", "mirror")
-_TASK_ONLY = "--at, --degrees, --ignore-limits"
+_TASK_ONLY = "--at, --degrees, --ignore-limits, --accuracy"
 #: In place of the tilts of an assembly mode without a pose.
 _HALF_TURN = ("half", "turn")
 
@@ -37,6 +37,7 @@ def fk_command(
     ] = None,
     degrees: tasks.DegreesOption = False,
     ignore_limits: options.IgnoreLimitsOption = False,
+    accuracy: options.AccuracyOption = None,
     as_json: common.JsonOption = False,
 ) -> None:
     """Compute the poses of given leg lengths: every assembly mode, or the one near a known pose.
@@ -63,9 +64,9 @@ def fk_command(
         if lengths is not None or near is not None:
             option = "--lengths" if lengths is not None else "--near"
             raise typer.BadParameter("a mechanism's actuators are given by --at", param_hint=option)
-        _of_task(mechanism, at, degrees, ignore_limits, as_json)
+        _of_task(mechanism, at, degrees, as_json, ignore_limits, accuracy)
         return
-    if at or degrees or ignore_limits:
+    if at or degrees or ignore_limits or accuracy is not None:
         raise typer.BadParameter("these options need a --mechanism", param_hint=_TASK_ONLY)
     if lengths is None:
         raise typer.BadParameter("give leg lengths, or a --mechanism", param_hint="--lengths")
@@ -97,9 +98,14 @@ def fk_command(
 
 
 def _of_task(
-    file: Path, at: list[str] | None, degrees: bool, ignore_limits: bool, as_json: bool
+    file: Path,
+    at: list[str] | None,
+    degrees: bool,
+    as_json: bool,
+    ignore_limits: bool,
+    accuracy: float | None,
 ) -> None:
-    task = tasks.load_task(file, ignore_limits)
+    task = tasks.load_task(file, ignore_limits, accuracy)
     names, angular = tasks.of_actuators(task)
     home = task.mechanism.home
     a = tasks.given(at, "--at", names, angular, task.to_actuators(task.home, home), degrees)

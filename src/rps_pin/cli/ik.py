@@ -13,7 +13,7 @@ from rps_pin.cli import mechanism_options as options
 from rps_pin.cli import task_options as tasks
 from rps_pin.rps.kinematics.legs import cone_angles, violations
 
-_TASK_ONLY = "--at, --degrees, --ignore-limits"
+_TASK_ONLY = "--at, --degrees, --ignore-limits, --accuracy"
 
 
 def ik_command(
@@ -31,6 +31,7 @@ def ik_command(
     ] = None,
     degrees: tasks.DegreesOption = False,
     ignore_limits: options.IgnoreLimitsOption = False,
+    accuracy: options.AccuracyOption = None,
     as_json: common.JsonOption = False,
 ) -> None:
     """Compute the leg lengths and angles of a pose, and check them against the robot's limits.
@@ -52,9 +53,9 @@ def ik_command(
             raise typer.BadParameter(
                 "a mechanism's coordinates are given by --at", param_hint="--pose"
             )
-        _of_task(mechanism, at, degrees, ignore_limits, as_json)
+        _of_task(mechanism, at, degrees, as_json, ignore_limits, accuracy)
         return
-    if at or degrees or ignore_limits:
+    if at or degrees or ignore_limits or accuracy is not None:
         raise typer.BadParameter("these options need a --mechanism", param_hint=_TASK_ONLY)
     if pose is None:
         raise typer.BadParameter("give a pose, or a --mechanism", param_hint="--pose")
@@ -97,9 +98,14 @@ def ik_command(
 
 
 def _of_task(
-    file: Path, at: list[str] | None, degrees: bool, ignore_limits: bool, as_json: bool
+    file: Path,
+    at: list[str] | None,
+    degrees: bool,
+    as_json: bool,
+    ignore_limits: bool,
+    accuracy: float | None,
 ) -> None:
-    task = tasks.load_task(file, ignore_limits)
+    task = tasks.load_task(file, ignore_limits, accuracy)
     x = tasks.given(at, "--at", task.coordinates, task.angular, np.array(task.home), degrees)
     q = task.configuration(x)
     a = task.to_actuators(x, q)

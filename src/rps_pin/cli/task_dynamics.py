@@ -45,10 +45,12 @@ def dynamics_of_task(
     fastest: bool,
     overwrite: bool,
     as_json: bool,
+    ignore_limits: bool,
+    accuracy: float | None,
     **loads: Any,
 ) -> None:
     """Compute, write and print the motion; see `rps_pin.cli.dynamics`."""
-    model, file = load_mechanism(mechanism)
+    model, file = load_mechanism(mechanism, ignore_limits, accuracy)
     task: Task = model.task
     path = load_task_trajectory(trajectory, task)
     folder = output or Path(f"{trajectory.stem}-dynamics")

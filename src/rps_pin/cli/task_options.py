@@ -39,7 +39,7 @@ DegreesOption = Annotated[
 ]
 
 
-def load_task(file: Path, ignore_limits: bool = False) -> Task:
+def load_task(file: Path, ignore_limits: bool = False, accuracy: float | None = None) -> Task:
     """Return the task of a mechanism's file.
 
     Raises
@@ -47,7 +47,7 @@ def load_task(file: Path, ignore_limits: bool = False) -> Task:
     MechanismError
         If it has none.
     """
-    mechanism, _ = options.load_mechanism(file, ignore_limits)
+    mechanism, _ = options.load_mechanism(file, ignore_limits, accuracy)
     task: Task = mechanism.task
     return task
 

@@ -113,9 +113,6 @@ def view_command(
     # Meshcat and its server are for this command only.
     from rps_pin.viewer import save_html, save_png, save_video, show
 
-    inputs = [file for file in (trajectory, mechanism) if file is not None]
-    outputs = [file for file in (html, png, video) if file is not None]
-    check_outputs(outputs, overwrite, inputs=inputs)
     machine: RPSRobot | ClosedLoopModel
     motion: Any
     if mechanism is not None:
@@ -125,6 +122,9 @@ def view_command(
         machine, drawn = common.load_robot(robot), {}
         curve = (radius, pitch, height, branch, duration)
         motion = pose or _of_robot(machine, trajectory, curve)
+    inputs = [file for file in (trajectory, mechanism) if file is not None]
+    outputs = [file for file in (html, png, video) if file is not None]
+    check_outputs(outputs, overwrite, inputs=inputs)
     tree = machine.mechanism if isinstance(machine, RPSRobot) else machine
     chosen = chosen_layers(layers, tree) | drawn
     sides = chosen_size(size)

@@ -28,6 +28,8 @@ _STEP = 1e-5
 _PLACES = 33
 #: Forces at rest below this part of the limit are rounding.
 _NO_WEIGHT = 1e-6
+#: Forces below this part of the weight are not known well; larger accelerations are tried so often.
+_HIDDEN, _TRIES = 1e-6, 6
 
 
 class CurveLimits(NamedTuple):
@@ -211,9 +213,15 @@ class CurveDynamics:
         u = np.linspace(0.0, self.curve.length, _PLACES)
         place, still, count = self.place(u), np.zeros(_PLACES), self.bounds.force.shape[-1]
         holding = self.levels(place, still, still)[:, :count]
-        inertia = self.levels(place, still, still + 1.0)[:, :count] - holding
-        largest = float(np.abs(inertia).max(initial=0.0))
         weight = float(np.abs(holding).max(initial=0.0))
+        tried, largest = 1.0, 0.0
+        for _ in range(_TRIES):  # until the weight does not hide the force of inertia
+            inertia = self.levels(place, still, still + tried)[:, :count] - holding
+            largest = float(np.abs(inertia).max(initial=0.0))
+            if largest > _HIDDEN * weight:
+                break
+            tried /= _HIDDEN
+        largest /= tried
         limit = float(self.half[:count].min(initial=math.inf))
         if math.isfinite(limit) and weight < _NO_WEIGHT * limit:
             weight = limit
