@@ -253,6 +253,9 @@ BAD: dict[str, Callable[[Any], Any]] = {
     "forces too large": lambda r: r.actuator_forces([_GOOD] * 3, [0.0, 1e200, 0.0], _GOOD),
     "shapes of a motion": lambda r: r.actuator_forces(np.zeros((2, 3)), np.zeros((3, 3)), _GOOD),
     "a wrench of five": lambda r: r.actuator_forces(_GOOD, _GOOD, _GOOD, wrench=np.zeros(5)),
+    "a wrench of rows of different lengths": lambda r: r.actuator_forces(
+        _GOOD, _GOOD, _GOOD, wrench=[[0.0] * 6, [0.0]]
+    ),
     "more wrenches than poses": lambda r: r.actuator_forces(
         _GOOD, _GOOD, _GOOD, wrench=np.zeros((2, 6))
     ),

@@ -116,7 +116,11 @@ class RobotCalls:
             return (force,), ~np.ma.getmaskarray(force)[..., 0]
 
         given = (*motion, _NO_WRENCH if wrench is None else wrench)
-        if np.ndim(given[3]) > 1 and _batch(given) != _batch(motion):
+        try:
+            is_batch = np.ndim(given[3]) > 1 and _batch(given) != _batch(motion)
+        except ValueError:  # rows of different lengths
+            is_batch = True
+        if is_batch:
             answer(*given, errors)  # its words: a wrench does not make a batch
         numbers = self._force_numbers
         (force,), good = self._settled("actuator_forces", given, numbers, answer, errors)
