@@ -95,7 +95,7 @@ class FaultEntry(Entry):
     kind: Kind
     start: NonNegative
     duration: Positive | None = None
-    leg: Literal[1, 2, 3] | None = None
+    leg: Annotated[int, Field(ge=1, le=3)] | None = None
     size: Finite | None = None
     offset: Three | None = None
 
