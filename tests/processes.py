@@ -23,17 +23,19 @@ RPS_PIN = (
 
 
 def start(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[str]:
-    """Start a process with SIGINT at its default; its output is piped as text, unless told.
+    """Start a process with SIGINT and SIGHUP at their defaults; its output is piped, unless told.
 
     Call it from the main thread: only there Python sets signals.
     """
     piped = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     # A handler of this process becomes the default in the child; what is ignored stays ignored.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    hung_up = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which nohup ignores
     try:
         return subprocess.Popen(list(command), **(piped | options))
     finally:
         signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGHUP, hung_up)
 
 
 def run(

@@ -25,7 +25,7 @@ LIMIT, GRACE = 10.0, 5.0
 LONGEST, _WAIT = 60.0, 0.5
 #: Address space of a worker, bytes.
 MEMORY = 8 * 2**30
-_FORK = multiprocessing.get_context("fork")
+_SPAWN = multiprocessing.get_context("spawn")
 
 Item = tuple[str, int] | Case
 
@@ -49,8 +49,8 @@ class _Worker:
         self._start()
 
     def _start(self) -> None:
-        self._end, theirs = _FORK.Pipe()
-        self._process: Any = _FORK.Process(target=_work, args=(theirs,), daemon=False)
+        self._end, theirs = _SPAWN.Pipe()
+        self._process: Any = _SPAWN.Process(target=_work, args=(theirs,), daemon=False)
         self._process.start()
         theirs.close()
 
