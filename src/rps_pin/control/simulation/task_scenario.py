@@ -70,7 +70,7 @@ class TaskControllerEntry(ControllerEntry):
 class TaskFaultEntry(FaultEntry):
     """See `Fault`; `leg` is the number of an actuator."""
 
-    leg: Annotated[int, Field(ge=1)] | None = None  # type: ignore[assignment]
+    leg: Annotated[int, Field(ge=1)] | None = None
     offset: Row | None = None
 
 
