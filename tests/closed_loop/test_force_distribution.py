@@ -138,6 +138,7 @@ def possible(mechanism: ClosedLoopModel, state: State, lower: Array, upper: Arra
     return bool(answer.status == 0)
 
 
+@pytest.mark.filterwarnings("ignore:Values in x were outside bounds:RuntimeWarning")  # of SLSQP
 @pytest.mark.parametrize("seed", range(25))
 def test_random_limits_and_bounds_against_slsqp(seed: int) -> None:
     rng = np.random.default_rng(seed)
