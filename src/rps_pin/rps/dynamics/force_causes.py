@@ -23,6 +23,7 @@ from rps_pin.rps.kinematics.legs import PoseLegs, check_legs
 from rps_pin.rps.kinematics.pose import checked_motion
 from rps_pin.rps.kinematics.samples import Errors, maskable
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.task.sizing.force_causes import ForceParts
 
 _NO_VECTOR = (0.0, 0.0, 0.0)
 #: Changes of `ForceTerms` that leave friction, or the bodies, out.
@@ -34,7 +35,7 @@ _NO_BODIES: dict[str, Any] = {
 
 
 @dataclass(frozen=True)
-class ForceCauses:
+class ForceCauses(ForceParts):
     """Parts of the actuator forces, shape (..., 3) each, N; positive pushes the leg out."""
 
     gravity: Array
@@ -49,16 +50,6 @@ class ForceCauses:
     """Carrying and moving the payload: its gravity, inertia and Coriolis forces."""
     external: Array
     """Withstanding the external wrench."""
-
-    @property
-    def total(self) -> Array:
-        """The actuator forces, shape (..., 3), N."""
-        whole: Array = np.sum(list(self.parts().values()), axis=0)
-        return whole
-
-    def parts(self) -> dict[str, Array]:
-        """Return the parts by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
 @refuses_other_kinds

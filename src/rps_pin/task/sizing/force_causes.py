@@ -29,7 +29,22 @@ from rps_pin.validation import real_array
 
 
 @dataclass(frozen=True)
-class TaskForceCauses:
+class ForceParts:
+    """Parts of the actuators' forces, a field for each, all of one shape; they add up."""
+
+    @property
+    def total(self) -> Array:
+        """The actuators' forces."""
+        whole: Array = np.sum(list(self.parts().values()), axis=0)
+        return whole
+
+    def parts(self) -> dict[str, Array]:
+        """Return the parts by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+@dataclass(frozen=True)
+class TaskForceCauses(ForceParts):
     """Parts of the actuators' forces, shape (n, na) each, N or N m."""
 
     gravity: Array
@@ -46,16 +61,6 @@ class TaskForceCauses:
     """Carrying and moving the payload: its gravity, inertia and Coriolis forces."""
     external: Array
     """Withstanding the external wrench."""
-
-    @property
-    def total(self) -> Array:
-        """The actuators' forces, shape (n, na)."""
-        whole: Array = np.sum(list(self.parts().values()), axis=0)
-        return whole
-
-    def parts(self) -> dict[str, Array]:
-        """Return the parts by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
 
 
 @refuses_other_kinds
