@@ -22,14 +22,12 @@ from rps_pin.closed_loop.constraints.equations import ClosureEquations
 from rps_pin.closed_loop.constraints.frame_coordinates import FrameCoordinates
 from rps_pin.closed_loop.constraints.rows import across
 from rps_pin.codegen.expressions.chains import Chains, End, Motion, constant, cross, tidy
-from rps_pin.codegen.expressions.joints import Expression
+from rps_pin.codegen.expressions.joints import Expression, beta
 from rps_pin.codegen.expressions.tree import Tree
 
 #: A sine that vanishes beside rounding errors, in place of 0 in the quotient of an angle and its
 #: sine. Its square is a normal number in single precision too.
 _TINY = 2.0**-62
-#: Square of an angle below which series stand for quotients.
-_SMALL_TURN = 1e-4
 #: A direction that is perpendicular to no likely axis.
 _ANY = np.array([1.0, 0.7, 0.4])
 
@@ -328,7 +326,7 @@ def _coordinates(tree: Tree, chains: Chains, ends: _Ends, closure: FrameCoordina
     if closure.angular:
         r, spin = _nearer_vector(motion.rotation, held[count:], turning), motion.spin
         squared = ca.sumsqr(r)
-        value, slope = _beta(squared)
+        value, slope = beta(squared)
         rates = ca.SX.eye(3) - ca.skew(r) / 2 + value * (r @ r.T - squared * ca.SX.eye(3))
         r_rate = rates @ spin
         across, moved = cross(r, spin), cross(r_rate, spin)
@@ -350,19 +348,6 @@ def _nearer_vector(rotation: Expression, near: Expression, chosen: Expression) -
     other = r * (1 - 2 * np.pi / angle)
     nearer = ca.sumsqr(chosen @ other - near) < ca.sumsqr(chosen @ r - near)
     return ca.if_else(nearer, other, r)
-
-
-def _beta(squared: Expression) -> tuple[Expression, Expression]:
-    """Return beta and its derivative by t = r . r; see `rotation_vector`."""
-    small, t = squared < _SMALL_TURN, ca.fmax(squared, _SMALL_TURN)
-    half = ca.sqrt(t) / 2
-    c = half * ca.cos(half) / ca.sin(half)
-    value = (1 - c) / t
-    slope = -((c - c * c) / (2 * t) - 1 / 8 + value) / t
-    return (
-        ca.if_else(small, 1 / 12 + squared / 720 + squared * squared / 30240, value),
-        ca.if_else(small, 1 / 720 + squared / 15120 + squared * squared / 403200, slope),
-    )
 
 
 def _whole(closure: LoopClosure) -> Array:

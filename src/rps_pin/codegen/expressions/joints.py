@@ -307,12 +307,7 @@ def _free_difference(q: Expression, other: Expression) -> Expression:
     w = turn_between(q[3:], other[3:])
     e = rotation_of(q[3:]).T @ (other[:3] - q[:3])
     squared = ca.sumsqr(w)
-    sinc, cosine, _ = _half_angle(squared)
-    factor = ca.if_else(
-        squared < _TINY,
-        1 / 12 + squared / 720 + squared * squared / 30240,
-        (1 - cosine / sinc) / ca.fmax(squared, _TINY),
-    )
+    factor, _ = beta(squared)
     across = ca.cross(w, e)
     return ca.vertcat(e - across / 2 + factor * ca.cross(w, across), w)
 
@@ -333,6 +328,18 @@ def _half_angle(squared: Expression) -> tuple[Expression, Expression, Expression
         ca.if_else(small, _series(y, (6, 20, 42, 72, 110)), sinc),
         ca.if_else(small, _series(y, (2, 12, 30, 56, 90)), cosine),
         ca.if_else(small, _series(squared, (20, 42, 72, 110, 156)) / 6, cubic),
+    )
+
+
+def beta(squared: Expression) -> tuple[Expression, Expression]:
+    """Return beta and its derivative by t = r . r; see `constraints.rotation_vector`."""
+    sinc, cosine, _ = _half_angle(squared)
+    c, small, t = cosine / sinc, squared < _TINY, ca.fmax(squared, _TINY)
+    value = (1 - c) / t
+    slope = -((c - c * c) / (2 * t) - 1 / 8 + value) / t
+    return (
+        ca.if_else(small, 1 / 12 + squared / 720 + squared * squared / 30240, value),
+        ca.if_else(small, 1 / 720 + squared / 15120 + squared * squared / 403200, slope),
     )
 
 
