@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from rps_pin.interruption import signals_as_ctrl_c
+from rps_pin.interruption import interruptions_wait, signals_as_ctrl_c
 
 
 class Slow:
@@ -52,6 +52,38 @@ def test_a_signal_that_arrives_in_a_destructor_is_not_lost() -> None:
         Slow(signal.SIGINT)
         wait()
     assert sys.unraisablehook is hook
+
+
+def test_an_inner_block_repeats_what_an_outer_one_received() -> None:
+    hook = sys.unraisablehook
+    with pytest.raises(SystemExit) as caught, signals_as_ctrl_c(), signals_as_ctrl_c():
+        Slow(signal.SIGHUP)
+        wait()
+    assert caught.value.code == 129
+    assert sys.unraisablehook is hook
+
+
+def test_interruptions_wait_for_the_end_of_a_block() -> None:
+    steps = []
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        with interruptions_wait():
+            signal.raise_signal(signal.SIGINT)
+            steps.append("the block")
+        wait()
+    assert signal.getsignal(signal.SIGINT) is before
+    with pytest.raises(SystemExit) as caught, signals_as_ctrl_c():
+        with interruptions_wait():
+            signal.raise_signal(signal.SIGTERM)
+            steps.append("another")
+        wait()
+    assert caught.value.code == 143
+    assert steps == ["the block", "another"]
+
+
+def test_interruptions_that_wait_do_not_hide_an_error() -> None:
+    with pytest.raises(ValueError, match="of the block"), interruptions_wait():
+        raise ValueError("of the block")
 
 
 def test_a_block_that_takes_ctrl_c_as_its_end_ends_well() -> None:

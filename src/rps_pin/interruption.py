@@ -36,7 +36,7 @@ _DAY = 86400.0
 
 
 class Interrupted(KeyboardInterrupt):
-    """Raised by a signal where Ctrl-C raises `KeyboardInterrupt`."""
+    """Raised by a signal where Ctrl-C raises `KeyboardInterrupt`; `args` holds its number."""
 
 
 @contextmanager
@@ -63,12 +63,13 @@ def signals_as_ctrl_c() -> Iterator[None]:
 
     def interrupt(number: int, _: object) -> None:
         received.append(number)
-        raise Interrupted
+        raise Interrupted(number)
 
     def lost(found: sys.UnraisableHookArgs) -> None:
-        # Raised where Python can only report it, in a destructor: the signal is sent again.
+        # Raised where Python can only report it, in a destructor: the signal is sent again. An
+        # outer block may have received it.
         if isinstance(found.exc_value, Interrupted):
-            again = received[-1]
+            again = found.exc_value.args[0]
         elif isinstance(found.exc_value, KeyboardInterrupt) and ctrl_c:
             again = signal.SIGINT
         else:
@@ -94,6 +95,29 @@ def signals_as_ctrl_c() -> Iterator[None]:
 
 def _to_main_thread(number: int) -> None:
     signal.pthread_kill(threading.main_thread().ident or 0, number)
+
+
+@contextmanager
+def interruptions_wait() -> Iterator[None]:
+    """Let Ctrl-C, SIGTERM and SIGHUP wait for the end of the block, of a library that is called.
+
+    Foreign code that calls Python back may not survive what a signal's handler raises there.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    waiting: list[int] = []
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, *_DEADLY)}
+    ours = {one: handler for one, handler in before.items() if callable(handler)}
+    try:
+        for one in ours:
+            signal.signal(one, lambda number, _: waiting.append(number))
+        yield
+    finally:
+        for one, handler in ours.items():
+            signal.signal(one, handler)
+        for number in waiting:
+            signal.raise_signal(number)
 
 
 def end_with_parent(parent: int) -> None:

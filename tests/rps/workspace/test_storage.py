@@ -33,7 +33,7 @@ from rps_pin.rps.workspace import (
     workspace,
     workspace_to_file,
 )
-from tests.processes import lives, start, wait_for_end
+from tests.processes import lives, run, start, wait_for_end
 
 
 @pytest.fixture(scope="module")
@@ -458,3 +458,30 @@ def test_what_is_no_regular_file_is_refused(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "pipe.h5"):
         with pytest.raises(InputError, match="not a regular file"):
             load_workspace(path)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of file sizes are kept differently")
+@pytest.mark.parametrize("size", [0, 100, 3000, 20_000])
+def test_a_process_goes_on_after_a_file_that_could_not_be_closed(size: int, tmp_path: Path) -> None:
+    """HDF5 writes its tables when it closes a file, and crashes at the end if it could not."""
+    script = f"""
+        import resource
+        from rps_pin import RPSParameters
+        from rps_pin.rps.workspace import leg_grid, workspace_to_file
+
+        micro = RPSParameters.from_preset("micro")
+        path, grid = {str(tmp_path / "space.h5")!r}, leg_grid(micro, 9)
+        for limit in ({size}, -1):
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, -1))
+            try:
+                workspace_to_file(micro, path, grid)
+                print("written")
+            except OSError as error:
+                print(error.strerror)
+    """
+    done = run([sys.executable, "-c", textwrap.dedent(script)], timeout=60)
+    assert done.returncode == 0, done.stderr
+    first, second = done.stdout.splitlines()
+    assert first.endswith("no part of it was kept: File too large")
+    assert second == "written"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["space.h5"]

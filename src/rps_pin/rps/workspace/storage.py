@@ -17,7 +17,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
@@ -30,11 +29,13 @@ from numpy.typing import NDArray
 
 from rps_pin.errors import InputError, shown
 from rps_pin.files import whole_file
+from rps_pin.interruption import interruptions_wait
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import GridJob
 from rps_pin.rps.workspace.evaluate import Fields, evaluate
 from rps_pin.rps.workspace.grids import AXES, WHOLE, Block, Grid, checked_grid
+from rps_pin.rps.workspace.lasting_file import LastingFile, new_hdf5_file
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
 from rps_pin.validation import choice, non_negative_number, real_array, real_vector
@@ -64,14 +65,16 @@ _VECTORS = ("pose", "position", "length", "angle")
 class WorkspaceFile:
     """A file being written; see `new_workspace_file`."""
 
-    def __init__(self, file: h5py.File, fields: Sequence[str]) -> None:
-        self._file = file
+    def __init__(self, file: h5py.File, disk: LastingFile, fields: Sequence[str]) -> None:
+        self._file, self._disk = file, disk
         self._fields = tuple(fields)
 
     def write(self, block: Block, values: Fields) -> None:
         """Write the fields of one block of the grid."""
-        for name in self._fields:
-            self._file[name][block] = getattr(values, name)
+        with interruptions_wait():
+            for name in self._fields:
+                self._file[name][block] = getattr(values, name)
+        self._disk.check()
 
 
 @contextmanager
@@ -107,24 +110,31 @@ def new_workspace_file(
     with (
         _clear_failures(target, size),
         whole_file(target) as scratch,
-        h5py.File(scratch, "w") as file,
+        new_hdf5_file(scratch) as (file, disk),
     ):
-        bits = {str(reason.name): int(reason) for reason in Reason}
-        file.attrs["format"] = FORMAT
-        file.attrs["parameters"] = json.dumps(source.parameters.model_dump())
-        file.attrs["grid"] = grid.kind
-        file.attrs["start"] = source.start
-        file.attrs["min_conditioning"] = source.min_conditioning
-        file.attrs["reason_bits"] = json.dumps(bits)
-        for i, (axis, (meaning, unit)) in enumerate(zip(grid.axes, AXES[grid.kind], strict=True)):
-            data = file.create_dataset(f"axis_{i + 1}", data=axis)
-            data.attrs["unit"], data.attrs["meaning"] = unit, meaning
-        for name in names:
-            shape = (*grid.shape, 3) if name in _VECTORS else grid.shape
-            data = file.create_dataset(name, shape, "uint16" if name == "reason" else dtype)
-            data.attrs["unit"], data.attrs["meaning"] = _FIELDS[name]
-        yield WorkspaceFile(file, names)
-        file.attrs["complete"] = True
+        with interruptions_wait():
+            _describe(file, source)
+            for name in names:
+                shape = (*grid.shape, 3) if name in _VECTORS else grid.shape
+                data = file.create_dataset(name, shape, "uint16" if name == "reason" else dtype)
+                data.attrs["unit"], data.attrs["meaning"] = _FIELDS[name]
+        yield WorkspaceFile(file, disk, names)
+        with interruptions_wait():
+            file.attrs["complete"] = True
+
+
+def _describe(file: h5py.File, source: Workspace | GridJob) -> None:
+    """Write what a workspace is of: attributes and axes."""
+    grid = source.grid
+    file.attrs["format"] = FORMAT
+    file.attrs["parameters"] = json.dumps(source.parameters.model_dump())
+    file.attrs["grid"] = grid.kind
+    file.attrs["start"] = source.start
+    file.attrs["min_conditioning"] = source.min_conditioning
+    file.attrs["reason_bits"] = json.dumps({str(one.name): int(one) for one in Reason})
+    for i, (axis, (meaning, unit)) in enumerate(zip(grid.axes, AXES[grid.kind], strict=True)):
+        data = file.create_dataset(f"axis_{i + 1}", data=axis)
+        data.attrs["unit"], data.attrs["meaning"] = unit, meaning
 
 
 @refuses_other_kinds
@@ -287,26 +297,14 @@ def bytes_per_point(fields: Sequence[str], dtype: DType) -> int:
 
 @contextmanager
 def _clear_failures(target: Path, size: int) -> Iterator[None]:
-    """Say of a failing write which file it was, and how large; HDF5's own words stay as cause."""
+    """Say of a failing write which file it was, and how large."""
     try:
         yield
-    except (OSError, RuntimeError) as error:
-        code = _system_error(error)
-        if code is None:
-            raise
+    except OSError as error:
+        code = error.errno or errno.EIO
         raise OSError(
             code,
             f"the workspace ({size / 1e9:.3g} GB) could not be written, and no part of it was "
             f"kept: {os.strerror(code)}",
             str(target),
         ) from error
-
-
-def _system_error(error: BaseException) -> int | None:
-    """Return the system's error number, which HDF5, closing the file, puts into a RuntimeError."""
-    if isinstance(error, OSError) and error.errno:
-        return error.errno
-    number = re.search(r"errno = (\d+)", str(error))
-    if number:
-        return int(number[1])
-    return errno.EIO if isinstance(error, OSError) else None

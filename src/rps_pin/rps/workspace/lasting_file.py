@@ -1,0 +1,79 @@
+"""An HDF5 file that can always be closed: the first write that fails is kept and raised afterwards.
+
+HDF5 writes its tables when a file is closed. Where it cannot, on a full disk, it keeps the file
+open, and its library crashes at the end of the process. So HDF5 writes through a Python object that
+reports success in any case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+
+from rps_pin.interruption import interruptions_wait
+
+
+class LastingFile:
+    """A binary file, open for HDF5; after a write that failed it drops what is written."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("r+b", buffering=0)
+        self._failure: OSError | None = None
+        self.seek, self.tell = self._file.seek, self._file.tell
+        self.read, self.readinto = self._file.read, self._file.readinto
+        self.close = self._file.close
+
+    def write(self, data: memoryview) -> int:
+        """Write all of `data`, or keep the error."""
+        rest = data
+        try:
+            while rest and self._failure is None:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self._failure = error
+        return len(data)
+
+    def truncate(self, size: int) -> int:
+        """Set the file's size, or keep the error."""
+        try:
+            if self._failure is None:
+                self._file.truncate(size)
+        except OSError as error:
+            self._failure = error
+        return size
+
+    def flush(self) -> None:
+        """Do nothing: nothing is buffered."""
+
+    def check(self) -> None:
+        """Raise the error that was kept, if there is one."""
+        if self._failure is not None:
+            raise self._failure
+
+
+@contextmanager
+def new_hdf5_file(path: Path) -> Iterator[tuple[h5py.File, LastingFile]]:
+    """Give an HDF5 file to write, in place of a file that is there, and what it writes through.
+
+    Calls of HDF5 in the block belong into `interruptions_wait`.
+
+    Raises
+    ------
+    OSError
+        At the end of the block, if a write has failed.
+    """
+    disk = LastingFile(path)
+    try:
+        with interruptions_wait():
+            file = h5py.File(disk, "w")
+        try:
+            yield file, disk
+        finally:
+            with interruptions_wait():
+                file.close()
+    finally:
+        disk.close()
+    disk.check()
