@@ -17,7 +17,7 @@ from rps_pin import (
 from rps_pin.task import Task
 from tests.closed_loop.mechanisms import values
 from tests.closed_loop.test_completion import flat_parallelogram
-from tests.task.robots import poses, task
+from tests.task.robots import compiled, poses, task
 from tests.worst import worst
 
 
@@ -141,6 +141,36 @@ def test_a_pose_outside_says_by_how_much() -> None:
         one.to_actuators(one.home + 1.0)
     with pytest.raises(ClosureError, match="'leg_1_rod_joint' at"):
         task("stewart").to_actuators([0, 0, 0.96, 0, 0, 0])
+
+
+@pytest.mark.parametrize("name", ["delta", "ankle", "sokolov"])
+@pytest.mark.parametrize("make", [task, compiled], ids=["pinocchio", "generated"])
+def test_forces_of_open_loops_are_refused_and_velocities_are_not(make, name) -> None:
+    """The rule of a `ClosedLoopModel`: its dynamics refuses open loops, its velocities do not."""
+    one, (_, q) = make(name), poses(name)
+    rate, count = np.ones(one.size), one.mechanism.actuated_indices.size
+    bad = q[1].copy()
+    bad[one.of_actuators[0]] += 0.1
+    calls = [
+        lambda q, **how: one.forces_to_actuators(q, rate, **how),
+        lambda q, **how: one.forces_to_task(q, np.ones(count), **how),
+        lambda q, **how: one.gains_to_actuators(q, rate, **how),
+        lambda q, **how: one.gains_to_task(q, np.ones(count), **how),
+        one.mass_matrix,
+    ]
+    if one.frame is not None:
+        calls.append(lambda q, **how: one.wrench_to_actuators(q, np.ones(6), **how))
+    for call in calls:
+        with pytest.raises(ClosureError, match="not a closed configuration: closure"):
+            call(bad)
+        with pytest.raises(ClosureError, match=r"sample \(1,\)"):
+            call(np.array([q[0], bad]))
+        found = call(np.array([q[0], bad, q[1]]), errors="mask")
+        assert np.isnan(found[1]).all()
+        assert worst(found[[0, 2]] - np.array([call(q[0]), call(q[1])])) < 1e-9 * worst(found[0])
+    with pytest.raises(ClosureError, match="not a closed configuration: closure"):
+        one.force_polytope(bad)
+    assert np.isfinite(one.jacobian(bad)).all()
 
 
 def end(go) -> float:

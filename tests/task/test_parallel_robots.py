@@ -22,6 +22,7 @@ from tests.reference import delta, five_bar, jets
 from tests.reference.newton_euler import Jet
 from tests.reference.parallel import linear_delta, planar_rrr, rotary_stewart
 from tests.reference.parallel.robots import ROBOTS
+from tests.task.paths import uniform
 from tests.task.robots import poses, task
 from tests.worst import worst
 
@@ -206,9 +207,75 @@ def test_singularities_are_where_geometry_has_them(name, pose, before) -> None:
     with pytest.raises(SingularityError, match="do not determine the task"):
         one.forces_to_actuators(nearer[2], np.ones(one.size))
     across = point_to_point(pose + before, pose - 0.3 * before, duration=1.0)
-    (event,) = check_path(one, across).singularities
+    (event,) = check_path(quick(name), across, least_steps=60).singularities
     assert (event.kind, event.singularity) == ("crosses", "type II")
     assert worst(event.pose - pose) < 1e-9
+
+
+#: Of each robot, ends of lines from home that lead through a singularity, and which it is.
+THROUGH = [
+    ("stewart", {"rx": 1.4}, "type II"),
+    ("rotary_stewart", {"z": 0.32}, "type I"),  # cranks and rods in line
+    ("delta", {"x": -0.42, "y": 0.455, "z": -0.24}, "type II"),  # rods parallel to one plane
+    ("delta", {"z": -0.85}, "type I"),  # arms and rods in line
+    ("linear_delta", {"x": -0.12}, "type I"),  # a rod is level
+    ("rrs", {"rx": 0.6}, "type II"),
+    ("planar_rrr", {"x": 0.0783, "y": 0.0076, "rz": 0.75}, "type II"),
+    ("five_bar", {"x": 0.163, "z": 0.15}, "type II"),
+    ("ankle", {"cross_joint": 1.35}, "type II"),
+    ("ankle", {"cross_joint": -0.9}, "type I"),  # a crank and its rod in line
+]
+
+
+def first_singular_share(robot, start, way, kind: str) -> float:
+    """Of the closed form: a sign of det(d(drives)/dx), or where its square roots end."""
+
+    def determinant(share: float) -> float:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return float(np.linalg.det(robot.gain(start + share * way)))
+
+    shares = np.linspace(0, 1, 101)
+    values = np.array([determinant(share) for share in shares])
+    if kind == "type II":
+        k = int(np.flatnonzero(values[1:] * values[:-1] < 0)[0])
+        return brentq(determinant, shares[k], shares[k + 1], xtol=1e-14)
+    k = int(np.flatnonzero(~np.isfinite(values))[0])
+    low, high = shares[k - 1], shares[k]
+    for _ in range(45):
+        middle = (low + high) / 2
+        low, high = (middle, high) if np.isfinite(determinant(middle)) else (low, middle)
+    return float(low)
+
+
+@pytest.mark.parametrize(("name", "end", "kind"), THROUGH)
+def test_a_path_through_a_singularity_is_found_where_the_closed_form_has_it(
+    name, end, kind
+) -> None:
+    one, robot = quick(name), ROBOTS[name]
+    start = one.home
+    goal = start.copy()
+    for coordinate, value in end.items():
+        goal[one.coordinates.index(coordinate)] = value
+    share = first_singular_share(robot, start, goal - start, kind)
+    event = check_path(one, uniform(start, goal), least_steps=60).singularities[0]
+    how = "crosses" if kind == "type II" else "ends"
+    assert (event.kind, event.singularity) == (how, kind)
+    assert event.time == pytest.approx(share, abs=1e-9)
+    assert worst(event.pose - (start + share * (goal - start))) < 1e-9
+
+
+def test_reaches_end_where_bars_are_in_line() -> None:
+    """Radii and lengths of the files: a Delta downwards, a linear Delta aside."""
+    for name, coordinate, goal, wanted in (
+        ("delta", 2, -0.85, -np.sqrt((0.25 + 0.6) ** 2 - (0.2 - 0.06) ** 2)),
+        ("linear_delta", 0, -0.12, 0.105 - 0.215),
+    ):
+        one = quick(name)
+        end = one.home
+        end[coordinate] = goal
+        (event,) = check_path(one, uniform(one.home, end), least_steps=60).singularities
+        assert event.kind == "ends"
+        assert event.pose[coordinate] == pytest.approx(wanted, abs=1e-9)
 
 
 @EACH

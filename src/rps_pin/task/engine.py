@@ -67,6 +67,17 @@ class PinocchioEngine:
 
         return self._each(answer, (q,), (self._mechanism.constraint_size,), errors)
 
+    def closed(self, q: ArrayLike, errors: Errors = "raise") -> Array:
+        """Return q, (..., nq), refused where the loops are open."""
+        system = self._mechanism.system
+
+        def answer(q: Array) -> Array:
+            system.equations.jacobian(q)
+            system.refuse_open(q)
+            return q
+
+        return self._each(answer, (q,), (self._nq,), errors)
+
     def jacobian(self, q: ArrayLike, errors: Errors = "raise") -> Array:
         """Return J, (..., nc, nv)."""
         shape = (self._mechanism.constraint_size, self._nv)

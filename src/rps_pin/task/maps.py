@@ -324,6 +324,9 @@ class TaskMaps:
     def jacobian(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
         """Return K = d(actuators)/d(task) at closed configurations, shape (..., na, m).
 
+        As velocities of a `ClosedLoopModel`, it does not look whether the loops are closed; calls
+        that return forces or inertia do, and refuse open ones.
+
         Raises
         ------
         SingularityError
@@ -511,6 +514,17 @@ class TaskMaps:
         acceleration_ = self._rows(acceleration, self.size, "acceleration")
         v = self._by_task.velocity(whole, rate_, **options)
         return q_, v, self._by_task.acceleration(whole, v, acceleration_, **options)
+
+    def _closed(self, q: ArrayLike, errors: Errors) -> Array:
+        """Return configurations, refused as those of `inverse_dynamics` are if loops are open.
+
+        With ``errors="mask"``, open ones are NaN.
+        """
+        q_, equations = self._rows(q, self._nq, "q"), self.mechanism.system.equations
+        gaps = self._by_actuators.gaps(q_, **options_of(errors))
+        if not (equations.largest_gaps(gaps) > equations.open_limit).any():
+            return q_
+        return PinocchioEngine(self.mechanism).closed(q_, errors)
 
     def _whole(self, q: Array, errors: Errors) -> Array:
         """Return configurations of the extended mechanism."""

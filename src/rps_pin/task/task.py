@@ -90,17 +90,25 @@ class Task(TaskMaps):
 
         Raises
         ------
+        ClosureError
+            If the loops are open.
         SingularityError
             If the actuators do not determine the task here (type II).
         """
-        K = self.jacobian(q, errors=errors)
+        K = self._gain(q, errors)
         f = self._rows(forces, self.size, "forces")
         return self._carried(K, f, errors)
 
     def forces_to_task(self, q: ArrayLike, tau: ArrayLike, *, errors: Errors = "raise") -> Array:
-        """Return the task's forces f = K' tau of actuators' forces (..., na), shape (..., m)."""
+        """Return the task's forces f = K' tau of actuators' forces (..., na), shape (..., m).
+
+        Raises
+        ------
+        ClosureError
+            If the loops are open.
+        """
         tau_ = self._rows(tau, self._actuated.size, "tau")
-        return np.asarray(np.einsum("...ij,...i->...j", self.jacobian(q, errors=errors), tau_))
+        return np.asarray(np.einsum("...ij,...i->...j", self._gain(q, errors), tau_))
 
     def actuator_forces(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, errors: Errors = "raise"
@@ -163,7 +171,7 @@ class Task(TaskMaps):
 
         Raises
         ------
-        SingularityError, MechanismError
+        ClosureError, SingularityError, MechanismError
             As `forces_to_actuators` and `twist_map`.
         """
         given = self._rows(wrench, 6, "wrench")
@@ -197,6 +205,8 @@ class Task(TaskMaps):
 
         Raises
         ------
+        ClosureError
+            If the loops are open.
         SingularityError
             If the actuators do not determine the task here.
         MechanismError
@@ -221,7 +231,7 @@ class Task(TaskMaps):
 
         K' G_a K + sum_i tau_i H_i; see `gains_to_actuators`. ``gains`` are (..., na, na) or (na,).
         """
-        K = self.jacobian(q, errors=errors)
+        K = self._gain(q, errors)
         found = np.swapaxes(K, -1, -2) @ self._matrix(gains, self._actuated.size, "gains") @ K
         return found if forces is None else found + self._geometric(q, forces, errors)
 
@@ -257,6 +267,8 @@ class Task(TaskMaps):
         ------
         InputError
             If an actuator has no limit.
+        ClosureError
+            If the loops are open.
         SingularityError
             If the actuators do not determine the task here.
         """
@@ -264,7 +276,7 @@ class Task(TaskMaps):
         if used is not None:
             taken = self._rows(used, self._actuated.size, "used")
             lower, upper = lower - taken, upper - taken
-        K = self.jacobian(self._one(q))
+        K = self._gain(self._one(q), "raise")
         return polytope.of_forces(K, lower, upper, 1 / self._units)
 
     def speed_polytope(
@@ -322,6 +334,15 @@ class Task(TaskMaps):
 
     # Parts ----------------------------------------------------------------------------------------
 
+    def _gain(self, q: ArrayLike, errors: Errors) -> Array:
+        """Return K for forces, which open loops have none of."""
+        q_ = self._closed(q, errors)
+        gone = np.isnan(q_[..., :1])
+        if not gone.any():
+            return self.jacobian(q_, errors=errors)
+        K = self.jacobian(np.where(gone, self.mechanism.home, q_), errors=errors)
+        return np.where(gone[..., None], np.nan, K)
+
     def _frame_jacobian(self, q: Array) -> Array:
         """Return the output frame's Jacobian, (6, nv), in world axes."""
         mechanism, x = self.mechanism, self._x
@@ -364,7 +385,7 @@ class Task(TaskMaps):
                 f"{self._actuated.size} actuators have no determined gains of {self.size} "
                 "coordinates"
             )
-        return self.jacobian(q, errors=errors)
+        return self._gain(q, errors)
 
     def _carried(self, K: Array, f: Array, errors: Errors) -> Array:
         """Return tau with K' tau = f, of least norm in one unit."""

@@ -310,10 +310,15 @@ class ClosureEquations:
 
     def largest_gap(self, gaps: Array) -> float:
         """Return the largest gap of a closure, m; angles with the length as lever."""
+        return float(self.largest_gaps(gaps))
+
+    def largest_gaps(self, gaps: Array) -> Array:
+        """Return `largest_gap` of many, (..., nc), shape (...)."""
         if not self.size:
-            return 0.0
+            return np.zeros(gaps.shape[:-1])
         scaled = self.row_scale * gaps
-        return math.sqrt(np.add.reduceat(scaled * scaled, self._groups).max())
+        squares = np.add.reduceat(scaled * scaled, self._groups, axis=-1)
+        return np.asarray(np.sqrt(squares.max(axis=-1)))
 
     def is_open(self, q: Array) -> bool:
         """Return whether a gap exceeds `OPEN`, after `jacobian` at q: fast, for control loops."""
