@@ -150,7 +150,7 @@ def test_rounded_rotations_are_made_rotations() -> None:
     turn = np.round(pin.exp3(np.array([0.4, -0.2, 0.7])), 5)
     closure = LoopClosure("a", "b", placement_b=pin.SE3(turn, np.ones(3)).homogeneous)
     found = closure.offsets()[1].rotation
-    assert worst(found @ found.T - np.eye(3)) < 1e-15
+    assert worst(found @ found.T - np.eye(3)) < 4e-15  # a singular value decomposition rounds
     assert worst(found - turn) < 1e-5
 
 

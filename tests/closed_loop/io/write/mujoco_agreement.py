@@ -179,7 +179,7 @@ def agreement(mechanism: ClosedLoopModel, path: Path, seed: int = 0) -> Agreemen
     twin, model = MujocoTwin(mechanism, path), mechanism.model
     start = mechanism.home
     N = mechanism.allowed_motions(start)
-    q = mechanism.project(pin.integrate(model, start, 0.1 * N @ rng.normal(size=N.shape[1])))
+    q = mechanism.project(pin.integrate(model, start, N @ _random(N, 0.1, rng)))
     N = mechanism.allowed_motions(q)
     T = twin.motions(q, N)
     gap = np.abs(twin.residuals()).max(initial=0.0)
@@ -195,10 +195,10 @@ def agreement(mechanism: ClosedLoopModel, path: Path, seed: int = 0) -> Agreemen
     mujoco.mj_forward(twin.model, twin.data)
     weight = twin.data.qfrc_bias - twin.data.qfrc_passive
     still = np.zeros(model.nv)
-    u = rng.normal(size=N.shape[1])
+    u = _random(N, 1.0, rng)
     v = N @ u
     opening = mechanism.loop_errors(q, v, still).acceleration
-    a = N @ rng.normal(size=N.shape[1])
+    a = N @ _random(N, 1.0, rng)
     if opening.size:
         a -= np.linalg.lstsq(mechanism.jacobian(q), opening, rcond=None)[0]
     effects = mechanism.effects
@@ -218,6 +218,12 @@ def agreement(mechanism: ClosedLoopModel, path: Path, seed: int = 0) -> Agreemen
         _relative(T.T @ damped, N.T @ losses),
         _force(mechanism, twin, q, v, a, N),
     )
+
+
+def _random(N: Array, norm: float, rng: np.random.Generator) -> Array:
+    """Return coefficients of a random motion: of this norm, so that no joint meets its limit."""
+    found = rng.normal(size=N.shape[1])
+    return found * (norm / max(float(np.linalg.norm(N @ found)), 1e-300))
 
 
 def _force(
