@@ -97,7 +97,7 @@ def test_random_mechanisms_of_every_joint_and_closure(seed: int) -> None:
         found = differences(right, answers(other, inputs, UnitsOf(other, units)))
         # Slides and hinges change the order of pivots; and axes are rounded once more. The length
         # of an adaptive step follows from the difference of two results that are nearly equal.
-        limits = {name: 1e-7 for name in CLOSED} | {"simulate adaptive": 1e-9}
+        limits = dict.fromkeys(CLOSED, 1e-07) | {"simulate adaptive": 1e-9}
         wrong = {
             k: v
             for k, v in found.items()

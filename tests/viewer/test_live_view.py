@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import itertools
 import os
 import signal
@@ -262,11 +263,12 @@ def test_what_is_no_pose_is_refused_and_the_last_one_stays(robot, pose):
 
 def test_leaves_nothing_behind_even_after_a_crash_of_the_loop(robot):
     def open_files() -> int:
+        gc.collect()  # what other tests left to the collector may be closed meanwhile
         return len(list(Path("/dev/fd").iterdir()))
 
     LiveView(robot, POSE)  # multiprocessing's own helper and first arena stay open
-    before = None
-    for _ in range(2):
+    counts = []
+    for _ in range(3):
         with pytest.raises(ZeroDivisionError), LiveView(robot, POSE) as running:
             pid = running._process.pid
             1 / 0  # noqa: B018
@@ -274,8 +276,9 @@ def test_leaves_nothing_behind_even_after_a_crash_of_the_loop(robot):
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
         del running
-        before = open_files() if before is None else before
-    assert open_files() == before
+        counts.append(open_files())
+    # What is left behind is left each time; multiprocessing may open a file of its own once.
+    assert counts[2] < counts[0] + 2, counts
 
 
 def test_a_crash_of_the_viewer_leaves_the_loop_alone(robot):
