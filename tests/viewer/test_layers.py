@@ -14,10 +14,11 @@ import pytest
 import umsgpack
 
 from rps_pin import ClosedLoopModel, JointCoupling, LoopClosure, RPSRobot, helix
-from rps_pin.closed_loop.visuals import skeleton
+from rps_pin.closed_loop.visuals import skeleton, visual_model
 from rps_pin.errors import ClosureError, InputError
 from rps_pin.rps import joint_reactions
 from rps_pin.rps.dynamics.motion_run import run_motion
+from rps_pin.trajectories import point_to_point
 from rps_pin.viewer import (
     LAYERS,
     Forces,
@@ -36,6 +37,7 @@ from rps_pin.viewer import (
 from rps_pin.viewer.layers.parts import between, pointing, tube
 from rps_pin.viewer.motion import MotionState
 from rps_pin.viewer.scene.stage import round_number
+from tests.reference import stewart
 
 URDF = Path(__file__).parents[2] / "urdf"
 POSE = [0.4, 0.1, -0.05]
@@ -407,6 +409,59 @@ def test_a_skeleton_reaches_every_closed_frame():
     bars = [one for one in skeleton(four_bar).geometryObjects if one.name.startswith("bar")]
     lengths = sorted(2 * float(bar.geometry.halfLength) for bar in bars)
     np.testing.assert_allclose(lengths, [0.2, 0.4, 0.45, 0.5], rtol=1e-12)
+
+
+def bars(recorder: Recorder) -> dict[str, np.ndarray]:
+    """Return begin and end, (2, 3), of each bar that is no link, as sent last."""
+    start = "/world/robot/bars/"
+    found = {}
+    for m in recorder.messages:
+        name = m.get("path", "").removeprefix(start)
+        if m["type"] == "set_transform" and m["path"].startswith(start) and "/" not in name:
+            place = np.reshape(m["matrix"], (4, 4)).T
+            ends = place @ np.array([[0, 0, 0, 1.0], [0, 0, 1, 1.0]]).T
+            found[name] = ends[:3].T
+    return found
+
+
+@pytest.mark.parametrize("name", ["delta", "linear_delta"])
+@pytest.mark.parametrize("with_shapes", [True, False])
+def test_rods_of_distance_closures_are_drawn(name, with_shapes):
+    """From frame to frame, as long as they are, in every pose and in the animation."""
+    mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
+    shapes = visual_model(URDF / f"{name}.yaml", mechanism.model) if with_shapes else None
+    path = point_to_point(mechanism.task.home, mechanism.task.home + 0.02, duration=1.0)
+    view, recorder = shown(mechanism, path, visual=shapes)
+    for share in (0.0, 0.6, 1.0):
+        view.show_moment(share)
+        q, found = view.motion.state_at(share).q, bars(recorder)
+        sliding = name == "linear_delta" and not with_shapes
+        assert len(found) == len(mechanism.closures) + (3 if sliding else 0)
+        for closure in mechanism.closures:
+            begin, end = found[closure.name]
+            for frame, place in ((closure.frame_a, begin), (closure.frame_b, end)):
+                where = mechanism.frame_placement(q, frame)[:3, 3]
+                np.testing.assert_allclose(place, where, atol=1e-9)
+            assert np.linalg.norm(end - begin) == pytest.approx(closure.distance, rel=1e-9)
+    view.animate()
+    animated = {clip["path"] for clip in recorder.messages[-1]["animations"]}
+    assert {f"/world/robot/bars/{closure.name}" for closure in mechanism.closures} <= animated
+
+
+def test_a_skeleton_has_legs_as_long_as_their_joints_say():
+    """Those of a Stewart platform, by the closed form; with its own shapes they are not drawn."""
+    mechanism = ClosedLoopModel.load(URDF / "stewart.yaml")
+    pose = mechanism.task.home + np.array([0.03, -0.02, 0.05, 0.1, 0.2, -0.1])
+    view, recorder = shown(mechanism)
+    view.display(mechanism.task.configuration(pose))
+    turn, found = pin.exp3(pose[3:]), bars(recorder)
+    assert len(found) == 6
+    for i, (anchor, ball) in enumerate(zip(stewart.ANCHORS, stewart.BALLS, strict=True), 1):
+        begin, end = found[f"leg_{i}_rod_joint"]
+        np.testing.assert_allclose(begin, anchor, atol=1e-9)
+        np.testing.assert_allclose(end, pose[:3] + turn @ ball, atol=1e-9)
+    shapes = visual_model(URDF / "stewart.yaml", mechanism.model)
+    assert not bars(shown(mechanism, visual=shapes)[1])
 
 
 def test_layers_are_switched_by_name(robot):

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 from pinocchio import coal
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import LoopClosure
 from rps_pin.closed_loop.io.gepetto import gepetto_urdf, is_gepetto
 from rps_pin.closed_loop.io.mechanism_schema import Description
@@ -111,20 +112,10 @@ def skeleton(mechanism: ClosedLoopModel) -> pin.GeometryModel:
     """Return bars for a mechanism that has no shapes of its own.
 
     A ball at every joint, and a bar on each body from its joint to the joints that it carries and
-    to its closed frames. The thickness is a fiftieth of the longest bar, or 1 cm if all are short
-    of any length.
+    to its closed frames. What no body has as its own, the viewer draws besides: rods of
+    ``distance`` closures, and the way from where a prismatic joint stands to where it is.
     """
-    model = mechanism.model
-    ends = [
-        (int(model.parents[joint]), np.array(model.jointPlacements[joint].translation))
-        for joint in range(1, model.njoints)
-    ]
-    for closure in mechanism.closures:
-        if isinstance(closure, LoopClosure):
-            for frame in closure.closed_frames(model):
-                ends.append((frame.joint, np.array(frame.placement.translation)))
-    longest = max((float(np.linalg.norm(end)) for _, end in ends), default=0.0)
-    radius = longest / 50.0 or 0.01
+    model, ends, radius = mechanism.model, _ends(mechanism), bar_radius(mechanism)
     ball, here = coal.Sphere(1.6 * radius), pin.SE3.Identity()
     items = [
         (_JOINT, pin.GeometryObject(f"joint_{joint}", joint, here, ball))
@@ -143,3 +134,37 @@ def skeleton(mechanism: ClosedLoopModel) -> pin.GeometryModel:
         item.meshColor = colour
         shapes.addGeometryObject(item)
     return shapes
+
+
+def bar_radius(mechanism: ClosedLoopModel) -> float:
+    """Return the thickness of a skeleton's bars, m: a fiftieth of the longest of bars and rods.
+
+    1 cm if all are short of any length.
+    """
+    longest = max((float(np.linalg.norm(end)) for _, end in _ends(mechanism)), default=0.0)
+    for closure in mechanism.closures:
+        if isinstance(closure, LoopClosure) and closure.distance is not None:
+            longest = max(longest, closure.distance)
+    return longest / 50.0 or 0.01
+
+
+def sliding_joints(mechanism: ClosedLoopModel) -> list[int]:
+    """Return the indices of the joints with one coordinate that is a length."""
+    joints, angular = mechanism.model.joints, mechanism.angular_velocities
+    return [
+        joint.id for joint in list(joints)[1:] if joint.nv == 1 and not bool(angular[joint.idx_v])
+    ]
+
+
+def _ends(mechanism: ClosedLoopModel) -> list[tuple[int, Array]]:
+    """Return joints and points of their bodies: joints that they carry, and closed frames."""
+    model = mechanism.model
+    ends = [
+        (int(model.parents[joint]), np.array(model.jointPlacements[joint].translation))
+        for joint in range(1, model.njoints)
+    ]
+    for closure in mechanism.closures:
+        if isinstance(closure, LoopClosure):
+            for frame in closure.closed_frames(model):
+                ends.append((frame.joint, np.array(frame.placement.translation)))
+    return ends

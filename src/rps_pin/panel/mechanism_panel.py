@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.assembly.joint_limits import JointLimits
-from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.errors import InputError, RPSPinError
 from rps_pin.panel.panel import Slider, quantity, slider_values
 from rps_pin.task import Task
@@ -126,9 +125,9 @@ class MechanismPanel:
         """Configuration of the mechanism, shape (nq,)."""
         return self._q
 
-    def visual_model(self) -> pin.GeometryModel:
-        """Return its visual geometry."""
-        return skeleton(self.mechanism) if self._visual is None else self._visual
+    def visual_model(self) -> pin.GeometryModel | None:
+        """Return its visual geometry; None for bars between its joints."""
+        return self._visual
 
     def _take(self, q: Array, x: Array | None = None) -> None:
         """Go to a closed configuration, whose task coordinates may be known."""

@@ -48,8 +48,8 @@ class Panel(Protocol):
     def configuration(self) -> Array:
         """Configuration of the mechanism, shape (nq,)."""
 
-    def visual_model(self) -> pin.GeometryModel:
-        """Return its visual geometry."""
+    def visual_model(self) -> pin.GeometryModel | None:
+        """Return its visual geometry; None for bars between its joints."""
 
 
 def slider_values(groups: dict[str, tuple[Slider, ...]], group: str, values: Any) -> Array:

@@ -33,6 +33,8 @@ class DisplayedMechanism:
     """Its geometry."""
     robot: RPSRobot | None
     """The 3-RPS, if it is one."""
+    is_skeleton: bool = False
+    """Whether the geometry is bars between the joints, in place of shapes of its own."""
 
     @property
     def model(self) -> pin.Model:
@@ -65,7 +67,7 @@ def displayed(
     if isinstance(what, RPSRobot):
         return DisplayedMechanism(what.mechanism, visual or what.visual_model(), what)
     if isinstance(what, ClosedLoopModel):
-        return DisplayedMechanism(what, visual or skeleton(what), None)
+        return DisplayedMechanism(what, visual or skeleton(what), None, visual is None)
     raise InputError(f"{type(what).__name__} cannot be shown: an RPSRobot or ClosedLoopModel can")
 
 

@@ -17,12 +17,13 @@ from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import real_vector
 from rps_pin.viewer.displayed_mechanism import configuration_of, displayed, motion_of
 from rps_pin.viewer.layers import layers_of
-from rps_pin.viewer.layers.base import DrawnLayer, Layer, LayerContext
+from rps_pin.viewer.layers.bars import moving_bars
+from rps_pin.viewer.layers.base import DrawnLayer, Layer, LayerContext, Moving
 from rps_pin.viewer.motion import FRAME_RATE, MotionState
 from rps_pin.viewer.playback import follow_clock
 from rps_pin.viewer.scene.keyframes import NodeKeyframes
 from rps_pin.viewer.scene.links import node_name
-from rps_pin.viewer.scene.scene import Scene
+from rps_pin.viewer.scene.scene import ROBOT, Scene
 from rps_pin.viewer.scene.shapes import Part
 from rps_pin.viewer.scene.stage import WORLD
 from rps_pin.viewer.writers.scene_writer import SceneWriter
@@ -30,6 +31,8 @@ from rps_pin.viewer.writers.window import Window
 
 LAYERS_NODE = f"{WORLD}/layers"
 """Path of the node that holds the layers: one child each, by the layer's name."""
+_BARS_NODE = f"{ROBOT}/bars"
+"""Path of the node that holds bars which are no links."""
 
 
 class View:
@@ -87,6 +90,10 @@ class View:
         framed = np.concatenate([self.motion.configurations, *more])
         self.scene = Scene(self.subject.model, self.subject.visual, window, framed)
         self._writer = self.scene.writer
+        bars = moving_bars(self.subject)
+        self._moving: dict[str, Moving | DrawnLayer] = {_BARS_NODE: bars} if bars else {}
+        for part in bars.parts if bars else ():
+            self._writer.add_part(_part_path(_BARS_NODE, part), part)
         context = LayerContext(self.subject, self.motion, self.scene.box)
         self.drawings: dict[str, DrawnLayer] = {}
         self._visible: dict[str, bool] = {}
@@ -96,6 +103,7 @@ class View:
             self.drawings[name] = drawn._replace(legend=replace(drawn.legend, name=name))
             self._visible[name] = len(self._visible) < len(on)
             path = f"{LAYERS_NODE}/{name}"
+            self._moving[path] = drawn
             for part in drawn.parts:
                 self._writer.add_part(_part_path(path, part), part, casts_shadow=False)
             if not self._visible[name]:
@@ -161,8 +169,8 @@ class View:
         """
         states = list(self.motion.states(frame_rate))
         keyframes: list[NodeKeyframes] = []
-        for name, drawn in self.drawings.items():
-            keyframes += _keyframes(f"{LAYERS_NODE}/{name}", drawn, states)
+        for path, drawn in self._moving.items():
+            keyframes += _keyframes(path, drawn, states)
         self.scene.animate(self.motion, frame_rate=frame_rate, more=keyframes)
 
     def _show(self, state: MotionState) -> None:
@@ -174,8 +182,7 @@ class View:
         self._writer.set_legend(entries, list(self._visible.values()))
 
     def _update_layers(self, state: MotionState) -> None:
-        for name, drawn in self.drawings.items():
-            path = f"{LAYERS_NODE}/{name}"
+        for path, drawn in self._moving.items():
             for node, now in (drawn.update(state) if drawn.update else {}).items():
                 self._writer.place(f"{path}/{node}", now.placement)
                 if now.colour is not None:
@@ -184,7 +191,9 @@ class View:
                         self._writer.set_colour(_part_path(path, part), now.colour, opacity)
 
 
-def _keyframes(path: str, drawn: DrawnLayer, states: Sequence[MotionState]) -> list[NodeKeyframes]:
+def _keyframes(
+    path: str, drawn: Moving | DrawnLayer, states: Sequence[MotionState]
+) -> list[NodeKeyframes]:
     """Return the keyframes of a layer's nodes at states of the motion."""
     if drawn.update is None:
         return []
@@ -199,7 +208,7 @@ def _keyframes(path: str, drawn: DrawnLayer, states: Sequence[MotionState]) -> l
     return keyframes
 
 
-def _parts_of(drawn: DrawnLayer, node: str) -> list[Part]:
+def _parts_of(drawn: Moving | DrawnLayer, node: str) -> list[Part]:
     return [part for part in drawn.parts if part.node == node]
 
 

@@ -52,6 +52,15 @@ NodeStates = Mapping[str, NodeState]
 """States of a layer's nodes, by name."""
 
 
+class Moving(NamedTuple):
+    """Shapes that move with the robot, not as one of its links."""
+
+    parts: Sequence[Part]
+    """The shapes."""
+    update: Callable[[MotionState], NodeStates]
+    """Returns where their nodes are in a state."""
+
+
 class DrawnLayer(NamedTuple):
     """A layer, drawn for one context."""
 
