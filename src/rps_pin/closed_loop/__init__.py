@@ -16,6 +16,9 @@ from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.editing.compose import Part, body, compose
 from rps_pin.closed_loop.editing.merge import JointMerge, merged
 from rps_pin.closed_loop.editing.replace import replace_joints
+from rps_pin.closed_loop.interference.at_pose import Interference
+from rps_pin.closed_loop.interference.distances import LinkDistance, LinkDistances
+from rps_pin.closed_loop.interference.shapes import CollisionShapes, composed_shapes
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import JointLimitPassed, Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
@@ -23,14 +26,18 @@ from rps_pin.closed_loop.simulation.stepper import Stepper
 
 __all__ = [
     "ClosedLoopModel",
+    "CollisionShapes",
     "DistributedForces",
     "ForceBound",
     "ForceDistribution",
+    "Interference",
     "InverseDynamics",
     "JointCoupling",
     "JointEffects",
     "JointLimitPassed",
     "JointMerge",
+    "LinkDistance",
+    "LinkDistances",
     "LoopClosure",
     "LoopErrors",
     "MechanismDescription",
@@ -39,6 +46,7 @@ __all__ = [
     "Stepper",
     "body",
     "compose",
+    "composed_shapes",
     "friction_pyramid",
     "merged",
     "replace_joints",

@@ -41,6 +41,10 @@ from rps_pin.closed_loop.editing.replace import (
     replaced_configuration,
     replaced_effects,
 )
+from rps_pin.closed_loop.interference.at_pose import Interference, interference_at
+from rps_pin.closed_loop.interference.distances import LinkDistances
+from rps_pin.closed_loop.interference.geometry import collision_geometry
+from rps_pin.closed_loop.interference.shapes import CollisionShapes, pairs_of, shapes_of
 from rps_pin.closed_loop.io.gepetto import parts_from_gepetto
 from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
@@ -109,11 +113,16 @@ class ClosedLoopModel:
         What the mechanism is for: the arguments of a `rps_pin.task.Task`, by name; see `task`.
     notes
         Sentences that `describe` prints: what the reader of a file has decided.
+    collision
+        Collision shapes of the links, for `interference`: `CollisionShapes`, as another mechanism
+        has them, or a `pin.GeometryModel` of this model. Readers of files give those of the file.
 
     Attributes
     ----------
     model, closures, actuated, effects, name, max_condition, accuracy, notes
         As given; `closures` and `actuated` as tuples.
+    collision_shapes : CollisionShapes
+        Collision shapes as they are stated, unbuilt; see `collision_model`.
     system : ConstraintSystem
         The tree with its closure equations and their factorisation, for the algorithms.
 
@@ -141,6 +150,7 @@ class ClosedLoopModel:
         accuracy: float | None = None,
         task: Mapping[str, Any] | None = None,
         notes: Sequence[str] = (),
+        collision: CollisionShapes | pin.GeometryModel | None = None,
     ) -> None:
         self.system = system = ConstraintSystem(
             model,
@@ -162,6 +172,9 @@ class ClosedLoopModel:
         self.name: str = name or model.name
         self.notes = tuple(notes)
         self._task = None if task is None else dict(task)
+        if isinstance(collision, pin.GeometryModel):
+            collision = shapes_of(model, collision)
+        self.collision_shapes: CollisionShapes = collision or CollisionShapes()
         self._home: Array | None = None
         self._start: Array = pin.neutral(model)
         self._given_length = characteristic_length
@@ -224,6 +237,7 @@ class ClosedLoopModel:
         model.gravity.linear = real_vector(gravity, 3, "gravity")
         own = tuple(closure for closure in parts.closures if closure not in given)
         options.setdefault("notes", parts.notes)
+        options.setdefault("collision", parts.collision)
         return cls(model, own + given, actuated, effects=with_effects(parts, effects), **options)
 
     @classmethod
@@ -344,6 +358,7 @@ class ClosedLoopModel:
             accuracy=parts.accuracy,
             task=parts.task,
             notes=parts.notes,
+            collision=parts.collision,
         )
         if parts.home is None:
             mechanism._home = mechanism.home  # closed, or not to be built
@@ -378,7 +393,95 @@ class ClosedLoopModel:
             "accuracy": self.accuracy,
             "task": self._task,
             "notes": self.notes,
+            "collision": self.collision_shapes,
         }
+
+    # Interference ---------------------------------------------------------------------------------
+
+    @cached_property
+    def collision_model(self) -> pin.GeometryModel:
+        """Collision shapes of the links, on this model; without pairs.
+
+        Meshes are found by the rules of ROS (`ROS_PACKAGE_PATH`); one that bounds a convex solid is
+        that solid, another one a surface.
+
+        Raises
+        ------
+        InputError
+            If a shape cannot be read; says which, where in its file, and why.
+        """
+        return collision_geometry(self.model, self.collision_shapes)
+
+    def with_collision(
+        self, collision: CollisionShapes | pin.GeometryModel, *, ignore: Any = ()
+    ) -> ClosedLoopModel:
+        """Return the same mechanism with other collision shapes; see the class.
+
+        Parameters
+        ----------
+        collision
+            The shapes.
+        ignore
+            Further pairs of links, by name, that may overlap.
+
+        Raises
+        ------
+        InputError
+            If a shape is on a joint that there is not, or `ignore` holds no pairs of names.
+        """
+        if isinstance(collision, pin.GeometryModel):
+            collision = shapes_of(self.model, collision)
+        options = self._options() | {"collision": collision.ignoring(ignore)}
+        return type(self)(self.model, self.closures, self.actuated, home=self._home, **options)
+
+    def link_distances(self, ignore: Any = ()) -> LinkDistances:
+        """Return distances of the pairs of links that are checked, for many configurations.
+
+        Checked are links of different bodies that neither a joint nor a closure connects; see
+        `rps_pin.closed_loop.interference.pairs`.
+
+        Parameters
+        ----------
+        ignore
+            Pairs of links, by name, that are not checked: ``[("arm", "cover")]``.
+
+        Raises
+        ------
+        InputError
+            As `collision_model`; or if `ignore` holds no pairs of names.
+        MechanismError
+            If a link of a pair is unknown.
+        """
+        pairs, length = pairs_of(ignore), self.characteristic_length
+        shapes, geometry = self.collision_shapes, self.collision_model
+        return LinkDistances(self.model, self.closures, length, shapes, geometry, pairs)
+
+    def interference(
+        self, q: ArrayLike, *, clearance: float = 0.0, ignore: Any = ()
+    ) -> Interference:
+        """Return which pairs of links overlap, or are nearer than a clearance.
+
+        Parameters
+        ----------
+        q
+            Configuration, shape (nq,).
+        clearance
+            Least distance of two links, m.
+        ignore
+            As for `link_distances`.
+
+        Raises
+        ------
+        InputError, MechanismError
+            As `link_distances`; or if q or the clearance do not fit.
+        """
+        q_, least = self._configuration(q), non_negative_number(clearance, "clearance", "m")
+        distances = self._distances if not ignore else self.link_distances(ignore)
+        return interference_at(distances, q_, least)
+
+    @cached_property
+    def _distances(self) -> LinkDistances:
+        return self.link_distances()
 
     # Other closures and actuators -----------------------------------------------------------------
 
@@ -1406,6 +1509,7 @@ class ClosedLoopModel:
             self.max_condition,
             self.accuracy,
             self._task,
+            self.collision_shapes,
         )
 
     # Other engines --------------------------------------------------------------------------------

@@ -12,15 +12,14 @@ from pinocchio import coal
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import LoopClosure
+from rps_pin.closed_loop.interference.meshes import mesh_file
 from rps_pin.closed_loop.io.gepetto import gepetto_urdf, is_gepetto
 from rps_pin.closed_loop.io.mechanism_schema import Description
 from rps_pin.closed_loop.io.urdf.normal_form import Shapes, normal_form
-from rps_pin.closed_loop.io.urdf.packages import file_of
 from rps_pin.closed_loop.io.urdf.tree import urdf_file
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.config import read_yaml
-from rps_pin.errors import InputError, few, warn_caller
-from rps_pin.files import known_format, opened
+from rps_pin.errors import few, warn_caller
 
 PackagePath = Sequence[str | os.PathLike[str]]
 
@@ -77,19 +76,11 @@ def urdf_shapes(
 
     def mesh(attributes: dict[str, str]) -> str:
         name = attributes.get("filename", "")
-        found = str(file_of(name, urdf, package_path).absolute())
         try:
             scale = np.array(attributes.get("scale", "1 1 1").split(), dtype=np.float64)
-            triangles = loader.load(found, np.broadcast_to(scale, 3).copy())
-            drawable = triangles.num_tris > 0 and np.isfinite(triangles.vertices()).all()
-        except (ValueError, RuntimeError, IndexError):
-            drawable = False
-        if not drawable:
-            with opened(found, "mesh") as file:
-                what = known_format(file.read(1000))
-            why = f": it is {what}" if what else ""
-            raise InputError(f"{name!r}: {found} cannot be read as a mesh{why}")
-        return found
+        except ValueError:
+            scale = np.full(3, np.nan)
+        return mesh_file(name, urdf, package_path, scale, loader)[0]
 
     missing: list[str] = []
     links = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}

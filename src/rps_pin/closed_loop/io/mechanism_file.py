@@ -40,6 +40,8 @@ from rps_pin.closed_loop.editing.merge import (
 )
 from rps_pin.closed_loop.editing.present_pose import closure_at
 from rps_pin.closed_loop.editing.replace import replace_joints, replaced_configuration
+from rps_pin.closed_loop.interference.pairs import check_links
+from rps_pin.closed_loop.interference.shapes import CollisionShapes
 from rps_pin.closed_loop.io.gepetto import is_gepetto, parts_from_gepetto
 from rps_pin.closed_loop.io.mechanism_schema import (
     ClosureEntry,
@@ -117,6 +119,7 @@ def parts_from_yaml(
         max_condition=description.max_condition,
         accuracy=description.accuracy,
         task=_task(file, description, parts.model),
+        collision=_collision(file, description, parts),
     )
 
 
@@ -317,6 +320,19 @@ def _task(file: YamlFile, description: Description, model: pin.Model) -> dict[st
         with file.at("task", "joints", i):
             joint_id(model, name, "task")
     return entry.model_dump() | {"placement": _placed(entry.placement)}
+
+
+# Interference -------------------------------------------------------------------------------------
+
+
+def _collision(file: YamlFile, description: Description, parts: MechanismParts) -> CollisionShapes:
+    """Return the shapes of the tree's file, without the pairs that the description leaves out."""
+    shapes, entry = parts.collision, description.interference
+    for i, pair in enumerate(entry.ignore if entry else ()):
+        with file.at("interference", "ignore", i):
+            shapes = shapes.ignoring([pair])
+            check_links(parts.model, [pair])
+    return shapes
 
 
 # Closures -----------------------------------------------------------------------------------------

@@ -63,6 +63,14 @@ class TaskEntry(Entry):
     characteristic_length: Positive | None = None
 
 
+class InterferenceEntry(Entry):
+    """Pairs of links, by name, that may overlap."""
+
+    ignore: list[Annotated[list[Text], Field(min_length=2, max_length=2)]] = Field(
+        default_factory=list
+    )
+
+
 class Description(Entry):
     """A mechanism file; it has one of `urdf` and `mjcf`.
 
@@ -95,3 +103,4 @@ class Description(Entry):
     max_condition: Annotated[float, Field(ge=1, allow_inf_nan=False)] | None = None
     accuracy: NonNegative | None = None
     task: TaskEntry | None = None
+    interference: InterferenceEntry | None = None

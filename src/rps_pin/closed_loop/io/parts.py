@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED, JointEffects
+from rps_pin.closed_loop.interference.shapes import CollisionShapes
 from rps_pin.errors import ClosureError, InputError
 
 #: Effects at joints, by their names in a description.
@@ -53,6 +54,8 @@ class MechanismParts:
         Revolute joints that the file calls continuous; a home may give their cosine and sine.
     notes
         Sentences on what the reader has decided.
+    collision
+        The links' collision shapes, and the pairs of links that may overlap.
     place_of
         Where the file has a closure, by its name; "" where another file has it. None: not known.
     """
@@ -73,6 +76,7 @@ class MechanismParts:
     task: Mapping[str, Any] | None = None
     continuous: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
+    collision: CollisionShapes = field(default_factory=CollisionShapes, compare=False)
     place_of: Callable[[str], str] | None = field(default=None, compare=False)
 
     def located(self, error: ClosureError) -> ClosureError:

@@ -375,7 +375,7 @@ def test_every_key_of_a_description_is_written_or_known_not_to_be() -> None:
     written = {
         *("name", "urdf", "gravity", "closures", "couplings", "actuated", "home", "merge"),
         *("damping", "friction", "stiffness", "rest", "armature", "friction_speed"),
-        *("characteristic_length", "max_condition", "accuracy", "task"),
+        *("characteristic_length", "max_condition", "accuracy", "task", "interference"),
     }
     assert set(Description.model_fields) == written | elsewhere
 

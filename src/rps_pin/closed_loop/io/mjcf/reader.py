@@ -14,6 +14,7 @@ from rps_pin.closed_loop.column_names import joint_coordinates
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.io.mjcf.actuators import Actuator, read_actuators
 from rps_pin.closed_loop.io.mjcf.closures import read_equalities
+from rps_pin.closed_loop.io.mjcf.collisions import collisions_of
 from rps_pin.closed_loop.io.mjcf.effects import joint_effects, refuse_other_forces
 from rps_pin.closed_loop.io.mjcf.numbers import refuse_wrong_numbers
 from rps_pin.closed_loop.io.mjcf.source import MjcfSource
@@ -78,6 +79,7 @@ def parts_from_mjcf(
         **effects,
         name=source.name,
         notes=unit_doubts(tree.model),
+        collision=collisions_of(tree),
         place_of=partial(_place_of, source, [closure.name for closure in equalities]),
     )
 

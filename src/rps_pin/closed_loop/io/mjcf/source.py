@@ -50,6 +50,8 @@ class MjcfSource:
     told : dict of str to list of str
         What the caller should know of the file, and the places in it: what is in it and is not
         part of the mechanism.
+    without_shapes : str
+        Why shapes were left out; empty if they were not.
 
     Raises
     ------
@@ -66,6 +68,7 @@ class MjcfSource:
         self.name = self._files.name
         self.mujoco = _mujoco()
         self.told: dict[str, list[str]] = {}
+        self.without_shapes = ""
         self._spec, self.model = self._compiled()
         try:
             self.model.names.decode()
@@ -99,7 +102,8 @@ class MjcfSource:
                 spec = without_appearance(self._parsed(), self.mujoco)
                 model = spec.compile()
                 without = "textures, sensors, and shapes that give no mass are left out"
-                self.told[f"MuJoCo: {self._reason(error)}: {without}"] = [self.origin]
+                self.without_shapes = f"MuJoCo: {self._reason(error)}: {without}"
+                self.told[self.without_shapes] = [self.origin]
                 return spec, model
         except (ValueError, RuntimeError) as error:
             why = self._reason(error)

@@ -20,6 +20,7 @@ from rps_pin.closed_loop.io.foreign import refuse_other_formats
 from rps_pin.closed_loop.io.parts import MechanismParts
 from rps_pin.closed_loop.io.unit_doubts import unit_doubts
 from rps_pin.closed_loop.io.urdf.check import check_tree
+from rps_pin.closed_loop.io.urdf.collisions import collisions_of
 from rps_pin.closed_loop.io.urdf.elements import SIMPLE, UrdfFile, UrdfJoint, read_elements
 from rps_pin.closed_loop.io.urdf.extensions import armature_of, look_into_extensions
 from rps_pin.closed_loop.io.urdf.inertials import read_inertials
@@ -102,6 +103,7 @@ def parts_from_urdf(path_or_xml: str | os.PathLike[str], root: str = "fixed") ->
         friction={one.name: one.friction for one in moving if one.friction},
         continuous=frozenset(one.name for one in moving if one.kind == "continuous"),
         notes=(*file.all_notes(), *unit_doubts(model)),
+        collision=collisions_of(file),
     )
 
 

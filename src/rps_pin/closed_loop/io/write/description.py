@@ -17,7 +17,12 @@ from rps_pin.closed_loop.io.write.numbers import number
 from rps_pin.closed_loop.io.write.source import Source, coordinates, kind_of, velocities
 
 
-def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, Any]]) -> str:
+def description_text(
+    source: Source,
+    urdf: str,
+    merges: Sequence[Mapping[str, Any]],
+    ignored: Sequence[tuple[str, str]] = (),
+) -> str:
     """Return the description of a tree without rows.
 
     Parameters
@@ -28,6 +33,8 @@ def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, An
         The name of the URDF's file.
     merges
         The entries of ``merge``.
+    ignored
+        Pairs of links that may overlap.
     """
     model, effects = source.model, source.effects
     lines = [f"name: {_value(source.name or 'mechanism')}", f"urdf: {_value(urdf)}"]
@@ -62,6 +69,8 @@ def description_text(source: Source, urdf: str, merges: Sequence[Mapping[str, An
         lines.append(f"accuracy: {number(source.accuracy)}")
     if source.task is not None:
         lines.append(f"task: {_value(_with_offsets(source.task))}")
+    if ignored:
+        lines.append(f"interference: {_value({'ignore': ignored})}")
     return "\n".join(lines) + "\n"
 
 

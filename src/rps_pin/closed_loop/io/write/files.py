@@ -29,8 +29,8 @@ def write_urdf(
     description = target.with_suffix(".yaml")
     told: list[str] = []
     plain = without_rows(source, is_whole)
-    text, merges = urdf_text(plain, shapes, told)
-    described = description_text(plain, target.name, merges)
+    text, merges, ignored = urdf_text(plain, shapes, told)
+    described = description_text(plain, target.name, merges, ignored)
     _write({target: text, description: described}, overwrite)
     _tell(target, told)
     return description

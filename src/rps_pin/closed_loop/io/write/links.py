@@ -39,6 +39,8 @@ class Links:
     ----------
     moved : list of str
         The link that each joint moves; the first is the root link, for the world.
+    of_frames : dict of int to Hung
+        Of each frame of the tree, the link that it stands for, and its placement in the joint.
     hung : list of Hung
         Where each joint begins; the first means nothing.
     fixed : list of FixedLink
@@ -51,11 +53,11 @@ class Links:
         self._joint_names = Names([*model.names, *(frame.name for frame in model.frames)])
         self._used: set[str] = set()
         #: Of each frame, its link; with the link's placement in the joint's frame.
-        self._links: dict[int, Hung] = {}
+        self.of_frames: dict[int, Hung] = {}
         self.moved = [self._moved(joint) for joint in range(model.njoints)]
         self.fixed: list[FixedLink] = []
         for index in range(1, model.nframes):
-            if index not in self._links:
+            if index not in self.of_frames:
                 self.fixed.append(self._fixed(index))
         self.hung = [Hung("", pin.SE3.Identity())]
         self.hung += [self._hung(joint) for joint in range(1, model.njoints)]
@@ -70,7 +72,7 @@ class Links:
         wanted = f"{self._model.names[joint]}_link" if joint else "base"
         name = self._link_name(frames[bodies[0]].name if bodies else None, wanted)
         for index in ends + bodies[:1]:
-            self._links[index] = Hung(name, pin.SE3.Identity())
+            self.of_frames[index] = Hung(name, pin.SE3.Identity())
         return name
 
     def _fixed(self, index: int) -> FixedLink:
@@ -87,7 +89,7 @@ class Links:
             body, joint = (behind or [-1])[0], frame.name
         name = self._link_name(frames[body].name if body >= 0 else None, f"{frame.name}_link")
         for one in {index, body} - {-1}:
-            self._links[one] = Hung(name, frame.placement)
+            self.of_frames[one] = Hung(name, frame.placement)
         return FixedLink(name, joint or self._joint_names.fresh(f"{frame.name}_fixed"), below)
 
     def _link_name(self, given: str | None, wanted: str) -> str:
@@ -98,7 +100,7 @@ class Links:
 
     def _below(self, frame: pin.Frame) -> Hung:
         """Return where a frame is, in the link of the frame before it."""
-        before = self._links.get(frame.parentFrame)
+        before = self.of_frames.get(frame.parentFrame)
         at_joint = Hung(self.moved[frame.parentJoint], pin.SE3.Identity())
         same = self._model.frames[frame.parentFrame].parentJoint == frame.parentJoint
         link, at = before if before is not None and same else at_joint
@@ -110,7 +112,7 @@ class Links:
         parent = model.parents[joint]
         for frame in model.frames:
             if frame.type == _JOINT and frame.parentJoint == joint:
-                link, at = self._links[frame.parentFrame]
+                link, at = self.of_frames[frame.parentFrame]
                 if model.frames[frame.parentFrame].parentJoint == parent:
                     return Hung(link, at.actInv(placement))
         return Hung(self.moved[parent], placement)

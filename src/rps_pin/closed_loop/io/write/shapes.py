@@ -1,13 +1,27 @@
-"""Shapes of links as the ``visual`` elements of a URDF."""
+"""Shapes of links as the ``visual`` and ``collision`` elements of a URDF."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import pinocchio as pin
 from lxml import etree
 
+from rps_pin.closed_loop.interference.shapes import CollisionShapes, LinkShape, MeshFile
+from rps_pin.closed_loop.io.urdf.packages import file_of
+from rps_pin.closed_loop.io.write.links import Hung
 from rps_pin.closed_loop.io.write.numbers import number, numbers
+from rps_pin.errors import InputError, few
+
+_NAMES = {
+    "sphere": ("radius",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+    "ellipsoid": ("a", "b", "c"),
+}
 
 
 def add_visuals(link: Any, shapes: pin.GeometryModel, joint: int) -> None:
@@ -45,3 +59,74 @@ def _form(shape: Any) -> tuple[str, dict[str, str]] | None:
         sizes = {"radius": number(form.radius), "length": number(2 * form.halfLength)}
         return kind.lower(), sizes
     return None
+
+
+# Collision shapes ---------------------------------------------------------------------------------
+
+
+def add_collisions(
+    robot: Any,
+    model: pin.Model,
+    links: Mapping[int, Hung],
+    shapes: CollisionShapes,
+    told: list[str],
+) -> list[tuple[str, str]]:
+    """Add shapes to the links of a URDF; return the pairs of links that may overlap.
+
+    Parameters
+    ----------
+    robot
+        The root element.
+    model, links
+        The tree, and of each of its frames the link, with its placement in the joint's frame.
+    shapes
+        The shapes.
+    told
+        Takes a sentence on what is left out.
+    """
+    elements = {link.get("name"): link for link in robot.iter("link")}
+    left_out = list(shapes.faults)
+    written: list[tuple[str, LinkShape]] = []
+    names: dict[str, str] = {}
+    for shape in shapes.shapes:
+        form = _stated(shape)
+        if isinstance(form, str) or not model.existFrame(shape.link, pin.FrameType.BODY):
+            left_out.append(f"{shape.where} ({form if isinstance(form, str) else 'no link'})")
+            continue
+        frame = model.getFrameId(shape.link, pin.FrameType.BODY)
+        hung = links[frame]
+        at = hung.placement.actInv(model.frames[frame].placement * shape.placement)
+        collision = etree.SubElement(elements[hung.link], "collision")
+        angles = numbers(pin.rpy.matrixToRpy(at.rotation))
+        etree.SubElement(collision, "origin", xyz=numbers(at.translation), rpy=angles)
+        etree.SubElement(etree.SubElement(collision, "geometry"), form[0], form[1])
+        names[shape.link] = hung.link
+        written.append((hung.link, shape))
+    if left_out:
+        told.append(f"collision shapes are left out: {few(left_out)}")
+    ignored = [(names.get(a, a), names.get(b, b)) for a, b in shapes.ignored]
+    apart: dict[tuple[str, str], bool] = {}
+    for (a, one), (b, other) in combinations(written, 2):
+        if a != b:
+            apart[a, b] = apart.get((a, b), False) or one.may_touch(other)
+    known = {link.get("name") for link in robot.iter("link")}
+    ignored += [pair for pair, touch in apart.items() if not touch]
+    return [pair for pair in dict.fromkeys(ignored) if known.issuperset(pair)]
+
+
+def _stated(shape: LinkShape) -> tuple[str, dict[str, str]] | str:
+    """Return a shape's element, or why there is none."""
+    if shape.fault:
+        return shape.fault
+    if isinstance(shape.mesh, MeshFile):
+        try:
+            path = file_of(shape.mesh.name, Path(shape.mesh.beside)).absolute()
+        except InputError as error:
+            return str(error)
+        return "mesh", {"filename": str(path), "scale": numbers(shape.mesh.scale)}
+    if shape.kind == "box":
+        return "box", {"size": numbers(shape.sizes)}
+    if shape.kind in _NAMES:
+        words = zip(_NAMES[shape.kind], shape.sizes, strict=True)
+        return shape.kind, {name: number(size) for name, size in words}
+    return f"a {shape.kind} that no file has"

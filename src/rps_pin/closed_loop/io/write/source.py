@@ -19,8 +19,10 @@ from rps_pin.closed_loop.column_names import joint_coordinates, named_velocities
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.dynamics.passive_joint_forces import JointEffects
 from rps_pin.closed_loop.editing.rebuild import JointRow, NewJoint, rebuilt
+from rps_pin.closed_loop.interference.shapes import CollisionShapes
 from rps_pin.errors import MechanismError, shown
 
+_NO_SHAPES = CollisionShapes()
 #: Axes count as perpendicular below this cosine.
 PERPENDICULAR = 1e-9
 #: Limits from here on bound nothing; MuJoCo's mjMAXVAL.
@@ -40,8 +42,8 @@ class Source(NamedTuple):
         A closed configuration, shape (nq,), or None if the mechanism has none.
     characteristic_length
         m.
-    max_condition, accuracy, task
-        Of `ClosedLoopModel`.
+    max_condition, accuracy, task, collision
+        Of `ClosedLoopModel`; the last with the collision shapes.
     """
 
     model: pin.Model
@@ -54,6 +56,7 @@ class Source(NamedTuple):
     max_condition: float
     accuracy: float | None = None
     task: Mapping[str, Any] | None = None
+    collision: CollisionShapes = _NO_SHAPES
 
 
 _IN_XML = re.compile("[\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")

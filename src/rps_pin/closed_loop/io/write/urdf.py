@@ -24,7 +24,7 @@ from lxml import etree
 from rps_pin.closed_loop.io.urdf.inertials import gross_fault
 from rps_pin.closed_loop.io.write.links import Hung, Links
 from rps_pin.closed_loop.io.write.numbers import number, numbers
-from rps_pin.closed_loop.io.write.shapes import add_visuals
+from rps_pin.closed_loop.io.write.shapes import add_collisions, add_visuals
 from rps_pin.closed_loop.io.write.source import (
     Names,
     Source,
@@ -59,8 +59,10 @@ def is_whole(joint: Any) -> bool:
 
 def urdf_text(
     source: Source, shapes: pin.GeometryModel | None, told: list[str]
-) -> tuple[str, list[dict[str, Any]]]:
-    """Return the URDF of a tree without rows (see `without_rows`), and the merges it needs.
+) -> tuple[str, list[dict[str, Any]], list[tuple[str, str]]]:
+    """Return the URDF of a tree without rows (see `without_rows`), and what its description needs.
+
+    That are the merges, and the pairs of links that may overlap.
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ class _Urdf:
         self._robot = etree.Element("robot", name=source.name or "mechanism", nsmap=spaces)
         self._merges: list[dict[str, Any]] = []
 
-    def text(self) -> tuple[str, list[dict[str, Any]]]:
+    def text(self) -> tuple[str, list[dict[str, Any]], list[tuple[str, str]]]:
         for joint in range(self._model.njoints):
             if joint:
                 self._add_joint(joint)
@@ -100,8 +102,11 @@ class _Urdf:
         for name, joint_name, below in self._links.fixed:
             self._joint(joint_name, "fixed", below, name)
             etree.SubElement(self._robot, "link", name=name)
+        ignored = add_collisions(
+            self._robot, self._model, self._links.of_frames, self._source.collision, self._told
+        )
         etree.indent(self._robot, space="  ")
-        return str(etree.tostring(self._robot, encoding="unicode")) + "\n", self._merges
+        return str(etree.tostring(self._robot, encoding="unicode")) + "\n", self._merges, ignored
 
     def _add_link(self, joint: int) -> None:
         link = etree.SubElement(self._robot, "link", name=self._links.moved[joint])
