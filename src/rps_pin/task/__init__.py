@@ -10,7 +10,13 @@ from rps_pin.task.maps import TaskState
 from rps_pin.task.motion.limits import MotionLimits
 from rps_pin.task.motion.time_optimal import time_optimal
 from rps_pin.task.path_check import check_path
-from rps_pin.task.paths.events import LimitEvent, PathCheck, SingularityEvent
+from rps_pin.task.paths.events import (
+    InterferenceEvent,
+    LimitEvent,
+    PathCheck,
+    PathInterference,
+    SingularityEvent,
+)
 from rps_pin.task.paths.limits import Cone
 from rps_pin.task.polytope import Ball, Polytope
 from rps_pin.task.singularity import SingularityMeasures
@@ -25,10 +31,12 @@ __all__ = [
     "Ball",
     "Cone",
     "DriveLimits",
+    "InterferenceEvent",
     "JointLoad",
     "LimitEvent",
     "MotionLimits",
     "PathCheck",
+    "PathInterference",
     "Payload",
     "Polytope",
     "SingularityEvent",

@@ -20,11 +20,12 @@ from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.loads import Loads, Payload
 from rps_pin.task.paths.events import PathCheck
 from rps_pin.task.paths.findings import GRAZE, check_signals, sample_times
+from rps_pin.task.paths.interference import path_interference
 from rps_pin.task.paths.limits import Cone
 from rps_pin.task.paths.signals import TaskSignals
 from rps_pin.task.task import Task
 from rps_pin.trajectories.path import Trajectory
-from rps_pin.validation import positive_number, whole_number
+from rps_pin.validation import non_negative_number, positive_number, whole_number
 
 
 @refuses_other_kinds
@@ -39,6 +40,9 @@ def check_path(
     tolerance: float | None = None,
     threshold: float = GRAZE,
     actuators: bool = True,
+    interference: bool | None = None,
+    clearance: float = 0.0,
+    ignore: Sequence[tuple[str, str]] = (),
     least_steps: int = 250,
     max_step: float = 0.02,
 ) -> PathCheck:
@@ -69,6 +73,14 @@ def check_path(
         A smallest distance below this is a graze. Distances are those of `SingularityMeasures`.
     actuators
         Whether speeds and forces of the actuators are checked.
+    interference
+        Whether pairs of links are checked for interference; left out, where the mechanism has
+        collision shapes and all can be read. See `ClosedLoopModel.interference`.
+    clearance
+        Least distance of two links, m.
+    ignore
+        Pairs of links, by name, that may overlap: ``[("arm", "cover")]``; those of the description
+        need not be named.
     least_steps, max_step
         How dense the path is sampled: at least so many steps, each of at most so much of every
         coordinate over the characteristic length. See the module's text for what that guarantees.
@@ -82,13 +94,15 @@ def check_path(
     ------
     InputError
         If a number is out of its range, or the trajectory's samples are not finite and of the
-        task's coordinates.
+        task's coordinates; if interference is asked for, and there are no collision shapes, or one
+        cannot be read.
     ClosureError, SingularityError
         If the first pose cannot be reached.
     MechanismError
-        If a cone's frame is unknown, or a task of joints is to carry a load.
+        If a cone's frame or a link is unknown, or a task of joints is to carry a load.
     """
     threshold = positive_number(threshold, "threshold")
+    least = non_negative_number(clearance, "clearance", "m")
     loads = Loads(task, payload, wrench)
     if loads.wrench is not None and loads.wrench.ndim != 1:
         raise InputError(f"wrench has shape {loads.wrench.shape}; along a path it must be (6,)")
@@ -96,7 +110,9 @@ def check_path(
     steps = whole_number(least_steps, "least_steps")
     times = sample_times(path, steps, positive_number(max_step, "max_step"))
     times = path.follow(times, near)
-    return with_end(check_signals(path, times, threshold), path)
+    links = path_interference(path, interference, least, ignore)
+    found = with_end(check_signals(path, times, threshold), path)
+    return found._replace(interference=links)
 
 
 def with_end(found: PathCheck, path: TaskSignals) -> PathCheck:

@@ -87,6 +87,80 @@ class LimitEvent(NamedTuple):
         )
 
 
+class InterferenceEvent(NamedTuple):
+    """Two links begin or cease to overlap, or to be nearer than the clearance."""
+
+    kind: str
+    """``"begins"``, ``"ends"``, ``"starts inside"`` (at the path's start; it ends later), or
+    ``"throughout"`` (from the start to the end of what was checked: one event)."""
+    link_a: str
+    """Name of a link."""
+    link_b: str
+    """Name of the other."""
+    time: float
+    """When, s."""
+    width: float
+    """Width of the bracket around `time`, s."""
+    pose: Array
+    """The task's coordinates at that time, m and rad."""
+    clearance: float
+    """m."""
+    where: str
+    """The pose in words."""
+
+    def __str__(self) -> str:
+        near = f"nearer than {self.clearance:.6g} m"
+        how = {
+            "begins": f"come {near}" if self.clearance else "begin to interfere",
+            "ends": f"are no longer {near}" if self.clearance else "come apart",
+            "starts inside": f"are {near} at the start"
+            if self.clearance
+            else "interfere at the start",
+            "throughout": f"are {near} on the whole path"
+            if self.clearance
+            else "interfere on the whole path",
+        }[self.kind]
+        width = f" (+- {self.width / 2:.1g} s)" if self.kind in ("begins", "ends") else ""
+        return f"{self.time:.9f} s: {self.link_a} and {self.link_b} {how}{width}; {self.where}"
+
+
+class PathInterference(NamedTuple):
+    """Interference of links along a path."""
+
+    events: tuple[InterferenceEvent, ...]
+    """In order of time."""
+    pairs: int
+    """How many pairs of links were checked."""
+    clearance: float
+    """Least distance that was asked for, m."""
+    minimum_distance: float
+    """Least signed distance of a pair, m: negative in interference, infinite if none is checked."""
+    minimum_links: tuple[str, str]
+    """Names of its links."""
+    minimum_time: float
+    """When, s."""
+    hidden: float
+    """Largest depth, m, of a contact between two samples that would not be found, if the links move
+    no faster between samples than at them."""
+    skipped: str = ""
+    """Why nothing was checked; empty if it was."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether no pair comes nearer than the clearance, or nothing was checked."""
+        return not self.events
+
+    def __str__(self) -> str:
+        if self.skipped:
+            return f"interference: {self.skipped}"
+        a, b = self.minimum_links
+        return (
+            f"interference: {self.pairs} pairs of links, least distance "
+            f"{self.minimum_distance:.6g} m ({a} and {b}) at t = {self.minimum_time:.9g} s "
+            f"(clearance {self.clearance:.6g} m)"
+        )
+
+
 class PathCheck(NamedTuple):
     """What `check_path` found."""
 
@@ -112,21 +186,33 @@ class PathCheck(NamedTuple):
     """Longest time between two of them, s: within it, no signal may turn more than once."""
     minimum_pose: Array
     """(z, tilt_x, tilt_y), or the task's coordinates, where the smallest distance is reached."""
+    interference: PathInterference | None = None
+    """Of the links; None if it was not asked for."""
 
     @property
     def ok(self) -> bool:
-        """Whether the path meets no singularity and keeps every limit."""
-        return not (self.singularities or self.limits)
+        """Whether the path meets no singularity, keeps every limit, and no links interfere."""
+        return not (self.singularities or self.limits or self.touching)
+
+    @property
+    def touching(self) -> tuple[InterferenceEvent, ...]:
+        """The events of interference."""
+        return () if self.interference is None else self.interference.events
 
     def lines(self) -> list[str]:
         """Return the findings as lines to read: a summary, then one for each event in time."""
-        events: list[SingularityEvent | LimitEvent] = [*self.singularities, *self.limits]
+        events: list[SingularityEvent | LimitEvent | InterferenceEvent] = [
+            *self.singularities,
+            *self.limits,
+            *self.touching,
+        ]
         events.sort(key=lambda event: event.time)
         return [
             f"{self.duration:.6g} s, {self.samples} samples: {_counted(self)}",
             f"smallest distance to a singularity: {self.minimum_distance:.4g} "
             f"({self.minimum_singularity}) at t = {self.minimum_time:.9g} s "
             f"(threshold {self.threshold:.3g})",
+            *([] if self.interference is None else [str(self.interference)]),
             *map(str, events),
         ]
 
@@ -141,9 +227,14 @@ def _counted(check: PathCheck) -> str:
     ends = any(event.kind == "ends" for event in check.singularities)
     near = len(check.singularities) - crossings - ends
     outside = sum(event.kind != "returns" for event in check.limits)
+    touching = {(event.link_a, event.link_b) for event in check.touching}
+    which = "1 pair of links interferes"
+    if len(touching) > 1:
+        which = f"{len(touching)} pairs of links interfere"
+    met = f"; {which}" if touching else ""
     return (
         f"crosses singularities {crossings} times, grazes or stays in them {near} times, "
-        f"leaves limits {outside} times{', and its assembly mode ends' if ends else ''}"
+        f"leaves limits {outside} times{', and its assembly mode ends' if ends else ''}{met}"
     )
 
 

@@ -268,8 +268,7 @@ class Findings:
         sign = self.sign[step, signal]
 
         def falling(times: Array, which: Indices) -> Bools:
-            rates = self.path.rates(times)
-            return np.asarray(sign[which] * rates[np.arange(which.size), signal[which]] < 0)
+            return np.asarray(sign[which] * self._rates_at(times, signal[which]) < 0)
 
         low, high = bisected(falling, self.times[step], self.times[step + 1], self.path.tolerance)
         middle = (low + high) / 2
@@ -297,6 +296,10 @@ class Findings:
         if not times.size:
             return np.zeros(0)
         return np.asarray(self.path.signals(times)[0][np.arange(times.size), signal])
+
+    def _rates_at(self, times: Array, signal: Indices) -> Array:
+        """Return the rate of one signal at each time, shape (n,)."""
+        return np.asarray(self.path.rates(times)[np.arange(times.size), signal])
 
     def _continuous(self, zeros: _Brackets) -> _Brackets:
         """Leave out jumps, where a signal may have them."""

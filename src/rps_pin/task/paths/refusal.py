@@ -28,7 +28,14 @@ def require_clear(
     SingularityError
         If it crosses a singularity or stays in one, or the assembly mode ends: says when and where.
     """
-    found = check_path(task, trajectory, near=near, least_steps=least_steps, actuators=False)
+    found = check_path(
+        task,
+        trajectory,
+        near=near,
+        least_steps=least_steps,
+        actuators=False,
+        interference=False,
+    )
     outside = [event for event in found.limits if event.kind != "returns"]
     if outside:
         more = f"; limits are left {len(outside)} times in all" if outside[1:] else ""

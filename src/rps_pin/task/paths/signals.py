@@ -52,7 +52,7 @@ class TaskSignals:
         loads: Loads | None = None,
         actuators: bool = True,
     ) -> None:
-        self._task, self._trajectory = task, trajectory
+        self.task, self._trajectory = task, trajectory
         self._loads = Loads(task) if loads is None else loads
         self.duration, self.tolerance = checked_times(trajectory, tolerance)
         self.scale = task.scale / task.characteristic_length
@@ -91,13 +91,13 @@ class TaskSignals:
 
     def _begin(self, x: Array, near: ArrayLike | None) -> Array:
         try:
-            return self._task.configuration(x, near, within_limits=False)
+            return self.task.configuration(x, near, within_limits=False)
         except RPSPinError as error:
             error.args = (f"at t = 0 s: {error}", *error.args[1:])
             raise
 
     def _continued(self, x: Array, near: Array) -> Array:
-        return self._task.configuration(x, near, within_limits=False)
+        return self.task.configuration(x, near, within_limits=False)
 
     def _ending(self, times: Array, high: float, found: list[Array]) -> Array:
         """Bracket where the assembly mode ends; return the times up to there."""
@@ -108,7 +108,7 @@ class TaskSignals:
                 low = middle
             except (ClosureError, SingularityError):
                 high = middle
-        measures = self._task.singularities(q)
+        measures = self.task.singularities(q)
         of_rows, of_input = abs(float(measures.constraint)), float(measures.type_i)
         kind = "constraint" if of_rows < of_input else "type I"
         pose = self.sample(np.array([low]))[0][0]
@@ -124,7 +124,7 @@ class TaskSignals:
                 f"at t = 0 s the path begins where the assembly mode ends, near a {kind} "
                 f"singularity ({self.end.distance:.3g}): it cannot be followed",
                 np.inf,
-                self._task.mechanism.max_condition,
+                self.task.mechanism.max_condition,
             )
         return times
 
@@ -136,7 +136,7 @@ class TaskSignals:
 
     def signals(self, times: Array) -> tuple[Array, Array]:
         """Return every signal and its rate at times (n,), shape (n, signals) each."""
-        motion = self._state(times)
+        motion = self.state(times)
         rooms, changes = self._exact(*motion)
         values = self._by_differences(motion[2])
         rates = self._differences(times, values)
@@ -144,25 +144,18 @@ class TaskSignals:
 
     def rates(self, times: Array) -> Array:
         """Return the rates alone at times (n,)."""
-        return self._ordered(self._differences(times), self._exact(*self._state(times))[1])
+        return self._ordered(self._differences(times), self._exact(*self.state(times))[1])
 
     def matters(self, sizes: Array, slopes: Array, steps: Array, threshold: float) -> Bools:
         """Return which turning points may be the nearest to a singularity, or beyond a limit.
 
-        A signal falls at most four times as far in a step as the cubic with its values and slopes
-        does.
+        See `lowest`.
         """
-        first, last = sizes[:-1], sizes[1:]
-        low, high = slopes[:-1] * steps[:, None], slopes[1:] * steps[:, None]
-        s = np.linspace(0.0, 1.0, 33)[:, None, None]
-        cubic = (1 - s) ** 2 * ((1 + 2 * s) * first + s * low)
-        cubic = cubic + s**2 * ((3 - 2 * s) * last - (1 - s) * high)
-        least = np.minimum(first, last)
-        lowest = least - 4 * np.maximum(least - cubic.min(axis=0), 0.0)
         kinds = len(self.kinds)
         near = max(float(np.abs(sizes[:, :kinds]).min()), threshold)
         bound = np.where(np.arange(sizes.shape[1]) < kinds, near, 0.0)
-        return np.asarray((lowest <= bound) | ~np.isfinite(lowest))
+        least = lowest(sizes, slopes, steps)
+        return np.asarray((least <= bound) | ~np.isfinite(least))
 
     def may_jump(self, values: Array) -> Bools:
         """Return False: the path ends before a measure could jump."""
@@ -170,14 +163,14 @@ class TaskSignals:
 
     def where(self, pose: Array) -> str:
         """Return a pose in words."""
-        named = zip(self._task.coordinates, self._task.angular, pose, strict=True)
+        named = zip(self.task.coordinates, self.task.angular, pose, strict=True)
         return ", ".join(
             f"{name} = {value:.6g} {'rad' if turns else 'm'}" for name, turns, value in named
         )
 
     def states(self) -> tuple[Array, TaskState]:
         """Return the times that were followed, and the motion of all joints there."""
-        return self._times, self._state(self._times)[2]
+        return self._times, self.state(self._times)[2]
 
     def _exact(self, pose: Array, rate: Array, state: TaskState) -> tuple[Array, Array]:
         """Return the rooms of positions and speeds and their rates, (n, limits) each."""
@@ -199,17 +192,17 @@ class TaskSignals:
         if times is self._times and values is not None:
             step = _FIRST * last
             to = np.where(times + step <= last, times + step, times - step)
-            change = self._by_differences(self._state(to)[2]) - values
+            change = self._by_differences(self.state(to)[2]) - values
             return np.asarray(change / (to - times)[:, None])
         before, after = (times + sign * _STEP * last for sign in (-1, 1))
         before, after = before.clip(0.0), after.clip(None, last)
-        change = self._by_differences(self._state(after)[2])
-        change = change - self._by_differences(self._state(before)[2])
+        change = self._by_differences(self.state(after)[2])
+        change = change - self._by_differences(self.state(before)[2])
         return np.asarray(change / (after - before)[:, None])
 
     def _by_differences(self, state: TaskState) -> Array:
         """Return the measures and the rooms of forces, shape (n, 3 + forces)."""
-        measures = self._task.singularities(state.q)
+        measures = self.task.singularities(state.q)
         # Where an input moves alone, type II is not determined.
         signed = np.where(np.isnan(measures.type_ii), 1.0, measures.signed_type_ii)
         columns = [signed, measures.constraint, measures.type_i]
@@ -225,23 +218,38 @@ class TaskSignals:
         room = np.where(np.isnan(tau[:, which]), -_ENDLESS, limit - sign * tau[:, which])
         return np.concatenate([np.stack(columns, axis=-1), room], axis=-1)
 
-    def _state(self, times: Array) -> tuple[Array, Array, TaskState]:
+    def state(self, times: Array) -> tuple[Array, Array, TaskState]:
         """Return poses, rates, and the motion of all joints at times (n,)."""
         pose, rate, acceleration = self._motion(times)
         if times is self._times:
             q = self._q
         else:
             before = np.searchsorted(self._times, times, side="right") - 1
-            q = self._task.configuration(pose, self._q[before], within_limits=False)
-        return pose, rate, self._task.motion(q, rate, acceleration)
+            q = self.task.configuration(pose, self._q[before], within_limits=False)
+        return pose, rate, self.task.motion(q, rate, acceleration)
 
     def _motion(self, times: Array) -> tuple[Array, Array, Array]:
-        found, size = self._trajectory.sample(times), self._task.size
+        found, size = self._trajectory.sample(times), self.task.size
         pose, rate, acceleration = (
             checked_samples(getattr(found, name), times, name, size)
             for name in ("pose", "rate", "acceleration")
         )
         return pose, rate, acceleration
+
+
+def lowest(sizes: Array, slopes: Array, steps: Array) -> Array:
+    """Return how far signals may fall in each step, shape (n, signals).
+
+    That is at most four times as far as the cubic with the values and slopes at both ends does; of
+    signals' sizes and slopes (n + 1, signals) at samples `steps` (n,) apart, s.
+    """
+    first, last = sizes[:-1], sizes[1:]
+    low, high = slopes[:-1] * steps[:, None], slopes[1:] * steps[:, None]
+    s = np.linspace(0.0, 1.0, 33)[:, None, None]
+    cubic = (1 - s) ** 2 * ((1 + 2 * s) * first + s * low)
+    cubic = cubic + s**2 * ((3 - 2 * s) * last - (1 - s) * high)
+    least = np.minimum(first, last)
+    return np.asarray(least - 4 * np.maximum(least - cubic.min(axis=0), 0.0))
 
 
 def _actuators(task: Task, field: str, quantity: str, units: tuple[str, str]) -> tuple[Signal, ...]:
