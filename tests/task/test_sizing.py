@@ -94,6 +94,14 @@ def test_up_and_down_on_three_upright_legs() -> None:
     assert {one["name"] for one in data["joints"]} >= {"leg_1_prismatic", "leg_1"}
 
 
+def test_text_is_returned_in_a_notebook_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    sheet = size_trajectory(lift(), UP, 20.0)
+    plain = sheet.text(100)
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    assert sheet.text(100) == plain
+    assert "leg_1_prismatic" in plain
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_the_3_rps_s_sheet_and_causes_come_out_without_closed_forms(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -211,7 +211,9 @@ class SizingSheet:
     def text(self, width: int = 100) -> str:
         """Return the table as plain text."""
         written = io.StringIO()
-        Console(file=written, width=width, color_system=None).print(self.table())
+        # In a notebook, a console would show what it prints there, and write nothing.
+        console = Console(file=written, width=width, color_system=None, force_jupyter=False)
+        console.print(self.table())
         return written.getvalue()
 
     def __str__(self) -> str:
