@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.codegen.engine.batches import Errors, by_samples
+from rps_pin.one_thread import guarded
 
 
 class Forces(NamedTuple):
@@ -59,14 +60,13 @@ class PinocchioEngine:
         """Return T, (..., nv, m)."""
         return self._each(self._mechanism.motion_basis, (q,), (self._nv, self._count), errors)
 
+    @guarded("_mechanism.system.guard")
     def gaps(self, q: ArrayLike, errors: Errors = "raise") -> Array:
         """Return the gaps of the closures' rows, (..., nc)."""
+        gaps = self._mechanism.system.equations.gaps
+        return self._each(gaps, (q,), (self._mechanism.constraint_size,), errors)
 
-        def answer(q: Array) -> Array:
-            return self._mechanism.loop_errors(q).position
-
-        return self._each(answer, (q,), (self._mechanism.constraint_size,), errors)
-
+    @guarded("_mechanism.system.guard")
     def closed(self, q: ArrayLike, errors: Errors = "raise") -> Array:
         """Return q, (..., nq), refused where the loops are open."""
         system = self._mechanism.system
