@@ -36,27 +36,8 @@ from rps_pin.task.motion.time_search import KEPT
 from rps_pin.trajectories.point_to_point import LineCurve
 from rps_pin.trajectories.spline import ChordSpline
 from tests.task import robots
+from tests.task.slides import ALONG, BACK, MASS, WAY, slide
 from tests.worst import worst
-
-WAY, MASS = 0.3, 2.0
-ALONG = LineCurve([0.1], [0.1 + WAY])
-BACK = LineCurve([0.1 + WAY], [0.1])
-
-
-@cache
-def slide(axis: str = "1 0 0", damping: float = 0.0) -> Task:
-    """A mass of 2 kg on a slide, without limits."""
-    mechanism = ClosedLoopModel.from_urdf(
-        f"""<robot name="slide"><link name="base"/>
-        <link name="mass"><inertial><mass value="{MASS}"/>
-        <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-        <joint name="slide" type="prismatic"><parent link="base"/><child link="mass"/>
-        <axis xyz="{axis}"/><limit lower="-1" upper="1" effort="1e9" velocity="1e9"/>
-        <dynamics damping="{damping}"/></joint></robot>""",
-        closures=[],
-        actuated=["slide"],
-    )
-    return Task(mechanism, joints=["slide"]).compile()
 
 
 def assert_shortest(found: float, expected: float) -> None:
@@ -365,7 +346,6 @@ def test_pinocchio_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ({"limits": ActuatorLimits(10.0)}, "they must be MotionLimits"),
         ({"limits": MotionLimits(force=math.inf)}, "no limit of force"),
-        ({"limits": MotionLimits(force=10.0, jerk=5.0)}, "jerk limit"),
         ({"limits": MotionLimits(force=-1.0)}, "force limit = -1.0: it must be positive"),
         ({"limits": MotionLimits(force=math.nan)}, "force limit"),
         ({"limits": MotionLimits(force="much")}, "force limit"),

@@ -77,13 +77,21 @@ class CurveDynamics(AnyCurveDynamics):
         jacobian = leg_jacobians(self.robot.parameters, place.pose).length_jacobian
         return np.asarray(np.einsum("...ij,...j->...i", jacobian, place.first))
 
-    def use_along(self, u: Array, square: Array, acceleration: Array) -> LimitUse:
+    def jerk_slopes(self, place: CurveSample) -> tuple[Array, Array]:
+        """Return nothing: limits of jerk are those of a task."""
+        none = np.empty((*place.pose.shape[:-1], 0))
+        return none, none
+
+    def use_along(
+        self, u: Array, square: Array, acceleration: Array, jerk: Array | None = None
+    ) -> LimitUse:
         """Return forces and speeds over their limits at parameters, u'^2 and u'' of shape (...)."""
         return self.use(self.sample(u, square, acceleration))
 
     def use(self, motion: PathSample) -> LimitUse:
         """Return forces and speeds of a sampled motion over their limits."""
-        return self.use_of(self._forces(*motion), self.robot.motion(*motion)[1].speed)
+        force, speed = self._forces(*motion), self.robot.motion(*motion)[1].speed
+        return self.use_of(force, speed, np.empty((*force.shape[:-1], 0)))
 
     def _forces(self, x: Array, rate: Array, acceleration: Array) -> Array:
         return self.robot.actuator_forces(x, rate, acceleration, wrench=self.wrench)

@@ -1,4 +1,4 @@
-"""Curves that are given for time scaling: what has one, and where its rate must be zero."""
+"""Curves that are given for time scaling: what has one, where its rate must be zero, and jumps."""
 
 from __future__ import annotations
 
@@ -16,6 +16,10 @@ from rps_pin.trajectories.path import PathSample, Trajectory
 POINTS = 4001
 #: First and second derivatives are zero below these parts of the largest first derivative.
 _NO_TANGENT, _NO_CURVATURE = 1e-6, 1e-2
+#: Changes of the second derivative below this part of the first, over the length, are no jumps.
+_NO_JUMP = 1e-6
+#: How often the interval of the largest change is halved.
+_HALVINGS = 16
 
 
 @dataclass(frozen=True)
@@ -104,3 +108,40 @@ def ends_at_rest(curve: Curve, size: Array) -> tuple[bool, bool]:
             "along, with a tangent everywhere (of a spline, its poses without times)"
         )
     return not without[0], not without[-1]
+
+
+def refuse_infinite_jerk(curve: Curve, size: Array, rest: tuple[bool, bool]) -> None:
+    """Refuse a curve along which no motion has a finite jerk.
+
+    Parameters
+    ----------
+    curve, size
+        As for `ends_at_rest`.
+    rest
+        What that returns.
+
+    Raises
+    ------
+    InputError
+        If the curve has no tangent at an end, or its second derivative jumps.
+    """
+    if not all(rest):
+        at = "beginning" if not rest[0] else "end"
+        raise InputError(
+            f"the curve has no tangent at its {at}: with a limit of jerk, u would begin there like "
+            "t^1.5. Give a curve with a tangent everywhere (of a spline, its poses without times)"
+        )
+    low, high = 0.0, curve.length
+    for parts in (POINTS - 1, *[2] * _HALVINGS):  # towards the largest change
+        u = np.linspace(low, high, parts + 1)
+        change = np.linalg.norm(np.diff(curve.at(u).second * size, axis=0), axis=-1)
+        largest = int(np.argmax(change))
+        if parts != 2:
+            first = change[largest]
+        low, high = u[largest], u[largest + 1]
+    tangent = np.linalg.norm(curve.at(u).first * size, axis=-1).max()
+    if change.max() > first / 2 and first * curve.length > _NO_JUMP * tangent:
+        raise InputError(
+            f"the curve's second derivative jumps at u = {low:.6g} of {curve.length:.6g}: a motion "
+            "through there has no finite jerk"
+        )

@@ -15,7 +15,12 @@ from rps_pin.task.task import Task
 from rps_pin.validation import numbers
 
 #: Unit of a quantity of a translation, and of a rotation.
-_UNITS = {"force": ("N", "N m"), "speed": ("m/s", "rad/s"), "acceleration": ("m/s^2", "rad/s^2")}
+_UNITS = {
+    "force": ("N", "N m"),
+    "speed": ("m/s", "rad/s"),
+    "acceleration": ("m/s^2", "rad/s^2"),
+    "jerk": ("m/s^3", "rad/s^3"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +42,9 @@ class MotionLimits:
     coordinate_acceleration: ArrayLike | None = None
     """Of the task's coordinates, m/s^2 or rad/s^2; left out, none."""
     jerk: ArrayLike | None = None
-    """Not possible, and refused."""
+    """Of the actuators, m/s^3 or rad/s^3; left out, none."""
+    coordinate_jerk: ArrayLike | None = None
+    """Of the task's coordinates, m/s^3 or rad/s^3; left out, none."""
 
     def of(self, task: Task) -> CurveLimits:
         """Return the least and largest of each quantity of a task.
@@ -46,14 +53,8 @@ class MotionLimits:
         ------
         InputError
             If a limit is not a number, of another shape, on the wrong side of zero, or infinite in
-            one direction only; if there is neither one of forces nor one of accelerations, or one
-            of jerk.
+            one direction only; if there is none of forces, accelerations or jerks.
         """
-        if self.jerk is not None:
-            raise InputError(
-                "jerk limit: a motion can be scaled to limits of force, speed and acceleration, "
-                "not of jerk; resample it with an S-curve (point_to_point) where jerk matters"
-            )
         model, actuated = task.mechanism.model, task.mechanism.actuated_indices
         force = np.asarray(model.effortLimit, dtype=np.float64)[actuated]
         speed = np.asarray(model.velocityLimit, dtype=np.float64)[actuated]
@@ -64,11 +65,13 @@ class MotionLimits:
             _ranges(self.coordinate_acceleration, size, "coordinate_acceleration"),
             _ranges(speed if self.speed is None else self.speed, count, "speed"),
             _ranges(self.coordinate_speed, size, "coordinate_speed"),
+            _finite_ranges(self.jerk, count, "jerk"),
+            _finite_ranges(self.coordinate_jerk, size, "coordinate_jerk"),
         )
-        if not np.isfinite(found.levels).any():
+        if not (np.isfinite(found.levels).any() or found.jerks.size):
             raise InputError(
-                "the actuators have no limit of force, and nothing has one of acceleration: any "
-                "time can be made shorter. Give limits=MotionLimits(force=...)"
+                "the actuators have no limit of force, and nothing has one of acceleration or "
+                "jerk: any time can be made shorter. Give limits=MotionLimits(force=...)"
             )
         return found
 
@@ -81,7 +84,9 @@ def sides_of(task: Task, limits: CurveLimits) -> tuple[str, ...]:
     levels += _named(limits.coordinate_acceleration, coordinates, "acceleration")
     speeds = _named(limits.speed, actuators, "speed")
     speeds += _named(limits.coordinate_speed, coordinates, "speed")
-    return (*(f"{one} +" for one in levels), *(f"{one} -" for one in levels), *speeds)
+    jerks = _named(limits.jerk, actuators, "jerk")
+    jerks += _named(limits.coordinate_jerk, coordinates, "jerk")
+    return (*(f"{one} +" for one in levels), *(f"{one} -" for one in levels), *speeds, *jerks)
 
 
 def unit(quantity: str, angular: bool) -> str:
@@ -91,6 +96,12 @@ def unit(quantity: str, angular: bool) -> str:
 
 def _named(ranges: Array, names: tuple[str, ...], what: str) -> list[str]:
     return [f"{name} {what}" for name in names[: ranges.shape[-1]]]
+
+
+def _finite_ranges(given: Any, size: int, what: str) -> Array:
+    """Return the ranges, or none if all of them are infinite."""
+    found = _ranges(given, size, what)
+    return found if np.isfinite(found).any() else np.empty((2, 0))
 
 
 def _ranges(given: Any, size: int, what: str) -> Array:
@@ -113,6 +124,7 @@ def _ranges(given: Any, size: int, what: str) -> Array:
         raise InputError(f"{what} limit: the least {least.tolist()} must be below the largest")
     if "force" not in what and not ((least < 0) & (largest > 0)).all():
         raise InputError(f"{what} limit: the least must be negative, and the largest positive")
-    if "speed" not in what and (np.isfinite(least) != np.isfinite(largest)).any():
+    either = "speed" in what or "jerk" in what  # which have a limit in one direction each
+    if not either and (np.isfinite(least) != np.isfinite(largest)).any():
         raise InputError(f"{what} limit: both the least and the largest must be finite, or neither")
     return found

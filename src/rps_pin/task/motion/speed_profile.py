@@ -73,6 +73,11 @@ class SpeedProfile:
         self.times = read_only(np.append(0.0, np.cumsum(steps)))
 
     @property
+    def pieces(self) -> int:
+        """How many pieces there are."""
+        return len(self.bump)
+
+    @property
     def length(self) -> float:
         """Largest u."""
         return float(self.knots[-1])

@@ -117,6 +117,17 @@ class TaskDynamics(CurveDynamics):
             return speed
         return np.concatenate([speed, place.curve.first], axis=-1)
 
+    def jerk_slopes(self, place: Place) -> tuple[Array, Array]:
+        """Return first and second derivatives by u of what has limits of jerk, (..., j) each."""
+        parts = [(place.curve.first[..., :0], place.curve.second[..., :0])]
+        if self.bounds.jerk.size:
+            actuators = place.velocity, place.acceleration
+            parts.append((actuators[0][..., self._actuated], actuators[1][..., self._actuated]))
+        if self.bounds.coordinate_jerk.size:
+            parts.append((place.curve.first, place.curve.second))
+        first, second = zip(*parts, strict=True)
+        return np.concatenate(first, axis=-1), np.concatenate(second, axis=-1)
+
     def infeasible(self) -> InfeasibleError:
         """Return the error of a curve without a time law: the forces at rest exceed their limits.
 

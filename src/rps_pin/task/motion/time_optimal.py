@@ -2,7 +2,8 @@
 
 Limits of forces, accelerations and speeds are linear in u'' and u'^2 (see `curve_dynamics`), and
 the shortest time is a convex program (see `fastest_profile`), which is solved repeatedly (see
-`time_search`).
+`time_search`). With limits of jerk the program is not convex: a local optimum is found from that
+motion (see `jerk.jerk_search`).
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, MechanismError, shown
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.task.motion.curves import curve_of, ends_at_rest
+from rps_pin.task.motion.curves import curve_of, ends_at_rest, refuse_infinite_jerk
+from rps_pin.task.motion.jerk.jerk_search import JerkSearch
 from rps_pin.task.motion.limited_motion import LimitedMotion
 from rps_pin.task.motion.limits import MotionLimits
 from rps_pin.task.motion.task_dynamics import TaskDynamics
@@ -48,8 +50,11 @@ def time_optimal(
         jumps should have the parameters where it does in an attribute ``knots``: otherwise the time
         found can be a per cent too long.
     limits
-        Of forces, speeds and accelerations; the forces and speeds of the model if left out. With
-        more actuators than coordinates, forces are those of least norm.
+        Of forces, speeds, accelerations and jerks; the forces and speeds of the model if left out.
+        With more actuators than coordinates, forces are those of least norm. With limits of jerk,
+        the motion begins and ends with zero acceleration, and the time is a local optimum: no small
+        change of the time law makes it shorter, by more than some tenths of a per mille to a per
+        mille, which is the width of its pieces.
     wrench
         Constant wrench that the surroundings exert on the output frame: force (N) and moment (N m)
         about its origin, in world axes, shape (6,).
@@ -64,13 +69,15 @@ def time_optimal(
     -------
     LimitedMotion
         A `TimedCurve` with its use of the limits, which are kept to `KEPT` of each, at places
-        within the pieces of its time law and at some thousands of times.
+        within the pieces of its time law and at some thousands of times. Its
+        `without_jerk_limits` is the shortest time without limits of jerk.
 
     Raises
     ------
     InputError
-        If there is no shortest time (no limit of force or acceleration), a limit of jerk is given,
-        the path is not a path, or its first and second derivatives are zero at some point.
+        If there is no shortest time (no limit of force, acceleration or jerk), the path is not a
+        path, or its first and second derivatives are zero at some point. With a limit of jerk, also
+        if the curve has no tangent at an end, or its second derivative jumps.
     MechanismError
         If there are fewer actuators than coordinates; if a task of joints is to take a wrench.
     ClosureError, SingularityError
@@ -95,9 +102,17 @@ def time_optimal(
     if load is not None and task.frame is None:
         raise MechanismError("a task of joints has no output frame for a wrench")
     rest = ends_at_rest(curve, task.scale)
+    if bounds.jerks.size:
+        refuse_infinite_jerk(curve, task.scale, rest)
     dynamics = TaskDynamics(task, curve, bounds, load, near)
-    search = TimeSearch(dynamics, rest, int(intervals), dynamics.infeasible)
-    return LimitedMotion(dynamics, search.run(progress))
+    free = None
+    if np.isfinite(bounds.levels).any():
+        other = dynamics.without_jerk_limits()
+        search = TimeSearch(other, rest, int(intervals), other.infeasible)
+        free = search.run(progress)
+    if free is not None and not bounds.jerks.size:
+        return LimitedMotion(dynamics, free)
+    return LimitedMotion(dynamics, JerkSearch(dynamics, free, int(intervals)).run(progress), free)
 
 
 def _refuse_other_coordinates(task: Task, curve: Curve) -> None:

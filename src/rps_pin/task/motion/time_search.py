@@ -17,7 +17,7 @@ import numpy as np
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import RPSPinError
-from rps_pin.task.motion.curve_dynamics import ACTIVE, CurveDynamics, CurveTerms
+from rps_pin.task.motion.curve_dynamics import ACTIVE, CurveDynamics, CurveTerms, breaks_of
 from rps_pin.task.motion.fastest_profile import ProfileLimits, fastest_profile
 from rps_pin.task.motion.speed_profile import SpeedProfile
 
@@ -249,6 +249,6 @@ def _first_knots(dynamics: CurveDynamics, intervals: int) -> Array:
         more = knots[1] / 4.0 ** np.arange(1, 5)
         knots = np.concatenate([knots, more, length - more])
     # Where pieces of a curve meet, forces have a kink.
-    inner = np.asarray(getattr(dynamics.curve, "knots", ()), dtype=np.float64)
+    inner = breaks_of(dynamics.curve)[1:-1]
     near = np.abs(inner[:, None] - knots).min(axis=1, initial=math.inf) < 1e-3 * knots[1]
-    return np.sort(np.concatenate([knots, inner[(inner > 0) & (inner < length) & ~near]]))
+    return np.sort(np.concatenate([knots, inner[~near]]))

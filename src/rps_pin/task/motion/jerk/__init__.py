@@ -1,0 +1,1 @@
+"""The shortest time under limits of jerk: time laws of constant jerk, by linear programs."""
