@@ -1,5 +1,8 @@
 """Ticks over all float64 numbers, as many as asked: ``python -m tests.control.float_ticks``.
 
+With ``--robots delta stewart ankle`` those of controllers of a task, by generated ticks and without
+(the maps and the dynamics are generated code in both).
+
 A run of some ticks is drawn as `test_every_float` draws it: bit patterns, special numbers, powers
 of ten, and numbers near a good reading. It starts from a reset; then a good tick must give the bits
 that it gave first, whatever came before. NumPy raises where it would warn.
@@ -9,13 +12,15 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import math
 import time
 import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cache
+from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
@@ -27,6 +32,7 @@ from rps_pin.control.loop.controller import Controller
 from rps_pin.control.loop.gains import Gains
 from rps_pin.rps.dynamics.loads import Payload
 from tests.control.conftest import none_built
+from tests.control.tasks import start, task
 from tests.worst import worst
 
 START = (0.223, 0.02, -0.01)
@@ -35,6 +41,7 @@ ROBOT = RPSRobot(
     Payload(0.1, [0.0, 0.01, 0.02], np.diag([2e-5, 3e-5, 4e-5])),
 )
 LENGTH = tuple(ROBOT.inverse_kinematics(START).length.tolist())
+TASKS = ("delta", "stewart", "ankle")
 
 SPECIAL_NUMBERS = [
     *(0.0, -0.0, 5e-324, -5e-324, 2.0**-1022, 1e-162, 1e154, -1e154, 1.4e154, 1e300, -1e300),
@@ -48,21 +55,46 @@ LAWS: dict[str, tuple[type[Controller], dict[str, Any]]] = {
     "PD in task space": (PDControl, {"space": "task", "compensation": "feed_forward", **NO_JUMP}),
 }
 ENGINES = ("generated", "interpreted")
-#: Ticks of a run, as many numbers as they need, and how many runs are drawn at once.
-RUN, NUMBERS, BLOCK = 8, 17, 500
+#: Ticks of a run, and how many runs are drawn at once.
+RUN, BLOCK = 8, 500
+
+
+class Subject(NamedTuple):
+    """A robot whose controllers are asked."""
+
+    robot: Any
+    start: tuple[float, ...]
+    length: tuple[float, ...]
+    """Positions of the actuators there."""
+    limit: tuple[float, ...]
+    """Of the actuators' forces."""
+
+
+RPS = Subject(ROBOT, START, LENGTH, (ROBOT.parameters.actuator_force_limit,) * 3)
+
+
+@cache
+def subject(name: str) -> Subject:
+    """Return a robot of `TASKS`, in generated code."""
+    one, x = task(name), start(name)
+    q, actuated = one.configuration(x), one.mechanism.actuated_indices
+    limit = one.mechanism.model.effortLimit[actuated]
+    length = q[one.of_actuators]
+    return Subject(one, tuple(x.tolist()), tuple(length.tolist()), tuple(limit.tolist()))
 
 
 class Draws:
     """Random numbers of every kind, drawn in blocks."""
 
-    def __init__(self, seed: int) -> None:
-        self._rng = np.random.default_rng(seed)
+    def __init__(self, seed: int, of: Subject = RPS) -> None:
+        self._rng, self._of = np.random.default_rng(seed), of
         self.exponents = np.zeros(2048, dtype=bool)
 
     def runs(self) -> Iterator[list[tuple[Any, Any, Any, float | None]]]:
         """Yield the arguments of runs of ticks without end."""
+        count = len(self._of.start)
         while True:
-            size = BLOCK, RUN, NUMBERS
+            size = BLOCK, RUN, 5 * count + 2
             rng, kind = self._rng, self._rng.integers(0, 8, size)
             bits = rng.integers(0, 2**64, size, dtype=np.uint64, endpoint=False)
             found = bits.view(np.float64)
@@ -76,24 +108,29 @@ class Draws:
             # What follows good readings meets the law; in some runs all are.
             near = rng.random((BLOCK, RUN, 5)) < rng.choice([0.3, 0.8, 1.0], (BLOCK, 1, 1))
             left_out = rng.random((BLOCK, RUN, 4))
-            shift = rng.uniform(-1e-4, 1e-4, (BLOCK, RUN, 15))
+            shift = rng.uniform(-1e-4, 1e-4, (BLOCK, RUN, 5 * count))
             for values, close, missing, small in zip(found, near, left_out, shift, strict=True):
-                yield [_tick(*one) for one in zip(values, close, missing, small, strict=True)]
+                rows = zip(values, close, missing, small, strict=True)
+                yield [_tick(self._of, *one) for one in rows]
 
 
-def _tick(values: Any, close: Any, missing: Any, small: Any) -> tuple[Any, Any, Any, float | None]:
+def _tick(
+    of: Subject, values: Any, close: Any, missing: Any, small: Any
+) -> tuple[Any, Any, Any, float | None]:
     """Return length, target, speed and dt: each any numbers, good ones, or left out."""
-    triples = [values[3 * k : 3 * k + 3] for k in range(5)]
-    centres = (LENGTH, START, None, None, None)
+    count = len(of.start)
+    rows = [values[count * k : count * (k + 1)] for k in range(5)]
+    centres = (of.length, of.start, None, None, None)
     for k, centre in enumerate(centres):
         if close[k]:
-            triples[k] = small[3 * k : 3 * k + 3] + (0.0 if centre is None else np.array(centre))
-    length, pose, rate, acceleration, speed = (tuple(triple.tolist()) for triple in triples)
+            offset = small[count * k : count * (k + 1)]
+            rows[k] = offset + (0.0 if centre is None else np.array(centre))
+    length, pose, rate, acceleration, speed = (tuple(row.tolist()) for row in rows)
     return (
         None if missing[0] < 0.05 else length,
         None if missing[1] < 0.4 else (pose, rate, acceleration),
         None if missing[2] < 0.4 else speed,
-        None if missing[3] < 0.4 else 1e-3 if missing[3] < 0.7 else float(values[15]),
+        None if missing[3] < 0.4 else 1e-3 if missing[3] < 0.7 else float(values[5 * count]),
     )
 
 
@@ -120,12 +157,14 @@ class Report:
         )
 
 
-def ticks_of(controller: Controller, name: str, count: int, draws: Draws) -> Report:
+def ticks_of(
+    controller: Controller, name: str, count: int, draws: Draws, of: Subject = RPS
+) -> Report:
     """Compute ticks of a controller, in runs from a reset each."""
     report, begin = Report(name), time.perf_counter()
-    limit, flags = ROBOT.parameters.actuator_force_limit, list(Status)
-    controller.reset(START)
-    controller.tick(LENGTH)
+    flags = list(Status)
+    controller.reset(of.start)
+    controller.tick(of.length)
     first, code = controller.forces.tobytes(), controller._generated
     for run in draws.runs():
         if report.ticks >= count:
@@ -143,16 +182,16 @@ def ticks_of(controller: Controller, name: str, count: int, draws: Draws) -> Rep
                     raise
                 continue
             report.statuses.update([flag.name for flag in flags if flag in status] or ["OK"])
-            share = worst([force / limit for force in controller.forces.tolist()])
+            share = worst(np.abs(controller.forces) / of.limit)
             report.largest = worst(report.largest, share)
             finite = all(np.isfinite(one).all() for one in controller.estimate.answers)
             if not (share <= 1.0 and finite and 0.05 <= controller.pace <= 1.0 and text):
                 report.faults.append(f"{name}: forces {controller.forces} after tick({given})")
-        controller.reset(START)
-        controller.tick(LENGTH)
+        controller.reset(of.start)
+        controller.tick(of.length)
         if controller.forces.tobytes() != first:
             report.faults.append(f"{name}: other forces of a good tick after {run!r}")
-        controller.reset(START)
+        controller.reset(of.start)
     report.seconds = time.perf_counter() - begin
     return report
 
@@ -210,13 +249,31 @@ def run(count: int, *, seed: int = 0) -> Iterator[Report]:
             assert draws.exponents.all() or count < 10_000  # every exponent that there is
 
 
+def run_task(name: str, count: int, *, seed: int = 0) -> Iterator[Report]:
+    """Yield reports of the controllers of a task: of each engine `count` ticks, of all laws."""
+    of, share = subject(name), math.ceil(count / len(LAWS))
+    for engine_name in ENGINES:
+        with _engine(engine_name):
+            draws = Draws(seed, of)
+            for law, (kind, options) in LAWS.items():
+                made = kind(of.robot, of.start, Gains.placed(15.0, integral=0.2), **options)
+                if engine_name == "interpreted":
+                    made._generated = made.estimate.generated = None
+                yield ticks_of(made, f"{name}, {engine_name}, {law}", share, draws, of)
+
+
 def main() -> int:
     """Print the reports; return 1 if there is a fault."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--ticks", type=int, default=1_000_000, help="of each engine")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--robots", nargs="+", choices=TASKS, help="controllers of these tasks")
     given, faults, ticks = parser.parse_args(), 0, 0
-    for report in run(given.ticks, seed=given.seed):
+    reports = run(given.ticks, seed=given.seed)
+    if given.robots:
+        each = (run_task(name, given.ticks, seed=given.seed) for name in given.robots)
+        reports = itertools.chain.from_iterable(each)
+    for report in reports:
         print(report, flush=True)
         for fault in report.faults[:5]:
             print("   ", fault)

@@ -333,6 +333,17 @@ def test_it_stops_near_a_singularity_and_refuses_targets_there() -> None:
     assert "stopped: near a type II singularity" in one.status_text
 
 
+def test_the_task_of_a_3_rps_has_its_closed_forms() -> None:
+    one, other = (
+        ComputedTorque(robot, start("rps"), Gains.placed(15.0)) for robot in (ROBOT.task, ROBOT)
+    )
+    assert one.engine == other.engine
+    reading = ROBOT.inverse_kinematics(start("rps")).length
+    for each in (one, other):
+        assert each.tick(reading + 1e-5) == Status.OK
+    np.testing.assert_array_equal(one.forces, other.forces)
+
+
 # Every float --------------------------------------------------------------------------------------
 
 BITS = st.integers(0, 2**64 - 1).map(lambda bits: struct.unpack("<d", struct.pack("<Q", bits))[0])

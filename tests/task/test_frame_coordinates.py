@@ -123,7 +123,7 @@ def test_dynamics_with_coordinates_has_its_derivatives(name) -> None:
     rate, acceleration = rng.normal(size=(2, one.size))
 
     def motion(x, rate):
-        start = one._joined(one.configuration(x, near=q[0]), x)
+        start = one.joined(one.configuration(x, near=q[0]), x)
         v = m.velocity(start, rate)
         return start, v, m.acceleration(start, v, acceleration)
 

@@ -286,6 +286,14 @@ class Unit:
                 wanted.update(one.calls)
         return (one for one in self.functions if one.name in wanted)
 
+    def local(self, end: str) -> str:
+        """Return the entries and what they call as local functions, with names that end in `end`.
+
+        To stand after ``scalar.h`` in a text with others.
+        """
+        parts = ["#undef PART", f"#define PART(name) name##_part_{end}"]
+        return "\n".join([*parts, *_renamed(list(self._needed()), end)])
+
     # For Python ---------------------------------------------------------------------------------
 
     @property

@@ -67,6 +67,18 @@ class ControlModel(Protocol):
         """Return the state after a time at the last rate; None where there is none."""
         ...
 
+    def numbers(self) -> dict[str, Any]:
+        """Return what generated code takes of the robot."""
+        ...
+
+    def setpoint_memory(self, geometry: Any) -> dict[str, Any]:
+        """Return what generated code's next tick takes of the target's geometry."""
+        ...
+
+    def setpoint_geometry(self, memory: dict[str, Any]) -> Any:
+        """Return the geometry of the target in generated code's memory."""
+        ...
+
     def forces(self, geometry: Any, rate: Any, acceleration: Any) -> Any:
         """Return the actuator forces of a motion; None where they are not determined."""
         ...

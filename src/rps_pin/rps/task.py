@@ -34,6 +34,11 @@ class RPSTask(Task):
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self._robot,)
 
+    @property
+    def robot(self) -> Any:
+        """The `RPSRobot`."""
+        return self._robot
+
     def compile(self, **options: Any) -> RPSTask:
         """Return the same task of the robot in generated code; see `RPSRobot.compile`."""
         return RPSTask(self._robot.compile(**options))

@@ -25,7 +25,7 @@ from rps_pin.closed_loop.constraints.rotation_vector import MOST_TURN
 from rps_pin.codegen.engine.batches import Errors
 from rps_pin.errors import InputError, MechanismError, RPSPinError, few
 from rps_pin.numerics.linear_algebra import null_space, rank, singular_values
-from rps_pin.task.coordinates import of_frame, of_joints
+from rps_pin.task.coordinates import Extended, of_frame, of_joints
 from rps_pin.task.engine import PinocchioEngine
 from rps_pin.validation import numbers, positive_number
 
@@ -133,6 +133,21 @@ class TaskMaps:
         return len(self.coordinates)
 
     @property
+    def rank(self) -> int:
+        """Rank of J at regular configurations."""
+        return self._rank
+
+    @property
+    def extension(self) -> Extended:
+        """How the extended mechanism holds the coordinates."""
+        return self._x
+
+    @property
+    def engines(self) -> tuple[Any, Any]:
+        """What computes the extended mechanism and the mechanism: engines of the same calls."""
+        return self._by_task, self._by_actuators
+
+    @property
     def output_frame(self) -> tuple[str | None, pin.SE3]:
         """Name of the output frame, none of a task of joints, and the placement of it there."""
         return self._x.frame, self._x.placement
@@ -200,7 +215,7 @@ class TaskMaps:
         if not self._x.added:
             return np.asarray(q_[..., self._x.idx_q])
         about = np.zeros(self.size) if near is None else self._rows(near, self.size, "near")
-        whole = self._joined(q_, about)
+        whole = self.joined(q_, about)
         held = whole[..., self._x.idx_q]
         gaps = self._by_task.gaps(whole, **options_of(errors))
         return np.asarray(held - gaps[..., self._x.rows])
@@ -254,7 +269,7 @@ class TaskMaps:
         q = self.mechanism.home if near is None else self._rows(near, self._nq, "near")
         if self._x.added:
             start = self.at(q, wanted, errors=errors)
-            q = self._joined(q, start)
+            q = self.joined(q, start)
         found = self._by_task.complete(wanted, q, **_continued(within_limits, errors))
         return np.asarray(found[..., : self._nq])
 
@@ -528,9 +543,12 @@ class TaskMaps:
 
     def _whole(self, q: Array, errors: Errors) -> Array:
         """Return configurations of the extended mechanism."""
-        return self._joined(q, self.at(q, errors=errors)) if self._x.added else q
+        return self.joined(q, self.at(q, errors=errors)) if self._x.added else q
 
-    def _joined(self, q: Array, x: Array) -> Array:
+    def joined(self, q: Array, x: Array) -> Array:
+        """Return configurations of the extended mechanism, with the frame's coordinates in them."""
+        if not self._x.added:
+            return q
         batch = np.broadcast_shapes(q.shape[:-1], x.shape[:-1])
         whole = np.empty((*batch, self._nq + self._x.added))
         whole[..., : self._nq] = q

@@ -9,8 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.control.any_task.motion import TaskAnswers, TaskGeometry, TaskJacobian, TaskMotion
+from rps_pin.control.any_task.motion import (
+    TaskAnswers,
+    TaskGeometry,
+    TaskJacobian,
+    TaskMotion,
+    departure,
+)
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, floats
+from rps_pin.control.generated.code import GeneratedTick
 from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.status import STATUSES, Status
@@ -25,7 +32,13 @@ from rps_pin.validation import numbers, positive_number, real_vector
 REFUSED = (RPSPinError, ArithmeticError, np.linalg.LinAlgError, ValueError)
 #: Of jumps and speeds where the model has no limit, per characteristic length (or rad).
 _JUMP, _SPEED = 0.05, 2.0
-_LARGEST = 1e6
+#: Of positions and of speeds, beyond which they are out of range.
+_LARGEST, _LARGEST_SPEED = 1e6, 1e9
+#: Largest change of a position, and of a target, that is followed in one tick: its way is followed
+#: step by step. In rad or characteristic lengths.
+FARTHEST = 10.0
+#: Joints are beyond their limits by more than that, m or rad.
+_SLACK = 1e-9
 
 
 class TaskEstimate(DeepCopied):
@@ -50,8 +63,8 @@ class TaskEstimate(DeepCopied):
         `SingularityMeasures.distance` below which the status has `Status.NEAR_SINGULAR`.
     largest_jump
         Largest difference of an actuator's position from its prediction, for each tick since the
-        last good one: one number or na, m or rad. Default: 1.2 times what the speed limits allow,
-        at most 0.05 rad or characteristic lengths.
+        last good one: one number or na, m or rad; 10 rad or characteristic lengths at most.
+        Default: 1.2 times what the speed limits allow, at most 0.05 rad or characteristic lengths.
 
     Attributes
     ----------
@@ -63,8 +76,6 @@ class TaskEstimate(DeepCopied):
         Ticks since the last good result.
     elapsed : float
         Time since then, s.
-    state : TaskMotion
-        The last good motion.
 
     Raises
     ------
@@ -103,7 +114,8 @@ class TaskEstimate(DeepCopied):
         self._fastest = limit
         self._period = positive_number(period, "period", "s")
         default = np.minimum(1.2 * limit * period, _JUMP * self._scale)
-        self._jump = default if largest_jump is None else _jump(largest_jump, count)
+        given = default if largest_jump is None else _jump(largest_jump, count)
+        self._jump = np.minimum(given, FARTHEST * self._scale)
         cut_off = positive_number(cut_off, "cut_off", "Hz", infinite=True)
         self._filter = SpeedFilter(cut_off, arrays(count))
         self._near = positive_number(near_singular, "near_singular")
@@ -111,14 +123,15 @@ class TaskEstimate(DeepCopied):
         model = mechanism.model
         sizes = (task.size, task.size, count, count, model.nq)
         self.answers = TaskAnswers(*(np.zeros(size) for size in sizes))
-        #: Generated code of a whole tick, which a task has not.
-        self.generated: None = None
+        #: Generated code of a controller's ticks.
+        self.generated: GeneratedTick | None = None
         self.reset(near)
 
     def reset(self, near: ArrayLike) -> None:
         """Start again from a pose, at rest. Raises as the constructor does."""
         x = real_vector(near, self.task.size, "near")
         q = self.task.configuration(x)
+        self._begin()
         still = np.zeros(self._count)
         geometry = self.geometry_of(q, x)
         self._filter.reset()
@@ -129,6 +142,62 @@ class TaskEstimate(DeepCopied):
             TaskMotion(geometry, np.zeros(self.task.size), still, self._jacobian(geometry))
         )
         self._filter.reset()
+
+    # Generated code -------------------------------------------------------------------------------
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what generated code takes of this object: see `form_of_task`."""
+        scale, limits = self._scale, self._limits
+        bounds = {"lower": limits.lower - _SLACK, "upper": limits.upper + _SLACK}
+        found = {"most": _LARGEST * scale, "most_speed": _LARGEST_SPEED * scale}
+        found |= {"fastest": self._fastest, "jump": self._jump}
+        found |= bounds if limits.q.size else {}
+        return {name: row.tolist() for name, row in found.items()} | {"near": self._near}
+
+    def memory(self) -> dict[str, Any]:
+        """Return what the next tick starts from."""
+        geometry, rate, speed, _ = self._state
+        return {
+            **self.place_of(geometry, ("whole", "reference", "values")),
+            "pose": geometry.pose.tolist(),
+            "position": geometry.length.tolist(),
+            "rate": rate.tolist(),
+            "speed": speed.tolist(),
+            "started": 0.0 if self._filter.last is None else 1.0,
+        }
+
+    def place_of(self, geometry: TaskGeometry, names: tuple[str, str, str]) -> dict[str, Any]:
+        """Return a configuration, and the Jacobian there with its first and last singular value."""
+        task, q = self.task, geometry.configuration
+        whole = task.joined(q, geometry.pose)
+        J = task.mechanism.system.scaled(task.engines[1].jacobian(q))
+        found = {names[0]: whole.tolist()}
+        if J.size:
+            found[names[1]] = J.ravel().tolist()
+        values = np.linalg.svd(J, compute_uv=False) if J.size else np.ones(1)
+        last = values[task.rank - 1] if task.rank else values[0]
+        return found | {names[2]: [float(last), float(values[0])]}
+
+    def take(self, memory: dict[str, Any]) -> None:
+        """Set the state from generated code's memory."""
+        x, rate, speed = (np.array(memory[name], ndmin=1) for name in ("pose", "rate", "speed"))
+        q = np.array(memory["whole"], ndmin=1)[: self.task.mechanism.model.nq]
+        geometry = self.geometry_of(q, x)
+        self._state = TaskMotion(geometry, rate, speed, self._jacobian(geometry))
+        self._filter.update(geometry.length, speed)
+
+    def _begin(self) -> None:
+        """Take the memory of generated code, whose next tick starts from another."""
+        if self.generated is not None:
+            self.generated.pull()
+            self.generated.ready = False
+
+    @property
+    def state(self) -> TaskMotion:
+        """The last good motion."""
+        if self.generated is not None:
+            self.generated.pull()
+        return self._state
 
     @property
     def type_ii(self) -> float:
@@ -157,6 +226,7 @@ class TaskEstimate(DeepCopied):
         dt
             Time since the last call, s; default: the period.
         """
+        self._begin()
         elapsed = self.elapsed + (self._period if dt is None else elapsed_time(dt))
         if not self.elapsed < elapsed < math.inf:
             return self._keep(flags.BAD_INPUT)
@@ -169,11 +239,11 @@ class TaskEstimate(DeepCopied):
         if d is None or not (np.abs(d) < _LARGEST * self._scale).all():
             return self._keep(flags.BAD_INPUT)
         last = self.state
-        departure = np.abs(d - last.geometry.length - last.speed * elapsed)
-        if not (departure <= self._jump * (self.age + 1)).all():
+        away = departure(d, last.geometry.length, last.speed, elapsed)
+        if not (np.abs(away) <= self._jump * (self.age + 1)).all():
             return self._keep(flags.JUMP)
         speeds = self._filter.after(d, elapsed) if speed is None else floats(speed, self._count)
-        if speeds is None or not np.isfinite(speeds).all():
+        if speeds is None or not (np.abs(speeds) < _LARGEST_SPEED * self._scale).all():
             return self._keep(flags.BAD_INPUT)
         try:
             moved = self._followed(d, speeds, last.geometry)
@@ -212,7 +282,7 @@ class TaskEstimate(DeepCopied):
 
     def beyond(self, q: Array) -> bool:
         """Return whether a joint is beyond its limits of position."""
-        return bool(self._limits.beyond(q, 1e-9).any())
+        return bool(self._limits.beyond(q, _SLACK).any())
 
     def messages(self, q: Array) -> list[str]:
         """Return a sentence for each such joint."""
@@ -261,7 +331,7 @@ class TaskEstimate(DeepCopied):
     # Inner workings -------------------------------------------------------------------------------
 
     def _accept(self, state: TaskMotion) -> Status:
-        self.state = state
+        self._state = state
         geometry, rate, speed, _ = state
         number = 0
         if self.beyond(geometry.configuration) or (np.abs(speed) > self._fastest).any():

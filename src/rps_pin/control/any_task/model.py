@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.control.any_task.estimate import REFUSED, TaskEstimate
+from rps_pin.control.any_task.estimate import FARTHEST, REFUSED, TaskEstimate
 from rps_pin.control.any_task.motion import TaskGeometry, TaskJacobian, TaskMotion
+from rps_pin.control.any_task.tick import generated_task_tick
 from rps_pin.control.estimator.loop_arguments import floats
+from rps_pin.control.generated.code import GeneratedTick
+from rps_pin.control.generated.proof import MakeLoop
 from rps_pin.control.loop.rejoining import rejoining_time
 from rps_pin.control.loop.vectors import arrays
+from rps_pin.errors import ClosureError, CompileError
 from rps_pin.task import Task
 
 _LARGEST = 1e6
@@ -35,7 +39,11 @@ class TaskModel:
         self.task = task
         self.estimate = TaskEstimate(task, near, **settings)
         self.size, self.vectors = task.size, arrays(task.size)
+        self._per_length = task.scale / task.characteristic_length
+        self._nothing = np.full(task.size, np.nan)
         self.units = tuple("rad" if one else "m" for one in task.angular)
+        if task.compiled:  # what is generated when it is first called, is so before the loop
+            self.mass(self.estimate.state.geometry)
         self.engine = "generated code" if task.compiled else "the Pinocchio engine"
         self.largest = _LARGEST * max(1.0, task.characteristic_length)
 
@@ -61,6 +69,13 @@ class TaskModel:
         return "is out of reach"
 
     def _continued(self, pose: Array, near: TaskGeometry) -> TaskGeometry:
+        away = float((np.abs(pose - near.pose) * self._per_length).max())
+        if not away <= FARTHEST:
+            raise ClosureError(
+                f"it is {away:.3g} rad or characteristic lengths from the last one; at most "
+                f"{FARTHEST:g} are followed in a tick",
+                away,
+            )
         q = self.task.configuration(pose, near.configuration, within_limits=False)
         return self.estimate.geometry_of(q, pose)
 
@@ -97,12 +112,48 @@ class TaskModel:
         jacobian = TaskJacobian(K, self.determinant(geometry))
         return TaskMotion(geometry, state.rate, state.speed, jacobian)
 
+    # Generated code -------------------------------------------------------------------------------
+
+    def generated_tick(
+        self, law: str, near: ArrayLike, make: MakeLoop, answers: Any, own: Any, given: Any = None
+    ) -> tuple[GeneratedTick | None, str]:
+        """Return machine code of ticks, if there is any, and what runs; see `generated_task_tick`.
+
+        Without it, the maps and the dynamics are generated code all the same, if the task is.
+        """
+        if not self.task.compiled:
+            return None, self.engine
+        try:
+            tick = generated_task_tick(self.task, law, near, make, answers, own, given)
+        except (CompileError, ImportError) as error:
+            words = str(error).splitlines()[0]
+            return None, f"{self.engine}, called by an interpreted tick: {words}"
+        return tick, tick.engine
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what generated code takes of the robot."""
+        return {**self.estimate.numbers(), "largest": self.largest}
+
+    def setpoint_memory(self, geometry: TaskGeometry) -> dict[str, Any]:
+        """Return what the next tick takes of the target's geometry."""
+        names = ("target", "target_reference", "target_values")
+        place = self.estimate.place_of(geometry, names)
+        return {**place, "target_pose": geometry.pose.tolist()}
+
+    def setpoint_geometry(self, memory: dict[str, Any]) -> TaskGeometry:
+        """Return the geometry of the target in generated code's memory."""
+        q = np.array(memory["target"], ndmin=1)[: self.task.mechanism.model.nq]
+        return self.estimate.geometry_of(q, np.array(memory["target_pose"], ndmin=1))
+
     # Motions and forces ---------------------------------------------------------------------------
 
     def motion(self, geometry: TaskGeometry, rate: Array, acceleration: Array) -> Any:
-        """Return the actuators' speeds and accelerations."""
+        """Return the actuators' speeds and accelerations, NaN if they are not determined."""
         indices = self.task.mechanism.actuated_indices
-        state = self.task.motion(geometry.configuration, rate, acceleration)
+        try:
+            state = self.task.motion(geometry.configuration, rate, acceleration)
+        except REFUSED:
+            return self._nothing, self._nothing
         return state.v[indices], state.a[indices]
 
     def forces(self, geometry: TaskGeometry, rate: Array, acceleration: Array) -> Array | None:
@@ -118,12 +169,18 @@ class TaskModel:
         return self.task.mass_matrix(geometry.configuration)
 
     def pose_rate(self, jacobian: TaskJacobian, speed: Array) -> Array:
-        """Return x' of K x' = the actuators' speeds."""
-        return np.asarray(np.linalg.solve(jacobian.K, speed))
+        """Return x' of K x' = the actuators' speeds, NaN if it is not determined."""
+        return self._solved(jacobian.K, speed)
 
     def force_of_wrench(self, jacobian: TaskJacobian, wrench: Array) -> Array:
-        """Return f of K' f = wrench."""
-        return np.asarray(np.linalg.solve(jacobian.K.T, wrench))
+        """Return f of K' f = wrench, NaN if it is not determined."""
+        return self._solved(jacobian.K.T, wrench)
+
+    def _solved(self, matrix: Array, right: Array) -> Array:
+        try:
+            return np.asarray(np.linalg.solve(matrix, right))
+        except np.linalg.LinAlgError:
+            return self._nothing
 
     def speed_of_rate(self, jacobian: TaskJacobian, rate: Array) -> Array:
         """Return K x'."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rps_pin.arrays import Array
 
@@ -55,3 +55,8 @@ class TaskAnswers(NamedTuple):
     """Their speeds, measured or filtered, shape (na,)."""
     configuration: Array
     """Positions of all joints, shape (nq,)."""
+
+
+def departure(position: Any, last: Any, speed: Any, elapsed: Any) -> Any:
+    """Return positions less the last ones, moved at their speed, m or rad; of arrays or columns."""
+    return position - last - speed * elapsed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -54,7 +55,7 @@ class LegModel(LegFormulas):
         largest_jump: float | None,
         **settings: Any,
     ) -> None:
-        p = robot.parameters
+        p, self._robot = robot.parameters, robot
         super().__init__(float(p.platform_radius))
         self._g, self._radius = float(p.base_radius), float(p.platform_radius)
         self.largest = LARGEST_LENGTH * (self._g + self._radius)
@@ -99,6 +100,22 @@ class LegModel(LegFormulas):
         return StateEstimate(
             geometry, state.rate, state.speed, leg_jacobian(geometry, self._radius)
         )
+
+    def numbers(self) -> dict[str, Any]:
+        """Return what generated code takes of the robot."""
+        terms = self._robot.force_terms
+        own = {one.name: getattr(terms, one.name) for one in fields(terms)}
+        return {**self.estimate.numbers(), **own}
+
+    def setpoint_memory(self, geometry: LegGeometry) -> dict[str, Any]:
+        """Return what the next tick takes of the target's geometry."""
+        return {"target_pose": geometry.pose}
+
+    def setpoint_geometry(self, memory: dict[str, Any]) -> LegGeometry:
+        """Return the geometry of the target in generated code's memory."""
+        geometry = self.geometry(memory["target_pose"])
+        assert geometry is not None  # of a regular tick
+        return geometry
 
     def forces(self, geometry: LegGeometry, rate: Triple, acceleration: Triple) -> Triple | None:
         """Return the actuator forces of a motion, None if they are not determined."""

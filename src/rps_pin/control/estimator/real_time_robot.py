@@ -26,7 +26,7 @@ from rps_pin.control.estimator.state_estimate import StateEstimate, departure, s
 from rps_pin.control.generated.code import NOT_REGULAR, GeneratedDynamics, GeneratedTick
 from rps_pin.control.generated.engine import Compiled, generated_tick
 from rps_pin.control.generated.proof import Ticked
-from rps_pin.control.generated.tick import DYNAMICS, ESTIMATE
+from rps_pin.control.generated.tick import DYNAMICS, ESTIMATE, form_of
 from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
@@ -157,7 +157,9 @@ class RealTimeRobot(DeepCopied):
         own = self._period, self._filter.share, self.take
         self._fast, engine = generated_tick(
             *(compiled, ESTIMATE, _proven_estimate),
-            lambda library: GeneratedTick(ESTIMATE, library, self.answers[:5], *own),
+            lambda library: GeneratedTick(
+                ESTIMATE, form_of(ESTIMATE), library, self.answers[:5], *own
+            ),
         )
         if self._fast is not None:
             self.generated = self._fast
@@ -169,7 +171,9 @@ class RealTimeRobot(DeepCopied):
         """Let generated code compute forces, if there is any."""
         self._dynamics, _ = generated_tick(
             *(compiled, DYNAMICS, _proven_dynamics),
-            lambda library: GeneratedDynamics(DYNAMICS, library, self.answers[5:]),
+            lambda library: GeneratedDynamics(
+                DYNAMICS, form_of(DYNAMICS), library, self.answers[5:]
+            ),
         )
         if self._dynamics is not None:
             terms = self._robot.force_terms

@@ -13,7 +13,7 @@ from numpy import ndarray
 
 from rps_pin.arrays import Array
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, three_floats
-from rps_pin.control.generated.tick import CONTROL_READING, DYNAMICS_READING, form_of
+from rps_pin.control.generated.tick import Form
 from rps_pin.copies import DeepCopied
 from rps_pin.errors import CompileError
 
@@ -24,12 +24,8 @@ if TYPE_CHECKING:
 _TICK = ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
 #: Of a tick that is not regular.
 NOT_REGULAR = -1
-_IN_CONTROL, _IN_DYNAMICS = CONTROL_READING.slices, DYNAMICS_READING.slices
-_LENGTH, _SPEED = _IN_CONTROL["reading"], _IN_CONTROL["reading_speed"]
-_MEASURED, _ELAPSED = _IN_CONTROL["measured"].start, _IN_CONTROL["elapsed"].start
-_SHARE, _GIVEN = _IN_CONTROL["share"].start, _IN_CONTROL["given"].start
-_TARGET = tuple(_IN_CONTROL[name] for name in ("pose", "rate", "acceleration"))
-_MOTION = tuple(_IN_DYNAMICS[name] for name in ("pose", "rate", "acceleration"))
+#: A motion's groups in a reading.
+_MOTION = ("pose", "rate", "acceleration")
 
 
 class _MachineCode(DeepCopied):
@@ -39,10 +35,14 @@ class _MachineCode(DeepCopied):
     ----------
     name
         Of the tick.
+    form
+        Layouts of its arrays.
     library
         Its machine code.
     answers
         Contiguous arrays that a tick writes.
+    floats
+        Turns what a caller gives into a row of finite numbers, or None.
 
     Attributes
     ----------
@@ -55,11 +55,18 @@ class _MachineCode(DeepCopied):
         If an array is not contiguous.
     """
 
-    def __init__(self, name: str, library: Library, answers: Sequence[Array]) -> None:
+    def __init__(
+        self,
+        name: str,
+        form: Form,
+        library: Library,
+        answers: Sequence[Array],
+        floats: Callable[[Any], Any] = three_floats,
+    ) -> None:
         if not all(one.flags.c_contiguous for one in answers):
             raise CompileError("generated code writes to contiguous arrays only", "")
-        self._name = name
-        self._array = np.zeros(sum(layout.size for layout in form_of(name)[:3]))
+        self._name, self._form, self._floats = name, form, floats
+        self._array = np.zeros(sum(layout.size for layout in form[:3]))
         self._answers = tuple(answers)
         self._library = library  # it keeps the code
         self.engine = f"generated code, by {library.compiler}"
@@ -67,7 +74,6 @@ class _MachineCode(DeepCopied):
 
     def _connect(self) -> None:
         """Take the places of the arrays in memory."""
-        self._form = form_of(self._name)
         pointers = [one.ctypes.data for one in self._answers]
         self._pointers = (ctypes.c_void_p * len(pointers))(*pointers)
         self._out = ctypes.c_void_p(ctypes.addressof(self._pointers))  # faster than the array
@@ -75,11 +81,13 @@ class _MachineCode(DeepCopied):
         doubles, (n, m, _) = self._array.data, [layout.size for layout in self._form[:3]]
         self._numbers, self._memory = doubles[:n], doubles[n : n + m]
         self._reading: Any = doubles[n + m :]
+        at = self._form.reading.slices
+        self._motion_at = tuple(at[one] for one in _MOTION if one in at)
         self._tick = _TICK(self._library.address(f"{self._name}_tick"))
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the places in memory: a copy has arrays of its own, and the same code."""
-        left_out = ("_form", "_pointers", "_out", "_x", "_numbers", "_memory", "_reading", "_tick")
+        left_out = ("_pointers", "_out", "_x", "_numbers", "_memory", "_reading", "_tick")
         return {name: value for name, value in self.__dict__.items() if name not in left_out}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -94,8 +102,9 @@ class _MachineCode(DeepCopied):
         """Return one number of the memory."""
         return self._memory[self._form.memory.slices[name].start]
 
-    def _motion_read(self, places: tuple[slice, ...], motion: Any) -> bool:
+    def _motion_read(self, motion: Any) -> bool:
         """Put pose, rate and acceleration of any type into the reading."""
+        places = self._motion_at
         try:
             pose, rate, acceleration = motion
         except Exception:  # of whatever object
@@ -114,7 +123,7 @@ class _MachineCode(DeepCopied):
         return all(self._converted(place, value) for place, value in values)
 
     def _read(self, place: slice, values: Numbers) -> bool:
-        """Put three numbers of any type into the reading."""
+        """Put numbers of any type into the reading."""
         if values.__class__ is ndarray:
             try:
                 self._reading[place] = values
@@ -124,10 +133,10 @@ class _MachineCode(DeepCopied):
         return self._converted(place, values)
 
     def _converted(self, place: slice, values: Numbers) -> bool:
-        three = three_floats(values)
-        if three is not None:
-            self._reading[place] = _doubles(three)
-        return three is not None
+        found = self._floats(values)
+        if found is not None:
+            self._reading[place] = _doubles(found)
+        return found is not None
 
 
 class GeneratedTick(_MachineCode):
@@ -137,7 +146,7 @@ class GeneratedTick(_MachineCode):
     ----------
     name
         `tick.ESTIMATE`, or the name of a law.
-    library, answers
+    form, library, answers, floats
         As for `_MachineCode`.
     period
         Time between two ticks, s.
@@ -157,16 +166,26 @@ class GeneratedTick(_MachineCode):
     def __init__(
         self,
         name: str,
+        form: Form,
         library: Library,
         answers: Sequence[Array],
         period: float,
         share: Callable[[float], float],
         take: Callable[[dict[str, Any]], None],
+        floats: Callable[[Any], Any] = three_floats,
     ) -> None:
-        super().__init__(name, library, answers)
+        super().__init__(name, form, library, answers, floats)
         self._share, self._take, self._period = share, take, period
         self.ready = self.ahead = False
         self._set_time(period)
+
+    def _connect(self) -> None:
+        super()._connect()
+        at = self._form.reading.slices
+        self._length_at, self._speed_at = at["reading"], at["reading_speed"]
+        self._measured_at, self._elapsed_at = at["measured"].start, at["elapsed"].start
+        self._share_at = at["share"].start
+        self._given_at = at["given"].start if "given" in at else -1
 
     def set_memory(self, groups: Mapping[str, Any]) -> None:
         """Set what the next tick starts from."""
@@ -182,7 +201,7 @@ class GeneratedTick(_MachineCode):
     @property
     def measured(self) -> bool:
         """Whether the last tick was given a speed."""
-        return bool(self._reading[_MEASURED])
+        return bool(self._reading[self._measured_at])
 
     def motion(self) -> tuple[memoryview, memoryview]:
         """Return the pose and its rate that the last tick left."""
@@ -190,8 +209,8 @@ class GeneratedTick(_MachineCode):
         return self._memory[at["pose"]], self._memory[at["rate"]]
 
     def _set_time(self, elapsed: float) -> None:
-        self._reading[_ELAPSED] = elapsed
-        self._reading[_SHARE] = self._share(elapsed)
+        self._reading[self._elapsed_at] = elapsed
+        self._reading[self._share_at] = self._share(elapsed)
         self._usual = elapsed == self._period
 
     def estimate(self, length: Numbers, speed: Numbers, dt: float | None) -> int:
@@ -199,16 +218,16 @@ class GeneratedTick(_MachineCode):
         reading = self._reading
         if length.__class__ is ndarray:  # no subclass: it may have masked entries
             try:
-                reading[_LENGTH] = length
+                reading[self._length_at] = length
             except (TypeError, ValueError):
-                if not self._converted(_LENGTH, length):
+                if not self._converted(self._length_at, length):
                     return NOT_REGULAR
-        elif not self._converted(_LENGTH, length):
+        elif not self._converted(self._length_at, length):
             return NOT_REGULAR
         if speed is None:
-            reading[_MEASURED] = 0.0
-        elif self._read(_SPEED, speed):
-            reading[_MEASURED] = 1.0
+            reading[self._measured_at] = 0.0
+        elif self._read(self._speed_at, speed):
+            reading[self._measured_at] = 1.0
         else:
             return NOT_REGULAR
         if dt is not None or not self._usual:
@@ -224,9 +243,9 @@ class GeneratedTick(_MachineCode):
     def control(self, length: Numbers, target: Any, speed: Numbers, dt: float | None) -> int:
         """Compute a regular tick of a controller likewise."""
         if target is None:
-            self._reading[_GIVEN] = 0.0
-        elif self._motion_read(_TARGET, target):
-            self._reading[_GIVEN] = 1.0
+            self._reading[self._given_at] = 0.0
+        elif self._motion_read(target):
+            self._reading[self._given_at] = 1.0
         else:
             return NOT_REGULAR
         return self.estimate(length, speed, dt)
@@ -237,15 +256,16 @@ class GeneratedDynamics(_MachineCode):
 
     def forces(self, pose: Any, rate: Any, acceleration: Numbers) -> int:
         """Compute forces and reactions of a motion: the `Status`, or `NOT_REGULAR`."""
-        if not self._motion_read(_MOTION, (pose, rate, acceleration)):
+        if not self._motion_read((pose, rate, acceleration)):
             return NOT_REGULAR
         return self._forces()
 
     def forces_at(self, pose: memoryview, rate: memoryview, acceleration: Numbers) -> int:
         """Compute the same at the pose and rate that `GeneratedTick.motion` returns."""
-        self._reading[_MOTION[0]] = pose
-        self._reading[_MOTION[1]] = rate
-        return self._forces() if self._read(_MOTION[2], acceleration) else NOT_REGULAR
+        at = self._motion_at
+        self._reading[at[0]] = pose
+        self._reading[at[1]] = rate
+        return self._forces() if self._read(at[2], acceleration) else NOT_REGULAR
 
     def _forces(self) -> int:
         number: int = self._tick(self._x, self._out)
@@ -254,7 +274,7 @@ class GeneratedDynamics(_MachineCode):
     @property
     def pose(self) -> tuple[float, float, float]:
         """The pose of the last call."""
-        z, x, y = self._reading[_MOTION[0]].tolist()
+        z, x, y = self._reading[self._motion_at[0]].tolist()
         return z, x, y
 
 

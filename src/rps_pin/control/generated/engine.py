@@ -20,7 +20,7 @@ _Code = TypeVar("_Code", GeneratedTick, GeneratedDynamics)
 
 HOW_TO_GET = "pip install 'rps-pin[compile]'"
 #: What ticks are made from besides.
-_SOURCES = ("control/estimator", "control/loop", "control/generated", "control/laws.py")
+TICK_SOURCES = ("control/estimator", "control/loop", "control/generated", "control/laws.py")
 
 
 def generated_tick(
@@ -66,33 +66,49 @@ _BUILT: dict[str, Library | CompileError] = {}
 
 
 def built(name: str, make: Callable[..., Any]) -> Library:
-    """Return the proven machine code of a tick; it is looked for once.
+    """Return the proven machine code of a tick of the 3-RPS; it is looked for once.
 
     Raises
     ------
     CompileError
         If there is none and it cannot be built.
     """
-    if name not in _BUILT:
+    refuse_without(name)
+    return built_once(name, lambda: _built(name, make))
+
+
+def refuse_without(name: str) -> None:
+    """Raise `CompileError` if a law has no name, or generated code is switched off."""
+    if not name:
+        raise CompileError("this law has no generated code", "")
+    if os.environ.get("RPS_PIN_COMPILE", "1") == "0":
+        raise CompileError("generated code is switched off by RPS_PIN_COMPILE=0", "")
+
+
+def built_once(key: str, make: Callable[[], Library]) -> Library:
+    """Return the machine code of a key; it is built at the first call of this process.
+
+    Raises
+    ------
+    CompileError
+        If it cannot be built; the same at each call.
+    """
+    if key not in _BUILT:
         try:
-            library = _built(name, make)
-            _BUILT[name] = library
+            library = make()
+            _BUILT[key] = library
             # Of a loop the best code, from its start: not another, built and proven beside it.
             if library.better is not None:
-                _BUILT[name] = library.better.result()
+                _BUILT[key] = library.better.result()
         except CompileError as error:
-            _BUILT.setdefault(name, error)
-    found = _BUILT[name]
+            _BUILT.setdefault(key, error)
+    found = _BUILT[key]
     if isinstance(found, CompileError):
         raise found
     return found
 
 
 def _built(name: str, make: Callable[..., Any]) -> Library:
-    if not name:
-        raise CompileError("this law has no generated code", "")
-    if os.environ.get("RPS_PIN_COMPILE", "1") == "0":
-        raise CompileError("generated code is switched off by RPS_PIN_COMPILE=0", "")
     try:
         version = metadata.version("casadi")
         from rps_pin.codegen.build import Source, build  # noqa: PLC0415
@@ -103,7 +119,7 @@ def _built(name: str, make: Callable[..., Any]) -> Library:
             f"3-RPS control loop, {name}",
             (f"{name}_tick",),
             lambda: tick_texts(name),
-            determined_by=f"{version} {digest_of(*SOURCES, *_SOURCES)}",
+            determined_by=f"{version} {digest_of(*SOURCES, *TICK_SOURCES)}",
         )
         return build(source, lambda library: prove(name, library, make))
     except ImportError as error:  # of CasADi only where nothing is kept

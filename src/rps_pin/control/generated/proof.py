@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -11,6 +11,7 @@ from rps_pin.arrays import Array
 from rps_pin.errors import CompileError
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.task import Task
 
 if TYPE_CHECKING:
     from rps_pin.codegen.build import Library
@@ -27,7 +28,7 @@ _TICKS, _PERIOD = 300, 1e-3
 class Case(NamedTuple):
     """Arguments of a loop's ticks."""
 
-    robot: RPSRobot
+    robot: RPSRobot | Task
     start: Array
     settings: dict[str, Any]
     ticks: list[tuple[Any, Any, Any, float | None]]
@@ -36,7 +37,13 @@ class Case(NamedTuple):
     """Borne by a leg, N: differences of forces are judged by it, those of others by 1e-3."""
 
 
-def prove(name: str, library: Library, make: MakeLoop) -> dict[str, Any]:
+def prove(
+    name: str,
+    library: Library,
+    make: MakeLoop,
+    motions: Iterable[Case] | None = None,
+    tolerance: float = TOLERANCE,
+) -> dict[str, Any]:
     """Compare a generated tick with the interpreted one over motions and faults.
 
     Parameters
@@ -49,6 +56,10 @@ def prove(name: str, library: Library, make: MakeLoop) -> dict[str, Any]:
         Makes a function of length, target, speed and dt that computes a tick, of a robot, a start,
         an engine (the library, or False) and settings of `Controller`. It returns the status, the
         answers by name, and whether generated code computed them.
+    motions
+        What is compared; left out, `cases` of the 3-RPS.
+    tolerance
+        Largest difference relative to the size of what is compared.
 
     Returns
     -------
@@ -58,10 +69,10 @@ def prove(name: str, library: Library, make: MakeLoop) -> dict[str, Any]:
     Raises
     ------
     CompileError
-        If anything differs by more than `TOLERANCE`, or less than half of the ticks is generated.
+        If anything differs by more than the tolerance, or less than half of the ticks is generated.
     """
     worst, generated, ticks = 0.0, 0, 0
-    for number, case in enumerate(cases()):
+    for number, case in enumerate(cases() if motions is None else motions):
         ours, theirs = (
             make(case.robot, case.start, compiled, **case.settings) for compiled in (library, False)
         )
@@ -81,10 +92,10 @@ def prove(name: str, library: Library, make: MakeLoop) -> dict[str, Any]:
                     size = case.weight
                 difference = float(abs(found - expected).max() / max(size, abs(expected).max()))
                 worst = max(worst, difference)
-                if not difference <= TOLERANCE:
+                if not difference <= tolerance:
                     raise CompileError(
                         f"{where}: {what} is {found.tolist()}; it must be {expected.tolist()}, to "
-                        f"{TOLERANCE} of its size",
+                        f"{tolerance} of its size",
                         library.compiler,
                     )
         ticks += len(case.ticks)

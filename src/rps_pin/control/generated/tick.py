@@ -30,7 +30,7 @@ from rps_pin.control.loop.force_limits import recovered_pace
 from rps_pin.control.loop.force_limits import within_limits as forces_within
 from rps_pin.control.loop.limits import none_beyond, within_limits
 from rps_pin.control.loop.setpoints import Setpoint, all_below
-from rps_pin.control.loop.vectors import backward_difference, low_pass, mean, pid
+from rps_pin.control.loop.vectors import TRIPLES, Vectors, backward_difference, low_pass
 from rps_pin.numerics.elementary import Number, select_all
 from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, kernel, symbols
 from rps_pin.rps.generated.forces import TERMS, terms_of
@@ -262,7 +262,7 @@ def _control(
         state,
         setpoint,
         LegFormulas(h),
-        _feedback(numbers, memory, reading, after),
+        feedback_of(TRIPLES, select_all, numbers, memory, reading, after),
         _dynamics(numbers),
     )
     regular = regular * (abs(sum(force)) < math.inf) * forces_within(force, numbers["force_limit"])
@@ -303,24 +303,29 @@ def _forces(numbers: dict[str, Any], reading: dict[str, Any]) -> Tick:
     return Tick(regular, flags.BEYOND_LIMIT * (1.0 - kept), {"determinant": determinant}, answers)
 
 
-def _feedback(
-    numbers: dict[str, Any], memory: dict[str, Any], reading: dict[str, Any], after: dict[str, Any]
+def feedback_of(
+    vectors: Vectors,
+    choose: Callable[[Any, Any, Any], Any],
+    numbers: Mapping[str, Any],
+    memory: Mapping[str, Any],
+    reading: Mapping[str, Any],
+    after: dict[str, Any],
 ) -> Feedback:
-    """Return `Controller._pid`; it puts its memory into `after`."""
+    """Return `Controller._pid` of vectors of any kind; it puts its memory into `after`.
 
-    def feedback(error: Triple, wanted: Triple, rate: Triple) -> Triple:
+    `choose` is `select` of two of these vectors.
+    """
+
+    def feedback(error: Any, wanted: Any, rate: Any) -> Any:
         measured = reading["measured"]
-        u = mean(wanted, memory["last_rate"])
-        filtered = low_pass(u, memory["filtered_rate"], reading["share"])
-        after["last_rate"] = select_all(measured, memory["last_rate"], wanted)
-        after["filtered_rate"] = select_all(measured, memory["filtered_rate"], filtered)
-        (w1, w2, w3), (v1, v2, v3) = select_all(measured, wanted, filtered), rate
-        command, after["integral"] = pid(
-            error,
-            (w1 - v1, w2 - v2, w3 - v3),
-            memory["integral"],
-            (numbers["kp"], numbers["kd"], numbers["ki"]),
-            reading["elapsed"],
+        u = vectors.mean(wanted, memory["last_rate"])
+        filtered = vectors.low_pass(u, memory["filtered_rate"], reading["share"])
+        after["last_rate"] = choose(measured, memory["last_rate"], wanted)
+        after["filtered_rate"] = choose(measured, memory["filtered_rate"], filtered)
+        error_rate = vectors.difference(choose(measured, wanted, filtered), rate)
+        gains = numbers["kp"], numbers["kd"], numbers["ki"]
+        command, after["integral"] = vectors.pid(
+            error, error_rate, memory["integral"], gains, reading["elapsed"]
         )
         return command
 

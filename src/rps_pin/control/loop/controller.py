@@ -24,7 +24,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import fields
 from typing import Any, Literal, cast, get_args
 
 import numpy as np
@@ -38,6 +37,7 @@ from rps_pin.control.estimator.state_estimate import StateEstimate
 from rps_pin.control.generated.code import NOT_REGULAR, GeneratedTick
 from rps_pin.control.generated.engine import Compiled, generated_tick
 from rps_pin.control.generated.proof import Ticked
+from rps_pin.control.generated.tick import Form, form_of
 from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SetpointRateFilter
 from rps_pin.control.loop.force_limits import LEAST_PACE, ForceLimits, recovered_pace
@@ -51,6 +51,7 @@ from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.one_thread import guarded, one_thread
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.task import RPSTask
 from rps_pin.task import Task
 from rps_pin.validation import choice, positive_number, real, whole_number
 
@@ -166,6 +167,8 @@ class Controller(DeepCopied, ABC):
         self._in_task_space = self.space == "task"
         self._most_lost = whole_number(most_lost, "most_lost", 0)
         self.robot = robot
+        if isinstance(robot, RPSTask):  # which has closed forms
+            robot = cast("RPSRobot", robot.robot)
         self._model: ControlModel = model_of(
             robot,
             near,
@@ -192,19 +195,23 @@ class Controller(DeepCopied, ABC):
         self._generated: GeneratedTick | None = None
         self._speed_measured = False
         self.reset(near)
-        self._use_generated(compiled)
+        self._use_generated(compiled, near)
 
-    def _use_generated(self, compiled: Compiled) -> None:
-        """Let generated code compute regular ticks of the 3-RPS, if there is any."""
-        if isinstance(self._model, TaskModel):
-            self.engine = self._model.engine
-            return
-        law, answers = self._generated_law, (*self.estimate.answers[:5], self.forces)
+    def _use_generated(self, compiled: Compiled, near: ArrayLike) -> None:
+        """Let generated code compute regular ticks, if there is any."""
+        law, model = self._generated_law, self._model
+        answers = (*self.estimate.answers[:5], self.forces)
         own = self.period, self._rate_filter.share, self._take
-        self._generated, self.engine = generated_tick(
-            *(compiled, law, self._proven),
-            lambda library: GeneratedTick(law, library, answers, *own),
-        )
+        if isinstance(model, TaskModel):
+            given = None if isinstance(compiled, str | bool) else compiled
+            found = model.generated_tick(law, near, self._proven, answers, own, given)
+        else:
+            form = form_of(law) if law else None
+            found = generated_tick(
+                *(compiled, law, self._proven),
+                lambda library: GeneratedTick(law, cast("Form", form), library, answers, *own),
+            )
+        self._generated, self.engine = found
         if self._generated is not None:
             self.estimate.generated, self.estimate.engine = self._generated, self.engine
             self._to_generated_code()
@@ -328,7 +335,7 @@ class Controller(DeepCopied, ABC):
         return status
 
     def _proven(
-        self, robot: RPSRobot, start: Array, compiled: Compiled, **settings: Any
+        self, robot: RPSRobot | Task, start: Array, compiled: Compiled, **settings: Any
     ) -> Callable[..., Ticked]:
         """Return what computes ticks to prove generated code with."""
         one = self._like(robot, start, space=self.space, compiled=compiled, **settings)
@@ -340,7 +347,7 @@ class Controller(DeepCopied, ABC):
 
         return ticked
 
-    def _like(self, robot: RPSRobot, start: Array, **settings: Any) -> Controller:
+    def _like(self, robot: RPSRobot | Task, start: Array, **settings: Any) -> Controller:
         """Return a controller with this law."""
         return type(self)(robot, start, Gains.placed(15.0, integral=0.2), **settings)
 
@@ -391,10 +398,9 @@ class Controller(DeepCopied, ABC):
 
     def _numbers(self) -> dict[str, Any]:
         """Return what generated code takes of this object: `CONTROL_NUMBERS`."""
-        (kp, kd, ki), terms = self._gains, cast("RPSRobot", self.robot).force_terms
+        kp, kd, ki = map(tuple, self._gains)
         return {
-            **self.estimate.numbers(),
-            **{one.name: getattr(terms, one.name) for one in fields(terms)},
+            **self._model.numbers(),
             **{"kp": kp, "kd": kd, "ki": ki, "stop": self._stop},
             **{"side": self._setpoints.side, "force_limit": self._limits.limit},
         }
@@ -404,15 +410,19 @@ class Controller(DeepCopied, ABC):
         generated, current = self._generated, self._setpoints.current
         if generated is None or not self._setpoints.followed:
             return
+        last = self._rate_filter.last
+        rows = {
+            "target_rate": current.rate,
+            "target_acceleration": current.acceleration,
+            "integral": self._integral,
+            "last_rate": self._vectors.zero if last is None else last,
+            "filtered_rate": self._rate_filter.speed,
+        }
         generated.set_memory(
             {
                 **self.estimate.memory(),
-                "target_pose": current.geometry.pose,
-                "target_rate": current.rate,
-                "target_acceleration": current.acceleration,
-                "integral": self._integral,
-                "last_rate": self._rate_filter.last or self._vectors.zero,
-                "filtered_rate": self._rate_filter.speed,
+                **self._model.setpoint_memory(current.geometry),
+                **{name: tuple(row) for name, row in rows.items()},
                 "pace": self._pace,
             }
         )
@@ -421,13 +431,12 @@ class Controller(DeepCopied, ABC):
         """Set the state from generated code's memory."""
         assert self._generated is not None
         self.estimate.take(memory)
-        geometry = self._model.geometry(memory["target_pose"], None)
-        assert geometry is not None  # of a regular tick
-        target = Setpoint(geometry, memory["target_rate"], memory["target_acceleration"])
-        self._setpoints.follow(target)
-        self._integral, self._pace = memory["integral"], memory["pace"]
-        self._rate_filter.last = memory["last_rate"]
-        self._rate_filter.speed = memory["filtered_rate"]
+        geometry, of = self._model.setpoint_geometry(memory), self._vectors.of
+        rate, acceleration = of(memory["target_rate"]), of(memory["target_acceleration"])
+        self._setpoints.follow(Setpoint(geometry, rate, acceleration))
+        self._integral, self._pace = of(memory["integral"]), memory["pace"]
+        self._rate_filter.last = of(memory["last_rate"])
+        self._rate_filter.speed = of(memory["filtered_rate"])
         self._speed_measured = self._generated.measured
 
     # Inner workings -------------------------------------------------------------------------------
@@ -513,7 +522,8 @@ def model_of(robot: Robot, near: ArrayLike, compiled: Compiled, **settings: Any)
 
 def _own(task: Task, compiled: Compiled) -> Task:
     """Return a task with scratch memory of its own, in generated code if that is asked for."""
-    if not (isinstance(compiled, str | bool) and compiled in ("auto", True, False)):
+    words = isinstance(compiled, str | bool) and compiled in ("auto", True, False)
+    if not (words or hasattr(compiled, "address")):
         raise InputError(f'compiled = {shown(compiled)}: it must be "auto", True or False')
     if compiled is True and not task.compiled:
         return task.compile(functions=("kinematics", "closing", "dynamics"))

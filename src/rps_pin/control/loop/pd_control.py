@@ -34,6 +34,7 @@ from rps_pin.control.loop.setpoints import Setpoint
 from rps_pin.control.robots import Robot
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.task import Task
 from rps_pin.validation import choice
 
 
@@ -69,7 +70,7 @@ class PDControl(Controller):
         self.compensation = cast("Compensation", checked)
         super().__init__(robot, near, gains, **settings)
 
-    def _like(self, robot: RPSRobot, start: Array, **settings: Any) -> Controller:
+    def _like(self, robot: RPSRobot | Task, start: Array, **settings: Any) -> Controller:
         inertia = effective_inertia(robot, start, space=self.space)
         gains = Gains.placed(15.0, integral=0.2).times(inertia)
         return PDControl(robot, start, gains, compensation=self.compensation, **settings)

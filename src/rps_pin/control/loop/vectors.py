@@ -1,4 +1,4 @@
-"""Vectors of a control loop: three floats (or CasADi expressions), or an array of any length.
+"""Vectors of a control loop: three floats (or CasADi expressions), arrays, or CasADi's columns.
 
 Each formula is written once, for one number; arrays take it as it is, element by element. Triples
 of floats are several times faster than arrays.
@@ -6,7 +6,9 @@ of floats are several times faster than arrays.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -124,4 +126,14 @@ def arrays(count: int) -> Vectors:
     """Return formulas of arrays, shape (count,)."""
     zero = np.zeros(count)
     zero.setflags(write=False)
-    return Vectors(zero, np.array, np.subtract, np.add, _low_pass, _slope, _mean, _pid, _unwound)
+    of = partial(np.array, ndmin=1)
+    return Vectors(zero, of, np.subtract, np.add, _low_pass, _slope, _mean, _pid, _unwound)
+
+
+def columns(count: int) -> Vectors:
+    """Return formulas of CasADi's columns, shape (count, 1)."""
+    import casadi as ca  # noqa: PLC0415
+
+    add, subtract = operator.add, operator.sub
+    zero = ca.SX.zeros(count)
+    return Vectors(zero, ca.SX, subtract, add, _low_pass, _slope, _mean, _pid, _unwound)
