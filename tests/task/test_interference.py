@@ -90,7 +90,7 @@ def test_balls_that_pass_each_other_touch_at_known_times(engine: Any) -> None:
     assert links.minimum_time == pytest.approx(1.0, abs=1e-6)
     text = str(found)
     assert "1 pair of links interferes" in text
-    assert "interference: 1 pairs of links, least distance -0.04 m (a and b) at t = 1" in text
+    assert "interference: 1 pair of links, least distance -0.04 m (a and b) at t = 1" in text
     assert re.search(r"a and b begin to interfere \(\+- \de-11 s\); xa = ", text)
     assert "a and b come apart" in text
 

@@ -2,20 +2,57 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
+from rps_pin.cli import mechanism_options as options
 from rps_pin.cli import task_options as tasks
+from rps_pin.errors import InputError
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.singularity.path_check import check_path
 from rps_pin.task.paths.events import PathCheck
 from rps_pin.task.paths.findings import GRAZE
 from rps_pin.trajectories.path import Trajectory
+
+if TYPE_CHECKING:
+    from rps_pin.task import Task
+
+
+class Interference(StrEnum):
+    """Whether it is checked."""
+
+    AUTO = "auto"
+    YES = "yes"
+    NO = "no"
+
+
+ClearanceOption = Annotated[
+    float,
+    typer.Option(min=0.0, help="Least distance of two links of a mechanism, m."),
+]
+IgnoreOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="LINK,LINK",
+        help="Two links of a mechanism that may overlap; can be given several times.",
+        show_default=False,
+    ),
+]
+InterferenceOption = Annotated[
+    Interference,
+    typer.Option(
+        help="Whether links of a mechanism are checked for interference: **auto**, where it has "
+        "collision shapes and all can be read; **yes**, or else it is an error; **no**.",
+    ),
+]
 
 
 def check_command(
@@ -38,13 +75,18 @@ def check_command(
         typer.Option(help="Distance to a singularity (0 to 1) below which a path grazes it."),
     ] = GRAZE,
     mechanism: tasks.MechanismOption = None,
+    clearance: ClearanceOption = 0.0,
+    ignore: IgnoreOption = None,
+    interference: InterferenceOption = Interference.AUTO,
+    package_path: options.PackagePathOption = None,
     as_json: common.JsonOption = False,
 ) -> None:
     """Check a path for singularities that it crosses or grazes, and limits that it leaves.
 
     That is a helix of a 3-RPS, or a trajectory file; with **--mechanism**, a trajectory of the
     coordinates of its task. Each event is located to a nanosecond, or to 1e-10 of the duration. Of
-    a mechanism, speeds and forces of the actuators are checked too.
+    a mechanism, speeds and forces of the actuators are checked too, and where its description has
+    collision shapes, the interference of its links.
 
     Exit status: 0 the path is clear; 1 it is not; 2 wrong usage.
 
@@ -57,13 +99,22 @@ def check_command(
     - `rps-pin check --radius 0.075 --pitch 0.05 --branch -` crosses none
 
     - `rps-pin check path.csv --mechanism stewart` columns time_s, x_m, ..., rz_rad
+
+    - `rps-pin check path.csv -m robot.yaml --clearance 0.005 --ignore arm,cover`
     """
     if mechanism is not None:
         if trajectory is None:
             told = "a mechanism has no helix: give a trajectory file"
             raise typer.BadParameter(told, param_hint="TRAJECTORY")
-        _of_task(mechanism, trajectory, threshold, as_json)
+        task = _task(mechanism, package_path)
+        choice = {Interference.YES: True, Interference.NO: False}.get(interference)
+        pairs = _pairs(ignore or ())
+        asked = {"interference": choice, "clearance": clearance, "ignore": pairs}
+        _of_task(task, trajectory, threshold, asked, as_json)
         return
+    if clearance or ignore or interference != Interference.AUTO or package_path:
+        told = "interference is checked of a mechanism: give its file, --mechanism FILE"
+        raise typer.BadParameter(told, param_hint="--interference")
     machine = common.load_robot(robot)
     path: Trajectory
     if trajectory is None:
@@ -74,13 +125,31 @@ def check_command(
     _tell(found, {"robot": machine.parameters.name}, as_json)
 
 
-def _of_task(mechanism: Path, trajectory: Path, threshold: float, as_json: bool) -> None:
+def _task(mechanism: Path, package_path: Sequence[Path] | None) -> Task:
+    task = tasks.load_task(mechanism)
+    if not package_path:
+        return task
+    one = task.mechanism
+    return task.with_mechanism(one.with_collision(one.collision_shapes.in_packages(package_path)))
+
+
+def _pairs(given: Sequence[str]) -> list[list[str]]:
+    """Return pairs of names of options like ``--ignore arm,cover``."""
+    pairs = [words.split(",") for words in given]
+    for words, pair in zip(given, pairs, strict=True):
+        if len(pair) != 2 or not all(pair):
+            raise InputError(f"--ignore {words!r}: it must be LINK,LINK, such as arm,cover")
+    return pairs
+
+
+def _of_task(
+    task: Task, trajectory: Path, threshold: float, asked: Mapping[str, Any], as_json: bool
+) -> None:
     from rps_pin.task.path_check import check_path as check_task_path
     from rps_pin.task.trajectory_file import load_task_trajectory
 
-    task = tasks.load_task(mechanism)
     path = load_task_trajectory(trajectory, task)
-    found = check_task_path(task, path, threshold=threshold)
+    found = check_task_path(task, path, threshold=threshold, **asked)
     _tell(found, {"mechanism": task.mechanism.name}, as_json)
 
 
@@ -93,9 +162,11 @@ def _tell(found: PathCheck, of: dict[str, str], as_json: bool) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Return named tuples as dictionaries, and arrays as lists, for JSON."""
+    """Return named tuples as dictionaries, arrays as lists, and infinity as none, for JSON."""
     if hasattr(value, "_asdict"):
         return {name: _plain(part) for name, part in value._asdict().items()}
     if isinstance(value, tuple):
         return [_plain(part) for part in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
     return value.tolist() if isinstance(value, np.ndarray) else value

@@ -402,8 +402,9 @@ class ClosedLoopModel:
     def collision_model(self) -> pin.GeometryModel:
         """Collision shapes of the links, on this model; without pairs.
 
-        Meshes are found by the rules of ROS (`ROS_PACKAGE_PATH`); one that bounds a convex solid is
-        that solid, another one a surface.
+        Meshes are found by the rules of ROS (`ROS_PACKAGE_PATH`), and in the folders that
+        `CollisionShapes.in_packages` adds: ``one.with_collision(one.collision_shapes.in_packages(
+        ["~/ws/src"]))``. One that bounds a convex solid is that solid, another one a surface.
 
         Raises
         ------

@@ -28,7 +28,8 @@ class Interference(NamedTuple):
         return not self.found
 
     def __str__(self) -> str:
-        told = f"{self.pairs} pairs of links, {len(self.found)} nearer than {self.clearance:.6g} m"
+        pairs = f"{self.pairs} pair{'' if self.pairs == 1 else 's'}"
+        told = f"{pairs} of links, {len(self.found)} nearer than {self.clearance:.6g} m"
         if self.nearest is None:
             return told
         return "\n".join((f"{told}; nearest: {self.nearest}", *map(str, self.found)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,11 +20,7 @@ from rps_pin.closed_loop.interference.shapes import (
 from rps_pin.errors import InputError, RPSPinError, few
 
 
-def collision_geometry(
-    model: pin.Model,
-    shapes: CollisionShapes,
-    package_path: Sequence[str | os.PathLike[str]] = (),
-) -> pin.GeometryModel:
+def collision_geometry(model: pin.Model, shapes: CollisionShapes) -> pin.GeometryModel:
     """Return the shapes on the links of a model, in the order in which they are given.
 
     Raises
@@ -43,7 +38,7 @@ def collision_geometry(
         frame = model.getFrameId(shape.link, pin.FrameType.BODY)
         joint, at = model.frames[frame].parentJoint, model.frames[frame].placement
         try:
-            path, geometry = _built(shape, package_path, loader)
+            path, geometry = _built(shape, shapes.package_path, loader)
         except RPSPinError as error:
             faults.append(f"{shape.where}: {error}")
             continue
@@ -57,9 +52,7 @@ def collision_geometry(
     return found
 
 
-def _built(
-    shape: LinkShape, package_path: Sequence[str | os.PathLike[str]], loader: Any
-) -> tuple[str, Any]:
+def _built(shape: LinkShape, package_path: Sequence[str], loader: Any) -> tuple[str, Any]:
     """Return the path of a shape's mesh, if it has one, and Coal's shape."""
     if shape.fault:
         raise InputError(shape.fault)

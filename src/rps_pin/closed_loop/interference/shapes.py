@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
@@ -88,11 +89,18 @@ class CollisionShapes:
         Pairs of names of links that may overlap.
     faults
         What else cannot be used, in sentences.
+    package_path
+        Folders that are ROS packages, or hold some, where meshes are looked for first.
     """
 
     shapes: tuple[LinkShape, ...] = ()
     ignored: tuple[tuple[str, str], ...] = ()
     faults: tuple[str, ...] = ()
+    package_path: tuple[str, ...] = ()
+
+    def in_packages(self, folders: Iterable[str | os.PathLike[str]]) -> CollisionShapes:
+        """Return the same shapes, whose meshes are looked for in further folders first."""
+        return replace(self, package_path=(*map(str, folders), *self.package_path))
 
     def ignoring(self, pairs: Any) -> CollisionShapes:
         """Return the same shapes with further pairs of links that are not checked."""
@@ -100,10 +108,10 @@ class CollisionShapes:
 
     def prefixed(self, prefix: str) -> CollisionShapes:
         """Return the same shapes of links with a prefix before their names."""
-        return CollisionShapes(
-            tuple(replace(one, link=prefix + one.link) for one in self.shapes),
-            tuple((prefix + a, prefix + b) for a, b in self.ignored),
-            self.faults,
+        return replace(
+            self,
+            shapes=tuple(replace(one, link=prefix + one.link) for one in self.shapes),
+            ignored=tuple((prefix + a, prefix + b) for a, b in self.ignored),
         )
 
 
@@ -121,6 +129,7 @@ def composed_shapes(parts: Mapping[str, CollisionShapes]) -> CollisionShapes:
         tuple(shape for one in all_of for shape in one.shapes),
         tuple(pair for one in all_of for pair in one.ignored),
         tuple(fault for one in all_of for fault in one.faults),
+        tuple(dict.fromkeys(folder for one in all_of for folder in one.package_path)),
     )
 
 

@@ -155,7 +155,7 @@ class PathInterference(NamedTuple):
             return f"interference: {self.skipped}"
         a, b = self.minimum_links
         return (
-            f"interference: {self.pairs} pairs of links, least distance "
+            f"interference: {_pairs(self.pairs)} of links, least distance "
             f"{self.minimum_distance:.6g} m ({a} and {b}) at t = {self.minimum_time:.9g} s "
             f"(clearance {self.clearance:.6g} m)"
         )
@@ -228,10 +228,8 @@ def _counted(check: PathCheck) -> str:
     near = len(check.singularities) - crossings - ends
     outside = sum(event.kind != "returns" for event in check.limits)
     touching = {(event.link_a, event.link_b) for event in check.touching}
-    which = "1 pair of links interferes"
-    if len(touching) > 1:
-        which = f"{len(touching)} pairs of links interfere"
-    met = f"; {which}" if touching else ""
+    does = "interferes" if len(touching) == 1 else "interfere"
+    met = f"; {_pairs(len(touching))} of links {does}" if touching else ""
     return (
         f"crosses singularities {crossings} times, grazes or stays in them {near} times, "
         f"leaves limits {outside} times{', and its assembly mode ends' if ends else ''}{met}"
@@ -242,3 +240,7 @@ def _place(pose: Array) -> str:
     """Return a pose of a 3-RPS in words."""
     z, tilt_x, tilt_y = pose
     return f"z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad"
+
+
+def _pairs(count: int) -> str:
+    return f"{count} pair{'' if count == 1 else 's'}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -89,7 +89,7 @@ def add_collisions(
     written: list[tuple[str, LinkShape]] = []
     names: dict[str, str] = {}
     for shape in shapes.shapes:
-        form = _stated(shape)
+        form = _stated(shape, shapes.package_path)
         if isinstance(form, str) or not model.existFrame(shape.link, pin.FrameType.BODY):
             left_out.append(f"{shape.where} ({form if isinstance(form, str) else 'no link'})")
             continue
@@ -114,13 +114,13 @@ def add_collisions(
     return [pair for pair in dict.fromkeys(ignored) if known.issuperset(pair)]
 
 
-def _stated(shape: LinkShape) -> tuple[str, dict[str, str]] | str:
+def _stated(shape: LinkShape, package_path: Sequence[str]) -> tuple[str, dict[str, str]] | str:
     """Return a shape's element, or why there is none."""
     if shape.fault:
         return shape.fault
     if isinstance(shape.mesh, MeshFile):
         try:
-            path = file_of(shape.mesh.name, Path(shape.mesh.beside)).absolute()
+            path = file_of(shape.mesh.name, Path(shape.mesh.beside), package_path).absolute()
         except InputError as error:
             return str(error)
         return "mesh", {"filename": str(path), "scale": numbers(shape.mesh.scale)}
