@@ -94,6 +94,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "convert urdf": _rps_pin("convert four_bar --to urdf -o out --overwrite"),
     "convert mjcf": _rps_pin("convert four_bar --to mjcf -o out --overwrite"),
     "export c": _rps_pin("export c four_bar -o out --overwrite"),
+    "new": _rps_pin("new stewart -o out --overwrite"),
+    "examples": _rps_pin("examples -o out --overwrite"),
     "view html": _rps_pin("view -r micro --html out/view.html --overwrite"),
     "helix": _rps_pin("helix -r micro --rate 20 -o out --overwrite"),
     "dynamics": _rps_pin("dynamics circle.yaml -r micro --rate 100 -o out --overwrite"),

@@ -29,6 +29,8 @@ CASES = {
     "convert urdf": (4096, ["four_bar.urdf", "four_bar.yaml"]),
     "convert mjcf": (1024, ["four_bar.xml"]),
     "export c": (40_960, ["four_bar.c", "four_bar.h", "four_bar_test.c", "README.md"]),
+    "new": (8192, ["mine.urdf", "mine.yaml", "path.yaml"]),
+    "examples": (1024, ["robot.xml", "mine.yaml", "path.csv"]),
     "view html": (102_400, ["view.html"]),
     "simulate": (102_400, ["viewer.html", "simulation.csv", "simulation.png", "simulation.svg"]),
     "control": (8192, ["loop.csv", "report.md", "summary.json", "tracking.png", "viewer.html"]),

@@ -34,6 +34,8 @@ FILES = {
     "urdf": (["urdf", "-r", "micro", "-o"], "x.urdf", "x.urdf"),
     "html": (["view", "--pose", "0.4", "0", "0", "--html"], "x.html", "x.html"),
     "convert": (["convert", "four_bar", "--to", "urdf", "-o"], ".", "four_bar.yaml"),
+    "new": (["new", "stewart", "-o"], ".", "mine.urdf"),
+    "examples": (["examples", "-o"], ".", "circle.yaml"),
     "mjcf": (["convert", "four_bar", "--to", "mjcf", "-o"], ".", "four_bar.xml"),
 }
 

@@ -42,6 +42,8 @@ BASES: dict[str, str] = {
     "assembly-modes": "four_bar.yaml --starts 50 --seconds 1",
     "simulate": "four_bar.yaml --duration 0.01 --output out",
     "convert": "four_bar.yaml --to urdf --output out",
+    "new": "delta --output out",
+    "examples": "--output out",
     "reproduce": "--quick --output a_file",
     "export c": "four_bar.yaml --output out",
     "doctor": "",

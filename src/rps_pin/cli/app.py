@@ -22,22 +22,24 @@ from rps_pin.plain_text import plain
 
 app = typer.Typer(name="rps-pin", cls=LazyGroup, no_args_is_help=True, **SETTINGS)
 
-_ROBOT, _MOTION, _ANY, _MORE = "The 3-RPS", "Its motion", "Any mechanism", "More"
+_BEGIN, _ANY, _RPS = "To begin", "Any robot", "The 3-RPS"
 for _panel, _name, _line in (
-    (_ROBOT, "view", "Show a pose or a motion in the browser."),
-    (_ROBOT, "ik", "Leg lengths of a pose, and limits; of any task too."),
-    (_ROBOT, "fk", "Poses of leg lengths: all modes, or one; any task."),
-    (_ROBOT, "workspace", "Its workspace, with the paper's figures."),
-    (_ROBOT, "urdf", "Its URDF."),
-    (_MOTION, "helix", "Actuator forces along the paper's helix."),
-    (_MOTION, "dynamics", "Forces of any trajectory; sizing."),
-    (_MOTION, "check", "Singularities and limits along a path."),
-    (_MOTION, "control", "A control loop on a simulated robot."),
+    (_BEGIN, "view", "Show a robot, a pose or a motion in the browser."),
+    (_BEGIN, "new", "Files of a robot of your own, to edit."),
+    (_BEGIN, "examples", "Sample files that the commands' examples name."),
+    (_ANY, "ik", "Leg lengths of a pose, and limits; of any task too."),
+    (_ANY, "fk", "Poses of leg lengths: all modes, or one; any task."),
+    (_ANY, "dynamics", "Forces of any trajectory; sizing."),
+    (_ANY, "check", "Singularities and limits along a path."),
+    (_ANY, "control", "A control loop on a simulated robot."),
     (_ANY, "describe", "Joints, closures, rank, mobility, actuation."),
     (_ANY, "assembly-modes", "Closed configurations with given joint values."),
     (_ANY, "simulate", "Simulation, loops closed at every step."),
     (_ANY, "convert", "URDF with its description, or a MuJoCo file."),
-    (_MORE, "reproduce", "The paper's equations, figures and tables."),
+    (_RPS, "helix", "Actuator forces along the paper's helix."),
+    (_RPS, "workspace", "Its workspace, with the paper's figures."),
+    (_RPS, "urdf", "Its URDF."),
+    (_RPS, "reproduce", "The paper's equations, figures and tables."),
 ):
     app.command(_name, rich_help_panel=_panel, short_help=_line)(
         LazyGroup.stub(_name.replace("-", "_"))
@@ -56,7 +58,7 @@ app.add_typer(
 )
 
 
-@app.command("doctor", rich_help_panel=_MORE)
+@app.command("doctor", rich_help_panel=_BEGIN)
 def doctor_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
 ) -> None:

@@ -98,9 +98,9 @@ def check_command(
 
     - `rps-pin check --radius 0.075 --pitch 0.05 --branch -` crosses none
 
-    - `rps-pin check path.csv --mechanism stewart` columns time_s, x_m, ..., rz_rad
+    - `rps-pin check stewart.csv --mechanism stewart` columns time_s, x_m, ..., rz_rad
 
-    - `rps-pin check path.csv -m robot.yaml --clearance 0.005 --ignore arm,cover`
+    - `rps-pin check stewart.csv -m stewart --clearance 0.005`
     """
     if mechanism is not None:
         if trajectory is None:

@@ -50,7 +50,7 @@ def control_command(
 
     Examples:
 
-    - `rps-pin control docs/scenarios/micro_helix.yaml`
+    - `rps-pin control scenario.yaml`
     """
     from rps_pin.control.simulation.loop_run import columns_of, write_loop_csv
     from rps_pin.control.simulation.loop_summary import status_name, summary_of

@@ -96,7 +96,7 @@ def export_c_command(
 
     - `rps-pin export c --robot micro --output micro_c`
 
-    - `rps-pin export c mine.yaml -o mine_c --real float --parameters payload:tool`
+    - `rps-pin export c stewart -o stewart_c --real float --parameters payload:platform`
     """
     try:
         from rps_pin.codegen.export.c_files import c_files, write_c_files

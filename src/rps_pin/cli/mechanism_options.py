@@ -16,12 +16,14 @@ from rps_pin.cli.printing import say
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.io.gepetto import FILE
 from rps_pin.errors import InputError
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.robot_file import kind_of_file, load_robot
 
 _FILE = typer.Argument(
     metavar="FILE|NAME",
-    help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), a URDF, a folder of "
-    "Gepetto's example-parallel-robots, or the name of one that comes with the package, such as "
-    "**delta**.",
+    help="A mechanism's description (**.yaml**), a MuJoCo file (**.xml**), a URDF, parameters of a "
+    "3-RPS, a folder of Gepetto's example-parallel-robots, or the name of one that comes with the "
+    "package, such as **delta**.",
     show_default=False,
     autocompletion=names_or_files(mechanism_names),
 )
@@ -73,7 +75,7 @@ def load_mechanism(
     """Return the mechanism of a file, told by its suffix, or of a name; and its file.
 
     Of a URDF nothing is driven, and only the loops that it states itself are closed. A folder is
-    one of Gepetto's example-parallel-robots.
+    one of Gepetto's example-parallel-robots. The parameters of a 3-RPS are a mechanism, too.
 
     Raises
     ------
@@ -81,7 +83,7 @@ def load_mechanism(
         If there is no mechanism of that name (lists those there are), or the suffix is of no kind
         that is read.
     """
-    if file.is_dir():
+    if file.is_dir() and ((file / FILE).exists() or str(file) not in mechanism_names()):
         file /= FILE
     if not (file.suffix or file.is_file()):
         names = mechanism_names()
@@ -93,6 +95,8 @@ def load_mechanism(
         file = MECHANISMS / f"{file}.yaml"
     suffix = file.suffix.lower()
     within_limits = False if ignore_limits else None
+    if kind_of_file(file) == "parameters":
+        return robot_of_parameters(file, ignore_limits, accuracy).mechanism, file
     if suffix in (".yaml", ".yml"):
         return ClosedLoopModel.load(file, within_limits=within_limits, accuracy=accuracy), file
     if suffix == ".xml":
@@ -109,6 +113,16 @@ def load_mechanism(
     )
 
 
+def robot_of_parameters(
+    file: Path, ignore_limits: bool = False, accuracy: float | None = None
+) -> RPSRobot:
+    """Return the robot of a parameter file."""
+    if accuracy is not None:
+        raise InputError(f"{file}: the numbers of a 3-RPS are exact: leave out --accuracy")
+    robot = load_robot(str(file))
+    return RPSRobot(robot.parameters.without_limits()) if ignore_limits else robot
+
+
 def shapes_of(
     file: Path, mechanism: ClosedLoopModel, package_path: Sequence[Path] | None = None
 ) -> tuple[pin.GeometryModel | None, list[str]]:
@@ -120,6 +134,8 @@ def shapes_of(
 
     if file.suffix.lower() == ".xml":
         return None, []
+    if kind_of_file(file) == "parameters":
+        return load_robot(str(file)).visual_model(), []
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         shapes = visual_model(file, mechanism.model, package_path or ())

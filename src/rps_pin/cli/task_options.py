@@ -15,6 +15,7 @@ from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.errors import InputError
+from rps_pin.rps.robot_file import kind_of_file
 
 if TYPE_CHECKING:
     from rps_pin.task import Task
@@ -40,13 +41,15 @@ DegreesOption = Annotated[
 
 
 def load_task(file: Path, ignore_limits: bool = False, accuracy: float | None = None) -> Task:
-    """Return the task of a mechanism's file.
+    """Return the task of a mechanism's file, or of the parameters of a 3-RPS.
 
     Raises
     ------
     MechanismError
         If it has none.
     """
+    if kind_of_file(file) == "parameters":
+        return options.robot_of_parameters(file, ignore_limits, accuracy).task
     mechanism, _ = options.load_mechanism(file, ignore_limits, accuracy)
     task: Task = mechanism.task
     return task

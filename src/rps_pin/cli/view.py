@@ -11,7 +11,8 @@ import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
-from rps_pin.cli.completion import mechanism_names, names_or_files
+from rps_pin.cli.completion import mechanism_names, names_or_files, preset_names
+from rps_pin.cli.given_options import given, refuse
 from rps_pin.cli.layer_options import LayersOption, SizeOption, chosen_layers, chosen_size
 from rps_pin.cli.mechanism_options import (
     AccuracyOption,
@@ -24,17 +25,30 @@ from rps_pin.cli.mechanism_options import (
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.printing import PlainConsole, say
 from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.config import read_yaml
+from rps_pin.errors import InputError, few
+from rps_pin.files import is_folder, is_there
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.rps.robot_file import Kind, kind_of_file
+
+#: Options by what they are of.
+_CURVE = ("radius", "pitch", "height", "branch", "duration")
+_OF_MECHANISMS = ("ignore_limits", "accuracy", "package_path")
+_OF_FILES = ("html", "png", "video")
 
 
 def view_command(
-    trajectory: Annotated[
+    context: typer.Context,
+    file: Annotated[
         Path | None,
         typer.Argument(
-            metavar="TRAJECTORY",
-            help="A CSV or YAML file of poses, or of the task's coordinates of a mechanism.",
+            metavar="FILE|NAME",
+            help="A trajectory (CSV or YAML), of the poses of a 3-RPS or of a mechanism's task; or "
+            "a robot, shown at its home: a 3-RPS's parameters, a mechanism's description, a URDF, "
+            "a MuJoCo file, or the name of one that comes with the package.",
             show_default=False,
+            autocompletion=names_or_files(lambda: [*preset_names(), *mechanism_names()]),
         ),
     ] = None,
     robot: common.RobotOption = "sokolov",
@@ -85,15 +99,20 @@ def view_command(
         int | None, typer.Option(help="Port of the server; default: a free one.")
     ] = None,
 ) -> None:
-    """Show a 3-RPS in the browser: a pose, a trajectory, or the helix; or any mechanism.
+    """Show a robot in the browser: its home, a pose, a trajectory, or the helix.
 
-    Starts a Meshcat server for this machine only, prints its address, and runs until Ctrl-C. With
-    **--html**, **--png** or **--video** it writes files instead. With **--interactive** it serves a
-    page with sliders for pose and leg lengths, or for the joints of any mechanism.
+    Without FILE: a 3-RPS on the helix, or the home of a mechanism. Starts a Meshcat server for this
+    machine only, prints its address, and runs until Ctrl-C. With **--html**, **--png** or
+    **--video** it writes files instead. With **--interactive** it serves a page with sliders for
+    pose and leg lengths, or for the joints of any mechanism.
 
     Examples:
 
     - `rps-pin view` the paper's helix
+
+    - `rps-pin view mine.yaml` your own robot, at its home
+
+    - `rps-pin view path.csv --robot mine.yaml` on a trajectory
 
     - `rps-pin view --robot micro --pose 0.22 0.1 0 --layers limits,ghosts`
 
@@ -101,9 +120,17 @@ def view_command(
 
     - `rps-pin view --interactive --mechanism delta`
 
-    - `rps-pin view path.csv --mechanism stewart` columns time_s, x_m, ..., rz_rad
+    - `rps-pin view stewart.csv --mechanism stewart` columns time_s, x_m, ..., rz_rad
     """
-    _refuse_both(pose is not None, trajectory is not None, mechanism is not None, interactive)
+    kind = None if file is None else _kind(file)
+    trajectory = file if kind == "trajectory" else None
+    if kind == "parameters":
+        refuse(context, f"{file} is a robot already", "robot", "mechanism")
+        robot = str(file)
+    elif kind == "mechanism":
+        refuse(context, f"{file} is a robot already", "robot", "mechanism")
+        mechanism = file
+    _refuse_what_does_not_fit(context, trajectory, mechanism, pose is not None, interactive)
     if pose is not None:
         common.doubt_pose("--pose", pose)
     if interactive:
@@ -111,7 +138,7 @@ def view_command(
         _interact(robot, pose, loaded, package_path, port, layers)
         return
     # Meshcat and its server are for this command only.
-    from rps_pin.viewer import save_html, save_png, save_video, show
+    from rps_pin.viewer import show
 
     machine: RPSRobot | ClosedLoopModel
     motion: Any
@@ -120,26 +147,19 @@ def view_command(
         machine, motion, drawn = _of_mechanism(loaded, package_path, trajectory)
     else:
         machine, drawn = common.load_robot(robot), {}
+        still = pose
+        if kind == "parameters" and pose is None and not given(context, *_CURVE):
+            z, tilt_x, tilt_y = machine.task.home.tolist()
+            still = z, tilt_x, tilt_y
         curve = (radius, pitch, height, branch, duration)
-        motion = pose or _of_robot(machine, trajectory, curve)
-    inputs = [file for file in (trajectory, mechanism) if file is not None]
-    outputs = [file for file in (html, png, video) if file is not None]
+        motion = _of_robot(machine, trajectory, curve) if still is None else still
+    inputs = [one for one in (file, mechanism) if one is not None]
+    outputs = [one for one in (html, png, video) if one is not None]
     check_outputs(outputs, overwrite, inputs=inputs)
     tree = machine.mechanism if isinstance(machine, RPSRobot) else machine
     chosen = chosen_layers(layers, tree) | drawn
-    sides = chosen_size(size)
-    if html is not None:
-        save_html(html, machine, motion, **chosen)
-        say(f"wrote {html}")
-    picture: dict[str, Any] = {"size": sides, "background": background}
-    picture |= drawn | {"layers": chosen["layers"]}
-    if png is not None:
-        save_png(png, machine, motion, time=time, **picture)
-        say(f"wrote {png}")
-    if video is not None:
-        progress = common.progress_bar(PlainConsole(stderr=True), "drawing")
-        save_video(video, machine, motion, progress=progress, **picture)
-        say(f"wrote {video}")
+    picture = {"size": chosen_size(size), "background": background, "layers": chosen["layers"]}
+    _write_files((html, png, video), machine, motion, time, chosen, picture | drawn)
     if html or png or video:
         return
     try:
@@ -150,13 +170,87 @@ def view_command(
         say("\nended")
 
 
-def _refuse_both(pose: bool, trajectory: bool, mechanism: bool, interactive: bool) -> None:
-    """Refuse options that do not go together, of which these are given."""
-    if pose and (trajectory or mechanism):
-        other = "a mechanism" if mechanism else "a trajectory"
-        raise typer.BadParameter(f"it does not go with {other}", param_hint="--pose")
-    if trajectory and interactive:
-        raise typer.BadParameter("the panel takes no trajectory", param_hint="TRAJECTORY")
+def _write_files(
+    files: tuple[Path | None, Path | None, Path | None],
+    machine: RPSRobot | ClosedLoopModel,
+    motion: Any,
+    time: float,
+    page: dict[str, Any],
+    picture: dict[str, Any],
+) -> None:
+    """Write a page, a picture and a film, those that are asked for."""
+    from rps_pin.viewer import save_html, save_png, save_video
+
+    html, png, video = files
+    if html is not None:
+        save_html(html, machine, motion, **page)
+        say(f"wrote {html}")
+    if png is not None:
+        save_png(png, machine, motion, time=time, **picture)
+        say(f"wrote {png}")
+    if video is not None:
+        progress = common.progress_bar(PlainConsole(stderr=True), "drawing")
+        save_video(video, machine, motion, progress=progress, **picture)
+        say(f"wrote {video}")
+
+
+def _kind(file: Path) -> Kind:
+    """Return what a file or a name shows: a trajectory, a mechanism, or parameters of a 3-RPS."""
+    if is_folder(file):
+        return "mechanism"
+    if not is_there(file) and not file.suffix:
+        if str(file) in preset_names():
+            return "parameters"
+        if str(file) in mechanism_names():
+            return "mechanism"
+        names = ", ".join([*preset_names(), *mechanism_names()])
+        raise InputError(
+            f"{str(file)!r} is not a file or a robot of the package; those are: {names}"
+        )
+    kind = kind_of_file(file)
+    if kind in ("trajectory", "mechanism", "parameters"):
+        return kind
+    keys = read_yaml(file, "file").values  # or says what is wrong
+    if kind == "scenario":
+        raise InputError(
+            f"{file} is a control scenario: rps-pin control {file} writes a page of its motion"
+        )
+    raise InputError(
+        f"{file} cannot be shown: a trajectory has the key kind, a mechanism urdf or mjcf, a 3-RPS "
+        f"base_radius and others; this file has: {few([*map(str, keys)])}"
+    )
+
+
+def _refuse_what_does_not_fit(
+    context: typer.Context,
+    trajectory: Path | None,
+    mechanism: Path | None,
+    pose: bool,
+    interactive: bool,
+) -> None:
+    """Refuse options that do not go together."""
+    if trajectory is not None and interactive:
+        raise typer.BadParameter("the panel takes no trajectory", param_hint="FILE|NAME")
+    if mechanism is not None:
+        refuse(context, "it does not go with a mechanism", "robot", "pose", *_CURVE)
+    else:
+        refuse(context, "it is an option of a mechanism", *_OF_MECHANISMS)
+    if trajectory is not None:
+        refuse(context, "it does not go with a trajectory", "pose", *_CURVE)
+    if pose:
+        refuse(context, "it is of a helix, and does not go with --pose", *_CURVE)
+    if interactive:
+        alone = "it does not go with --interactive"
+        refuse(context, alone, *_OF_FILES, "overwrite", "time", "size", "background", *_CURVE)
+        return
+    if given(context, *_OF_FILES):
+        refuse(context, "a file is written, and no server started", "port")
+    else:
+        refuse(context, "no file is written: see --html, --png and --video", "overwrite")
+    if not given(context, "png"):
+        refuse(context, "it is the time of a picture: see --png", "time")
+    if not given(context, "png", "video"):
+        refuse(context, "it is of a picture or film: see --png, --video", "size", "background")
 
 
 def _of_mechanism(

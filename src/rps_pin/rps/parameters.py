@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import math
 import os
+import re
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -18,7 +20,7 @@ from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED
 from rps_pin.config import Finite, NonNegative, Positive, first_problem, read_yaml
 from rps_pin.errors import InputError, ParameterError, did_you_mean
-from rps_pin.files import whole_file
+from rps_pin.files import write_text
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import LARGEST, fixed_array, inertia_fault, read_only
 
@@ -40,6 +42,19 @@ def _array(*shape: int) -> pydantic.BeforeValidator:
         return read_only(array + 0.0)  # no negative zeros: equal arrays, equal hashes
 
     return pydantic.BeforeValidator(convert)
+
+
+def robot_name(name: str) -> str:
+    """Return a robot's name, which names files and functions too, if it is one.
+
+    Raises
+    ------
+    ValueError
+        If it is none; says the rule.
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_\-]*", name):
+        raise ValueError("a name begins with a letter and has letters a-z, digits, - and _ only")
+    return name
 
 
 _ToList = pydantic.PlainSerializer(lambda array: array.tolist(), return_type=list)
@@ -89,7 +104,7 @@ class RPSParameters(pydantic.BaseModel):
         use_attribute_docstrings=True,
     )
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$")] = "rps"
+    name: Annotated[str, pydantic.AfterValidator(robot_name)] = "rps"
     """name of the robot; letters, digits, - and _"""
 
     base_radius: Positive
@@ -284,6 +299,10 @@ class RPSParameters(pydantic.BaseModel):
     @refuses_other_kinds
     def to_yaml(self, path: str | os.PathLike[str]) -> None:
         """Write the parameters to a YAML file, each with its meaning and unit as a comment."""
+        write_text(path, self.yaml_text())
+
+    def yaml_text(self) -> str:
+        """Return what `to_yaml` writes."""
         document = CommentedMap(self.model_dump())
         for field, info in type(self).model_fields.items():
             meaning = " ".join(str(info.description).split())
@@ -291,8 +310,9 @@ class RPSParameters(pydantic.BaseModel):
         yaml = YAML()
         yaml.width = 200
         yaml.default_flow_style = None
-        with whole_file(path) as scratch:
-            yaml.dump(document, scratch)
+        text = io.StringIO()
+        yaml.dump(document, text)
+        return text.getvalue()
 
 
 def _parameter_error(error: pydantic.ValidationError) -> ParameterError:

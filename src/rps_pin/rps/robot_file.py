@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Literal
 
 from rps_pin.bounds import YAML, most
 from rps_pin.errors import InputError
-from rps_pin.files import is_there
+from rps_pin.files import is_file, is_there
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
+
+Kind = Literal["mechanism", "trajectory", "scenario", "parameters"]
+_KEY = re.compile(rb"^([A-Za-z_]+)\s*:", re.MULTILINE)
+#: Keys of which a file of a kind has one.
+_KEYS: dict[Kind, set[str]] = {
+    "mechanism": {"urdf", "mjcf", "closed_loop", "name_mot"},
+    "trajectory": {"kind"},
+    "scenario": {"trajectory", "controller", "plant"},
+    "parameters": set(RPSParameters.model_fields) - {"name", "gravity"},
+}
 
 
 def load_robot(name_or_file: str, folder: Path = Path()) -> RPSRobot:
@@ -35,19 +46,26 @@ def load_robot(name_or_file: str, folder: Path = Path()) -> RPSRobot:
             f"{', '.join(RPSParameters.presets())}"
         )
     file = folder / name_or_file
-    if _is_mechanism(file):
+    if kind_of_file(file) == "mechanism":
         raise InputError(
             f"{name_or_file} is the file of a mechanism, not of the parameters of a 3-RPS; "
-            "mechanisms are for ClosedLoopModel, and for rps-pin describe, simulate, convert and "
-            "export c"
+            "mechanisms are for ClosedLoopModel, for --mechanism of a command, and for rps-pin "
+            "describe, simulate, convert and export c"
         )
     return RPSRobot(RPSParameters.from_yaml(file))
 
 
-def _is_mechanism(file: Path) -> bool:
-    """Return whether a file is a URDF, a MuJoCo file, or a description that names one."""
-    if file.suffix.lower() in (".urdf", ".xml", ".mjcf"):
-        return True
-    if not file.is_file() or file.stat().st_size > most(YAML):
-        return False
-    return re.search(rb"^(urdf|mjcf)\s*:", file.read_bytes(), re.MULTILINE) is not None
+def kind_of_file(file: Path) -> Kind | None:
+    """Return what a file describes, told by its name's ending and by its first keys.
+
+    Nothing is checked: the reader of that kind says what is wrong. None: it cannot be told.
+    """
+    suffix = file.suffix.lower()
+    if suffix in (".urdf", ".xml", ".mjcf"):
+        return "mechanism"
+    if suffix == ".csv":
+        return "trajectory"
+    if not is_file(file) or file.stat().st_size > most(YAML):
+        return None
+    keys = {key.decode() for key in _KEY.findall(file.read_bytes())}
+    return next((kind for kind, telling in _KEYS.items() if keys & telling), None)

@@ -1,0 +1,168 @@
+"""A robot of one's own: `rps-pin new` and `examples`, and what they print, as typed."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import shlex
+import shutil
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from rps_pin import ClosedLoopModel, RPSParameters, RPSRobot
+from rps_pin.cli.app import app
+from rps_pin.control.simulation.scenario import load_scenario
+from rps_pin.rps.motion.trajectory_file import load_trajectory
+from rps_pin.task import check_path
+from rps_pin.task.trajectory_file import load_task_trajectory
+from rps_pin.viewer.show import LocalView
+from tests.cli.commands import rps_pin
+from tests.each import each
+
+ROOT = Path(__file__).parents[2]
+URDF = ROOT / "urdf"
+#: Slow, or they need a browser: their files are loaded by others.
+SLOW = re.compile(r"rps-pin (workspace|reproduce|control|export)|--png|--fastest|--duration 3")
+TASKS = {"path.yaml": "delta", "stewart.csv": "stewart"}
+
+
+def run_as_typed(line: str, folder: Path) -> None:
+    """Run a command; a server ends at once, as by Ctrl-C."""
+    program, *words = shlex.split(line)
+    assert program == "rps-pin"
+    with (
+        mock.patch.object(LocalView, "play", side_effect=KeyboardInterrupt),
+        mock.patch("rps_pin.cli.view.threading") as threading,
+    ):
+        threading.Event.return_value.wait.side_effect = KeyboardInterrupt
+        ended = rps_pin(*words, folder=folder)
+    wanted = int(line == "rps-pin check --radius 0.075 --pitch 0.05")  # it crosses two
+    assert ended.returncode == wanted, (line, ended.stdout, ended.stderr)
+
+
+@each("kind", ["3rps", "stewart", "delta", "five-bar"])
+def test_a_new_robot_works_at_once_as_typed(kind: str, tmp_path: Path) -> None:
+    tmp_path /= kind
+    tmp_path.mkdir()
+    ended = rps_pin("new", kind, "--output", "mine", folder=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    commands = re.findall(r"^  (rps-pin .*)$", ended.stdout, re.MULTILINE)
+    assert [line.split()[1] for line in commands] == ["view", "describe", "ik", "fk", "dynamics"]
+    for line in commands:
+        run_as_typed(line, tmp_path)
+    again = rps_pin("new", kind, "--output", "mine", folder=tmp_path)
+    assert again.returncode == 1
+    assert "exist; --overwrite replaces them" in again.stderr
+
+
+@pytest.mark.parametrize("kind", ["stewart", "delta", "five-bar"])
+def test_it_is_the_robot_of_the_package_but_for_its_name(kind: str, tmp_path: Path) -> None:
+    assert rps_pin("new", kind, "--name", "my-own", folder=tmp_path).returncode == 0
+    own = ClosedLoopModel.load(tmp_path / "my-own" / "my-own.yaml")
+    theirs = ClosedLoopModel.load(URDF / f"{kind.replace('-', '_')}.yaml")
+    assert own.name == "my-own"
+    np.testing.assert_array_equal(own.home, theirs.home)
+    assert own.actuated == theirs.actuated
+    assert list(own.model.names) == list(theirs.model.names)
+    for one, other in zip(own.model.inertias, theirs.model.inertias, strict=True):
+        assert one == other
+    text = (tmp_path / "my-own" / "my-own.urdf").read_text()
+    for words in ("Mass (kg)", "What is drawn", "A frame:", "Limits of position"):
+        assert text.count(f"<!-- {words}") == 1
+    assert "tools/" not in text
+    described = (tmp_path / "my-own" / "my-own.yaml").read_text()
+    for line in re.findall(r"^(\w+):", described, re.MULTILINE):
+        assert re.search(rf"^# .*\n{line}:", described, re.MULTILINE), line
+
+
+def test_a_new_3rps_is_the_preset_with_a_comment_for_each_field(tmp_path: Path) -> None:
+    assert rps_pin("new", "3rps", "--name", "lab", folder=tmp_path).returncode == 0
+    file = tmp_path / "lab" / "lab.yaml"
+    assert RPSParameters.from_yaml(file) == RPSParameters.from_preset("micro").replace(name="lab")
+    assert file.read_text().count("\n# ") >= len(RPSParameters.model_fields)
+
+
+def test_a_name_that_is_none_is_told_the_rule() -> None:
+    for name in ("my robot", "../x", "7", ""):
+        ended = rps_pin("new", "3rps", "--name", name)
+        assert ended.returncode == 2
+        assert "a name begins with a letter" in " ".join(ended.stderr.split())
+
+
+def commands_of_readme() -> list[str]:
+    text = (ROOT / "README.md").read_text("utf-8")
+    block = text.partition("## Command line")[2].partition("`--help`")[0]
+    return [line.partition("#")[0].strip() for line in re.findall(r"rps-pin .*", block)]
+
+
+def commands_of_help(name: str) -> list[str]:
+    module = importlib.import_module(f"rps_pin.cli.{re.sub('[- ]', '_', name)}")
+    command = getattr(module, f"{module.__name__.rpartition('.')[2]}_command")
+    examples = re.split(r"\n    Examples?:", command.__doc__)[1:]
+    return [line for text in examples for line in re.findall(r"`(rps-pin [^`]*)`", text)]
+
+
+NAMES = [*sorted({str(one.name) for one in app.registered_commands} - {"doctor"}), "export c"]
+
+
+def test_every_command_has_an_example() -> None:
+    for name in NAMES:
+        assert commands_of_help(name), name
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("samples")
+    assert rps_pin("examples", "-o", ".", folder=folder).returncode == 0
+    return folder
+
+
+def all_commands() -> list[str]:
+    return [
+        *dict.fromkeys([*commands_of_readme(), *(c for n in NAMES for c in commands_of_help(n))])
+    ]
+
+
+@pytest.fixture
+def place(samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the samples; figures stay empty, as drawing takes most of the time."""
+    monkeypatch.setattr(Figure, "savefig", lambda _, path, **options: path.write_text("<svg/>"))
+    shutil.copytree(samples, tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+@pytest.mark.parametrize("line", [line for line in all_commands() if not SLOW.search(line)])
+def test_every_command_of_readme_and_help_runs_as_typed(line: str, place: Path) -> None:
+    run_as_typed(line, place)
+
+
+def test_the_files_that_commands_name_are_there_and_load(samples: Path) -> None:
+    """Also those of slow commands; each file is what its name says."""
+    named = {word for line in all_commands() for word in line.split() if "." in word}
+    inputs = {word for word in named if Path(word).suffix in (".yaml", ".csv", ".xml")}
+    assert inputs <= {file.name for file in samples.iterdir()}
+    mine = RPSRobot(RPSParameters.from_yaml(samples / "mine.yaml"))
+    for file in ("path.csv", "circle.yaml", "spline.yaml", "step.yaml"):
+        path = load_trajectory(samples / file, mine)
+        mine.inverse_kinematics(path.sample(np.linspace(0.0, path.duration, 200)).pose)
+    for name in ("path.yaml", "stewart.csv"):
+        task = ClosedLoopModel.load(URDF / f"{TASKS[name]}.yaml").task
+        path = load_task_trajectory(samples / name, task)
+        assert check_path(task, path).ok
+    for name in ("scenario.yaml", "faults.yaml"):
+        assert load_scenario(samples / name).duration > 0
+
+
+def test_samples_are_never_replaced_unless_asked(samples: Path, tmp_path: Path) -> None:
+    shutil.copytree(samples, tmp_path, dirs_exist_ok=True)
+    (tmp_path / "mine.yaml").write_text("PRECIOUS")
+    ended = rps_pin("examples", "-o", ".", folder=tmp_path)
+    assert ended.returncode == 1
+    assert "exist; --overwrite replaces them" in ended.stderr
+    assert (tmp_path / "mine.yaml").read_text() == "PRECIOUS"
+    assert rps_pin("examples", "-o", ".", "--overwrite", folder=tmp_path).returncode == 0
+    assert (tmp_path / "mine.yaml").read_text() == (samples / "mine.yaml").read_text()
