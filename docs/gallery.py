@@ -1,10 +1,14 @@
-"""Draw the figures of rps_pin.plots: docs/gallery.md and its pictures.
+"""Draw the figures of rps_pin.plots: docs/gallery.md, with the code of each, and its pictures.
 
 .venv/bin/python docs/gallery.py
 """
 
 from __future__ import annotations
 
+import contextlib
+import inspect
+import re
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,120 +16,203 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rps_pin import ClosedLoopModel, RPSRobot, helix, plots
-from rps_pin.control import ComputedTorque, Encoders, Gains, LoopRun, Plant, run_loop
+from rps_pin.control import ComputedTorque, Encoders, Gains, Plant, run_loop
 from rps_pin.paper import paper_comparison
-from rps_pin.rps import ActuatorLimits, Payload, force_causes, size_trajectory
+from rps_pin.rps import ActuatorLimits, Payload, force_causes, size_trajectory, time_optimal
 from rps_pin.rps.dynamics.motion_run import run_motion
 from rps_pin.rps.workspace import leg_grid, pose_grid, workspace
-from rps_pin.trajectories import circle
+from rps_pin.task import size_trajectory as size_of_task
+from rps_pin.trajectories import circle, point_to_point
+
+sokolov = RPSRobot.from_preset("sokolov")
+micro = RPSRobot.from_preset("micro")
 
 DOCS = Path(__file__).parent
 IMAGES = DOCS / "images" / "gallery"
-DPI = 72
+#: Lines of this file that the page's first block has.
+_FIRST = re.compile(
+    r"^(?:from rps_pin.*|import numpy as np|sokolov = .*|micro = .*)$", re.MULTILINE
+)
+Draw = Callable[[], Figure]
+#: Caption and function of each figure, by the name of its picture.
+FIGURES: dict[str, tuple[str, Draw]] = {}
 
 
-def figures() -> dict[str, tuple[str, Callable[[], Figure]]]:
-    """Return the title and a call of each function, by its name."""
-    sokolov, micro = RPSRobot.from_preset("sokolov"), RPSRobot.from_preset("micro")
-    path = helix(sokolov, radius=0.75e-3, pitch=0.5e-3, height=0.4)
-    run = run_motion(sokolov, path, sample_rate=200.0)
+def shown(caption: str) -> Callable[[Draw], Draw]:
+    """Let the page have what a function draws, and its code."""
+
+    def kept(draw: Draw) -> Draw:
+        FIGURES[draw.__name__.removeprefix("_")] = caption, draw
+        return draw
+
+    return kept
+
+
+@shown("Path of the platform's centre")
+def _plot_path() -> Figure:
+    run = run_motion(sokolov, helix(sokolov, radius=0.75e-3, pitch=0.5e-3, height=0.4), 200.0)
+    return plots.plot_path(run)
+
+
+@shown("Leg lengths over time, with their limits")
+def _plot_lengths() -> Figure:
+    run = run_motion(micro, circle(height=0.223, tilt=0.15, duration=0.6), 200.0)
+    return plots.plot_lengths(run)
+
+
+@shown("Actuator forces over time; where the acceleration jumps, so do they")
+def _plot_forces() -> Figure:
+    run = run_motion(sokolov, helix(sokolov, radius=0.75e-3, pitch=0.5e-3, height=0.4), 200.0)
+    return plots.plot_forces(run)
+
+
+@shown("Speed of the legs over their length")
+def _plot_length_phase() -> Figure:
+    run = run_motion(sokolov, helix(sokolov, radius=0.75e-3, pitch=0.5e-3, height=0.4), 200.0)
+    return plots.plot_length_phase(run)
+
+
+@shown("Actuator forces by cause")
+def _plot_force_causes() -> Figure:
     loaded = micro.with_payload(Payload(mass=0.5, centre=(0.0, 0.0, 0.05)))
-    task = circle(height=0.223, tilt=0.1, duration=0.6)
-    time = np.linspace(0.0, task.duration, 601)
-    limits = ActuatorLimits(force=25.0, speed=0.2, power=2.0)
-    space = workspace(micro, leg_grid(micro.parameters, 21))
-    tilts = np.linspace(-0.5, 0.5, 121)
-    slices = workspace(micro, pose_grid([0.225], tilts))
-    controlled = loop(micro)
-    four_bar = ClosedLoopModel.load(DOCS.parent / "urdf" / "four_bar.yaml")
-    falling = four_bar.simulate(four_bar.home, duration=1.0)
-    heights = np.linspace(0.15, 0.6, 61)
+    motion = circle(height=0.223, tilt=0.1, duration=0.6)
+    time = np.linspace(0.0, motion.duration, 601)
+    return plots.plot_force_causes(time, force_causes(loaded, *motion.sample(time)))
+
+
+@shown("Actuator forces by cause in the shortest time along a circle, at a limit of force")
+def _plot_force_causes_fastest() -> Figure:
+    limits = ActuatorLimits(force=9.0, speed=0.3)
+    motion = time_optimal(micro, circle(height=0.223, tilt=0.1, duration=0.6), limits=limits)
+    time = np.linspace(0.0, motion.duration, 601)
+    causes = force_causes(micro, *motion.sample(time))
+    return plots.plot_force_causes(time, causes, limit=limits.force)
+
+
+@shown("Force over speed of the actuators, within limits of force, speed and power")
+def _plot_sizing() -> Figure:
+    motion = circle(height=0.223, tilt=0.1, duration=0.6)
+    limits = ActuatorLimits(force=10.0, speed=0.2, power=1.0)
+    return plots.plot_sizing(size_trajectory(micro, motion, limits=limits))
+
+
+@shown("Torque over speed of a Delta's drives, with their limits")
+def _plot_sizing_of_a_mechanism() -> Figure:
+    task = ClosedLoopModel.load("urdf/delta.yaml").task
+    motion = point_to_point(task.home, [0.1, 0.05, -0.4], duration=0.12)
+    return plots.plot_sizing(size_of_task(task, motion, 500.0))
+
+
+@shown("Assembly modes of given leg lengths")
+def _plot_assembly_modes() -> Figure:
     modes = micro.assembly_modes([0.225] * 3)
-    return {
-        "plot_path": ("path of the platform's centre", lambda: plots.plot_path(run)),
-        "plot_lengths": ("leg lengths over time", lambda: plots.plot_lengths(run)),
-        "plot_forces": ("actuator forces over time", lambda: plots.plot_forces(run)),
-        "plot_length_phase": ("speed over length", lambda: plots.plot_length_phase(run)),
-        "plot_force_causes": (
-            "actuator forces by cause",
-            lambda: plots.plot_force_causes(time, force_causes(loaded, *task.sample(time))),
-        ),
-        "plot_sizing": (
-            "force over speed, and the actuators' limits",
-            lambda: plots.plot_sizing(size_trajectory(loaded, task, limits=limits)),
-        ),
-        "plot_assembly_modes": (
-            "assembly modes of given leg lengths",
-            lambda: plots.plot_assembly_modes(micro.parameters, modes),
-        ),
-        "plot_theoretical": (
-            "the theoretical workspace",
-            lambda: plots.plot_theoretical(micro.parameters),
-        ),
-        "plot_effective": (
-            "the effective workspace within it",
-            lambda: plots.plot_effective(space),
-        ),
-        "plot_space": ("boundary of the workspace in space", lambda: plots.plot_space(space)),
-        "plot_views": (
-            "positions of the workspace in three planes",
-            lambda: plots.plot_views(space),
-        ),
-        "plot_reasons": (
-            "reachable tilts, and the reasons why others are not",
-            lambda: plots.plot_reasons(slices, 0.225),
-        ),
-        "plot_comparison": (
-            "extent of the workspace over the base radius, with the paper's values",
-            lambda: plots.plot_comparison(paper_comparison(points=11)),
-        ),
-        "plot_tilt_conditioning": (
-            "singularity measure over the tilt",
-            lambda: plots.plot_tilt_conditioning(sokolov.parameters, 0.4),
-        ),
-        "plot_height_conditioning": (
-            "singularity measure over height and tilt",
-            lambda: plots.plot_height_conditioning(sokolov.parameters, heights),
-        ),
-        "plot_tracking": (
-            "tracking errors of a controller",
-            lambda: plots.plot_tracking(controlled),
-        ),
-        "plot_loop_forces": (
-            "forces and status of a controller",
-            lambda: plots.plot_loop_forces(controlled),
-        ),
-        "plot_simulation": (
-            "simulation of a mechanism",
-            lambda: plots.plot_simulation(falling, four_bar),
-        ),
-    }
+    return plots.plot_assembly_modes(micro.parameters, modes)
 
 
-def loop(robot: RPSRobot) -> LoopRun:
-    """Return a controlled motion with encoders."""
-    path = circle(height=0.223, tilt=0.05, duration=0.5)
-    start = path.sample(0.0).pose
-    controller = ComputedTorque(robot, start, Gains.placed(15.0, integral=0.2))
-    plant = Plant(robot, start, delay=1, encoders=Encoders(resolution=50e-9, noise=20e-9))
-    return run_loop(controller, plant, path)
+@shown("Theoretical workspace")
+def _plot_theoretical() -> Figure:
+    return plots.plot_theoretical(micro.parameters)
+
+
+@shown("Effective workspace within the theoretical one")
+def _plot_effective() -> Figure:
+    space = workspace(micro, leg_grid(micro.parameters, 21))
+    return plots.plot_effective(space)
+
+
+@shown("Boundary of the workspace in space, with the conditioning")
+def _plot_space() -> Figure:
+    space = workspace(micro, leg_grid(micro.parameters, 21))
+    return plots.plot_space(space)
+
+
+@shown("Outlines of the workspace in three planes")
+def _plot_views() -> Figure:
+    space = workspace(micro, leg_grid(micro.parameters, 21))
+    return plots.plot_views(space)
+
+
+@shown("Tilts that are reachable at a height, and the reasons why others are not")
+def _plot_reasons() -> Figure:
+    tilts = workspace(micro, pose_grid([0.225], np.linspace(-0.5, 0.5, 201)))
+    return plots.plot_reasons(tilts, 0.225)
+
+
+@shown("Extent of the workspace over the base radius, with the paper's value")
+def _plot_comparison() -> Figure:
+    return plots.plot_comparison(paper_comparison(points=11))
+
+
+@shown("Distance to a singularity over the tilt")
+def _plot_tilt_conditioning() -> Figure:
+    return plots.plot_tilt_conditioning(sokolov.parameters, height=0.4)
+
+
+@shown("Distance to a singularity over height and tilt")
+def _plot_height_conditioning() -> Figure:
+    return plots.plot_height_conditioning(sokolov.parameters, np.linspace(0.15, 0.6, 61))
+
+
+@shown("Targets, actual lengths and errors of a controlled 3-RPS, with encoders and a delay")
+def _plot_tracking() -> Figure:
+    motion = circle(height=0.223, tilt=0.05, duration=0.5)
+    start = motion.sample(0.0).pose
+    controller = ComputedTorque(micro, start, Gains.placed(15.0, integral=0.2))
+    plant = Plant(micro, start, delay=1, encoders=Encoders(resolution=50e-9, noise=20e-9))
+    return plots.plot_tracking(run_loop(controller, plant, motion))
+
+
+@shown("Targets, actual values and errors of a controlled five-bar")
+def _plot_tracking_of_a_mechanism() -> Figure:
+    task = ClosedLoopModel.load("urdf/five_bar.yaml").task
+    motion = point_to_point(task.home, task.home + 0.02, duration=0.4)
+    controller = ComputedTorque(task, task.home, Gains.placed(15.0, integral=0.2))
+    plant = Plant(task, task.home, delay=1)
+    return plots.plot_tracking(run_loop(controller, plant, motion))
+
+
+@shown("Forces and status of a controller")
+def _plot_loop_forces() -> Figure:
+    motion = circle(height=0.223, tilt=0.05, duration=0.5)
+    start = motion.sample(0.0).pose
+    controller = ComputedTorque(micro, start, Gains.placed(15.0, integral=0.2))
+    return plots.plot_loop_forces(run_loop(controller, Plant(micro, start), motion))
+
+
+@shown("Simulation of a mechanism that falls: positions and energies")
+def _plot_simulation() -> Figure:
+    four_bar = ClosedLoopModel.load("urdf/four_bar.yaml")
+    falling = four_bar.simulate(four_bar.home, duration=1.0)
+    return plots.plot_simulation(falling, four_bar)
+
+
+def page() -> str:
+    """Return the page: each figure with its code, which `tests/test_docs.py` runs."""
+    first = _FIRST.findall(Path(__file__).read_text("utf-8"))
+    lines = [
+        "<!-- made by docs/gallery.py -->",
+        "# Gallery",
+        "",
+        "The figures of `rps_pin.plots`, as wide as a journal's column (85 mm) or page (175 mm),",
+        "with letters of 8 pt. Functions with one panel take existing axes (`axes=`), most others",
+        "an existing figure (`figure=`). `plots.save_figure` writes PNG and SVG.",
+        *("", "```python", first[0], "", *first[1:-2], "", *first[-2:], "```"),
+    ]
+    for name, (caption, draw) in FIGURES.items():
+        code = textwrap.dedent(inspect.getsource(draw).split("-> Figure:\n", 1)[1])
+        lines += ["", f"## {caption}", "", "```python"]
+        lines += [re.sub("^return ", "figure = ", code, flags=re.MULTILINE).rstrip()]
+        lines += ["```", "", f"![{caption}](images/gallery/{name}.png)"]
+    return "\n".join(lines) + "\n"
 
 
 def main() -> None:
     """Write the pictures and the page."""
     IMAGES.mkdir(parents=True, exist_ok=True)
-    lines = [
-        "<!-- made by docs/gallery.py -->",
-        "# Gallery",
-        "",
-        "The figures of `rps_pin.plots`. Most take existing axes (`axes=`); those in 3D take",
-        "an existing figure (`figure=`). `docs/gallery.py` contains the calls.",
-    ]
-    for name, (shows, draw) in figures().items():
-        draw().savefig(IMAGES / f"{name}.png", dpi=DPI)
-        lines += ["", f"## {name}", "", f"{shows[0].upper()}{shows[1:]}.", ""]
-        lines.append(f"![{shows}](images/gallery/{name}.png)")
-    (DOCS / "gallery.md").write_text("\n".join(lines) + "\n", "utf-8")
+    with contextlib.chdir(DOCS.parent):  # URDF files are found from there
+        for name, (_, draw) in FIGURES.items():
+            draw().savefig(IMAGES / f"{name}.png")
+    (DOCS / "gallery.md").write_text(page(), "utf-8")
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ def main() -> None:
         command = [sys.executable, "-c", "from rps_pin.cli import main; main()", "helix"]
         shown = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
         text = replaced(text, "rps-pin helix", quoted(shown.stdout.split("Written:")[0]))
-        shutil.copy(Path(folder) / "helix" / "figure_9_forces.png", IMAGES / "forces.png")
+        shutil.copy(Path(folder) / "helix" / "forces.png", IMAGES / "forces.png")
     photograph(IMAGES / "robot.png")
     block = re.search(r"```python\n(.*?)```", text, re.DOTALL)
     assert block is not None

@@ -335,7 +335,7 @@ def test_workspace_writes_figures_data_and_what_the_paper_states(tmp_path: Path)
     assert not any(row["holds"] for row in others)
     assert summary["volume"] < 1e-3 * summary["cylinder_volume"]
     names = {Path(file).name for file in summary["files"]}
-    assert {"workspace.h5", "boundary.stl", "figure_2_assembly_modes.png"} <= names
+    assert {"workspace.h5", "boundary.stl", "assembly_modes.png"} <= names
     assert all(Path(file).stat().st_size > 1000 for file in summary["files"])
 
     before = (tmp_path / "out" / "workspace.h5").read_bytes()

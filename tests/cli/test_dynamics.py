@@ -19,7 +19,7 @@ CIRCLE = "kind: circle\nheight: 0.223\ntilt: 0.1\nduration: 2.0\n"
 FIGURES = [
     f"{name}.{suffix}"
     for name in (
-        *("figure_7_path", "figure_8_lengths", "figure_9_forces"),
+        *("path", "lengths", "forces"),
         *("forces_by_cause", "force_over_speed"),
     )
     for suffix in ("png", "svg")

@@ -34,9 +34,9 @@ CASES = {
     "view html": (102_400, ["view.html"]),
     "simulate": (102_400, ["viewer.html", "simulation.csv", "simulation.png", "simulation.svg"]),
     "control": (8192, ["loop.csv", "report.md", "summary.json", "tracking.png", "viewer.html"]),
-    "helix": (4096, ["helix.csv", "figure_7_path.png", "viewer.html"]),
+    "helix": (4096, ["helix.csv", "path.png", "viewer.html"]),
     "dynamics": (4096, ["dynamics.csv", "sizing.json", "forces_by_cause.svg", "viewer.html"]),
-    "workspace": (4096, ["workspace.h5", "boundary.stl", "figure_2_assembly_modes.png"]),
+    "workspace": (4096, ["workspace.h5", "boundary.stl", "assembly_modes.png"]),
     "reproduce": (4096, ["reproduction/figure_1.png", "reproduction.md"]),
 }
 #: The browser of pictures needs files of any size: these are tried on a small disk alone.

@@ -13,18 +13,22 @@ from rps_pin.paper.compute import Reproduction
 from rps_pin.paper.figure_1 import POSE, plot_mechanism
 from rps_pin.paper.figures import pictures
 from rps_pin.paper.table_2_figures import plot_table_2
+from rps_pin.plots import COLUMN, PAGE
+from tests.plots.overlaps import faults
 
 
 def test_there_is_a_picture_for_each_of_the_paper_s(found: Reproduction) -> None:
     assert {f"figure_{n}" for n in range(1, 10)} < set(pictures(found))
 
 
-def test_axes_have_names(found: Reproduction) -> None:
+def test_axes_have_names_and_no_text_collides(found: Reproduction) -> None:
     for name, draw in pictures(found).items():
         figure = draw()
         assert isinstance(figure, Figure)
+        assert figure.get_figwidth() in (COLUMN, PAGE)
+        assert not faults(figure), name
         for axes in figure.axes:
-            if isinstance(axes, Axes3D) or name == "table_2":
+            if isinstance(axes, Axes3D) or name == "table_2" or axes.get_label() == "<colorbar>":
                 continue
             assert axes.get_xlabel(), name
 

@@ -23,7 +23,7 @@ def contours(figure: Figure) -> list[QuadContourSet]:
 def test_the_measure_is_drawn_over_the_tilts(measure: str) -> None:
     figure = plot_tilt_conditioning(SOKOLOV, 0.4, TILTS, measure=measure)  # type: ignore[arg-type]
     axes, bar = figure.axes
-    assert axes.get_xlabel() == "tilt about x (degrees)"
+    assert axes.get_xlabel() == "tilt about x (degrees), at $p_z$ = 400 mm"
     assert axes.get_ylabel() == "tilt about y (degrees)"
     assert "(0 singular" in bar.get_ylabel()
     drawn = contours(figure)[0]

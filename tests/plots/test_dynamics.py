@@ -16,6 +16,7 @@ from rps_pin.rps.dynamics.sizing import size_trajectory
 from rps_pin.task.sizing.sizing import size_trajectory as size_of_task
 from rps_pin.task.sizing.sizing_sheet import ActuatorLimits, SizingSheet
 from rps_pin.trajectories import point_to_point
+from tests.plots.overlaps import faults
 
 Array = NDArray[np.float64]
 
@@ -45,7 +46,9 @@ def test_stacks_end_at_the_sums_of_their_signs(causes: tuple[Array, ForceCauses]
     assert len(figure.axes) == 3
     for leg, axes in enumerate(figure.axes):
         assert "(N)" in axes.get_ylabel()
-        assert np.array_equal(axes.get_lines()[0].get_ydata(), parts.total[:, leg])
+        line = axes.get_lines()[0]
+        kept = np.isin(line.get_xdata(), time)  # the others stand where forces jump
+        assert np.array_equal(np.asarray(line.get_ydata())[kept], parts.total[:, leg])
         corners = np.concatenate(
             [path.vertices for area in axes.collections for path in area.get_paths()]
         )
@@ -57,6 +60,18 @@ def test_stacks_end_at_the_sums_of_their_signs(causes: tuple[Array, ForceCauses]
     assert legend is not None
     labels = [text.get_text() for text in legend.get_texts()]
     assert labels == ["gravity", "inertia", "Coriolis", "friction", "payload", "sum"]
+
+
+def test_causes_that_would_not_be_seen_are_left_out(causes: tuple[Array, ForceCauses]) -> None:
+    """At a tenth of the speed, Coriolis forces are a hundredth, and inertia is still shown."""
+    robot = RPSRobot.from_preset("sokolov")
+    path = helix(robot, radius=20e-3, pitch=50e-3, height=0.4, duration=10.0)
+    time = np.linspace(0, path.duration, 201)
+    parts = force_causes(robot, *path.sample(time))
+    assert np.abs(parts.coriolis).max() < 5e-3 * np.abs(parts.gravity).max()
+    legend = plot_force_causes(time, parts).axes[0].get_legend()
+    assert legend is not None
+    assert "Coriolis" not in [text.get_text() for text in legend.get_texts()]
 
 
 def test_causes_are_drawn_on_ones_own_axes(causes: tuple[Array, ForceCauses]) -> None:
@@ -101,10 +116,19 @@ def test_sizing_of_a_mechanism_has_its_joints_and_their_units() -> None:
     for name, unit in (("delta", "torque (N m)"), ("stewart", "force (N)")):
         task = ClosedLoopModel.load(f"urdf/{name}.yaml").task
         end = task.home.copy()
-        end[2] += 0.02
+        end[:3] += [0.01, 0.005, 0.02]
         sheet = size_of_task(task, point_to_point(task.home, end, duration=0.5), 50.0)
         axes = plot_sizing(sheet).axes[0]
         assert axes.get_ylabel() == unit
         labels = axes.get_legend_handles_labels()[1]
         assert labels[: len(task.mechanism.actuated)] == list(task.mechanism.actuated)
         assert "limits" in labels
+        assert not faults(axes.get_figure(root=True))
+
+
+def test_actuators_that_do_the_same_are_one_curve() -> None:
+    task = ClosedLoopModel.load("urdf/stewart.yaml").task
+    end = task.home + np.array([0.0, 0.0, 0.02, 0.0, 0.0, 0.0])
+    sheet = size_of_task(task, point_to_point(task.home, end, duration=0.5), 50.0)
+    labels = plot_sizing(sheet).axes[0].get_legend_handles_labels()[1]
+    assert labels == ["all 6 are equal", "limits"]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from rps_pin import RPSRobot, helix
 from rps_pin.plots import plot_forces, plot_lengths, plot_path, save_figure
 from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
+from rps_pin.trajectories import circle
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +37,23 @@ def test_forces_are_drawn_in_newtons_on_ones_own_axes(run: MotionRun) -> None:
     assert "(N)" in axes.get_ylabel()
     assert len(axes.get_lines()) == 3
     for leg, line in enumerate(axes.get_lines()):
-        assert np.array_equal(line.get_ydata(), run.force[:, leg])
+        at = np.isin(line.get_xdata(), run.time)
+        assert np.array_equal(np.asarray(line.get_ydata())[at], run.force[:, leg])
+
+
+def test_forces_jump_upright_where_accelerations_do(run: MotionRun) -> None:
+    """A helix ramps its speed: the acceleration jumps at the ends of the ramps, 0.5 s long here."""
+    robot = RPSRobot.from_preset("sokolov")
+    path = helix(robot, radius=0.75e-3, pitch=0.5e-3, height=0.4)
+    ramps = np.array([path.ramp, path.duration - path.ramp])
+    (axes,) = plot_forces(run).axes
+    for line in axes.get_lines():
+        time = np.asarray(line.get_xdata())
+        upright = time[:-1][np.diff(time) == 0.0]
+        assert len(upright) == 2
+        assert np.abs(upright - ramps).max() <= 1 / 50.0
+    smooth = run_motion(robot, circle(height=0.4, tilt=0.05, duration=1.0), 100.0)
+    assert len(plot_forces(smooth).axes[0].get_lines()[0].get_xdata()) == len(smooth.time)
 
 
 def test_the_path_in_space_is_the_helix(run: MotionRun) -> None:

@@ -31,6 +31,8 @@ from rps_pin.validation import finite_number
 
 Six = tuple[float, float, float, float, float, float]
 
+_FIGURES = ("forces_by_cause", "force_over_speed")
+
 
 def dynamics_command(
     trajectory: Annotated[
@@ -124,7 +126,7 @@ def dynamics_command(
     name = machine.parameters.name
     path = load_trajectory(trajectory, machine)
     folder = output or Path(f"{trajectory.stem}-dynamics")
-    figures = figures_in(folder, "forces_by_cause", "force_over_speed")
+    figures = figures_in(folder, *_FIGURES)
     results = [*motion_files(folder, "dynamics"), *figures, folder / "sizing.json"]
     check_outputs(results, overwrite, inputs=[trajectory], renewed=True)
     console = common.text_console(as_json)
@@ -150,8 +152,9 @@ def dynamics_command(
         files = write_motion(folder, "dynamics", title, machine, run)
         motion = run.pose, run.rate, run.acceleration
         causes = force_causes(machine, *motion, wrench=wrench, legs=run.legs)
-        files += save_figure(plot_force_causes(run.time, causes), folder, "forces_by_cause")
-        files += save_figure(plot_sizing(sheet), folder, "force_over_speed")
+        drawn = plot_force_causes(run.time, causes, limit=limits.force), plot_sizing(sheet)
+        for figure, name_of_figure in zip(drawn, _FIGURES, strict=True):
+            files += save_figure(figure, folder, name_of_figure)
         files.append(folder / "sizing.json")
         write_text(files[-1], json.dumps(sheet.as_dict(), indent=2) + "\n")
     if as_json:

@@ -16,7 +16,7 @@ from rps_pin.rps.dynamics.motion_run import ActuatorSummary, MotionRun, MotionSu
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.trajectories.path import Trajectory, end_states
 
-_FIGURES = ("figure_7_path", "figure_8_lengths", "figure_9_forces")
+_FIGURES = ("path", "lengths", "forces")
 
 
 def motion_files(folder: Path, name: str) -> list[Path]:

@@ -20,11 +20,11 @@ from rps_pin.rps.robot import RPSRobot
 #: Lengths per leg of the surfaces in the figures.
 _DRAWN_POINTS = 18
 _FIGURES = (
-    "figure_2_assembly_modes",
-    "figure_3_theoretical",
-    "figure_4_effective",
-    "figure_5_space",
-    "figure_6_views",
+    "assembly_modes",
+    "theoretical_workspace",
+    "effective_workspace",
+    "workspace_surface",
+    "workspace_outlines",
 )
 
 
@@ -63,8 +63,7 @@ def workspace_command(
     summary = _summary(machine, found, rows)
     with console.status("writing the results"):
         # Slow to import: only for commands that draw.
-        from rps_pin.plots import save_figure
-        from rps_pin.plots import workspace as plots
+        from rps_pin import plots
 
         space.save_workspace(found, files[0], overwrite=True)
         space.save_mesh(space.boundary(found), files[1], overwrite=True)
@@ -81,7 +80,7 @@ def workspace_command(
             *([plots.plot_comparison(rows)] if rows else []),
         ]
         for name, figure in zip(drawn, figures, strict=True):
-            files += save_figure(figure, output, name)
+            files += plots.save_figure(figure, output, name)
     if as_json:
         common.print_json(summary | {"files": files})
         return

@@ -8,15 +8,12 @@ from pathlib import Path
 import matplotlib
 from matplotlib.figure import Figure
 
+from rps_pin import plots
 from rps_pin.files import whole_file
 from rps_pin.paper import table_2_figures as table_2
 from rps_pin.paper.compute import Reproduction
 from rps_pin.paper.figure_1 import plot_mechanism
-from rps_pin.plots import STYLE, plot_forces, plot_lengths, plot_path, workspace
 from rps_pin.rps.robot import RPSRobot
-
-_DOTS_PER_INCH = 80
-
 
 #: Names of the pictures' files.
 NAMES = (
@@ -30,14 +27,14 @@ def pictures(found: Reproduction) -> dict[str, Callable[[], Figure]]:
     micro = found.workspace.parameters
     return {
         "figure_1": lambda: plot_mechanism(RPSRobot.from_preset("sokolov")),
-        "figure_2": lambda: workspace.plot_assembly_modes(micro, found.modes),
-        "figure_3": lambda: workspace.plot_theoretical(micro),
-        "figure_4": lambda: workspace.plot_effective(found.coarse_workspace),
-        "figure_5": lambda: workspace.plot_space(found.coarse_workspace),
-        "figure_6": lambda: workspace.plot_views(found.workspace),
-        "figure_7": lambda: plot_path(found.runs["+"]),
-        "figure_8": lambda: plot_branches(found, plot_lengths),
-        "figure_9": lambda: plot_branches(found, plot_forces),
+        "figure_2": lambda: plots.plot_assembly_modes(micro, found.modes),
+        "figure_3": lambda: plots.plot_theoretical(micro),
+        "figure_4": lambda: plots.plot_effective(found.coarse_workspace),
+        "figure_5": lambda: plots.plot_space(found.coarse_workspace),
+        "figure_6": lambda: plots.plot_views(found.workspace),
+        "figure_7": lambda: plots.plot_path(found.runs["+"]),
+        "figure_8": lambda: plot_branches(found, plots.plot_lengths),
+        "figure_9": lambda: plot_branches(found, plots.plot_forces),
         "approach": lambda: table_2.plot_approach(found.approach),
         "probes": lambda: table_2.plot_probes(found.probes),
         "interpretations": lambda: table_2.plot_interpretations(found),
@@ -56,21 +53,20 @@ def write_figures(
     files = []
     for name in track(NAMES, "pictures"):
         path = folder / f"{name}.png"
-        with matplotlib.rc_context(STYLE), whole_file(path) as scratch:
-            draw[name]().savefig(scratch, dpi=_DOTS_PER_INCH, metadata={"Software": None})
+        with matplotlib.rc_context(plots.STYLE), whole_file(path) as scratch:
+            draw[name]().savefig(scratch, metadata={"Software": None})
         files.append(path)
     return files
 
 
+@plots.styled
 def plot_branches(found: Reproduction, plot: Callable[..., Figure]) -> Figure:
     """Draw a quantity of Table 1's helix over time, the two branches side by side."""
-    figure = Figure(figsize=(10.4, 3.8), layout="constrained")
+    figure = Figure(figsize=(plots.PAGE, 2.2), layout="constrained")
     axes = figure.subplots(1, 2, sharey=True)
     for one, (branch, run) in zip(axes, found.runs.items(), strict=True):
         plot(run, one)
-        one.set_title(f"{one.get_title(loc='left')}, branch {branch}", loc="left")
-        one.get_legend().remove()
-    low, high = axes[0].get_ylim()
-    axes[0].set_ylim(low, high + 0.12 * (high - low))
-    axes[0].legend(loc="upper right", ncols=3, frameon=False)
+        one.set_xlabel(f"time (s), branch {branch}")
+    axes[1].get_legend().remove()
+    axes[1].set_ylabel("")
     return figure

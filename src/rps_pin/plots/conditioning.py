@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,19 +11,21 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.plots.style import COLOUR_MAP, STYLE, figure_of, new_axes
+from rps_pin.plots.curves import legend_above
+from rps_pin.plots.style import COLOUR_MAP, COLUMN, figure_of, new_axes, styled
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measures import singularity_measures
 from rps_pin.validation import choice, finite_number, real_array
 
 Measure = Literal["type_ii", "constraint", "determinant"]
 _LABELS = {
-    "type_ii": "distance to type II (0 singular, 1 at best)",
-    "constraint": "distance to constraint (0 singular, 1 at best)",
+    "type_ii": "distance to type II (0 singular, 1 best)",
+    "constraint": "distance to constraint (0 singular, 1 best)",
     "determinant": "determinant (0 singular)",
 }
 
 
+@styled
 def plot_tilt_conditioning(
     parameters: RPSParameters,
     height: float,
@@ -56,14 +57,14 @@ def plot_tilt_conditioning(
     across = _increasing(np.linspace(-1.5, 1.5, 161) if tilts is None else tilts, "tilts")
     x, y = np.meshgrid(across, across)
     pose = np.stack([np.full_like(x, finite_number(height, "height", "m")), x, y], axis=-1)
-    with matplotlib.rc_context(STYLE):
-        axes = new_axes(axes, (5.6, 4.6))
-        _map(axes, parameters, pose, (np.degrees(x), np.degrees(y)), measure)
-        axes.set(xlabel="tilt about x (degrees)", ylabel="tilt about y (degrees)", aspect="equal")
-        axes.set_title(f"At $p_z$ = {1e3 * height:.6g} mm", loc="left")
+    axes = new_axes(axes, (COLUMN, 2.9))
+    _map(axes, parameters, pose, (np.degrees(x), np.degrees(y)), measure)
+    axes.set(xlabel=f"tilt about x (degrees), at $p_z$ = {1e3 * height:.6g} mm", aspect="equal")
+    axes.set_ylabel("tilt about y (degrees)")
     return figure_of(axes)
 
 
+@styled
 def plot_height_conditioning(
     parameters: RPSParameters,
     heights: ArrayLike,
@@ -98,11 +99,10 @@ def plot_height_conditioning(
     angle = finite_number(direction, "direction", "rad")
     tilt, z = np.meshgrid(across, up)
     pose = np.stack([z, tilt * np.cos(angle), tilt * np.sin(angle)], axis=-1)
-    with matplotlib.rc_context(STYLE):
-        axes = new_axes(axes, (5.6, 4.2))
-        _map(axes, parameters, pose, (np.degrees(tilt), 1e3 * z), measure)
-        axes.set_xlabel(f"tilt about the axis at {np.degrees(angle):.4g} degrees (degrees)")
-        axes.set_ylabel("height $p_z$ (mm)")
+    axes = new_axes(axes, (COLUMN, 2.7))
+    _map(axes, parameters, pose, (np.degrees(tilt), 1e3 * z), measure)
+    about = f" about the axis {np.degrees(angle):.4g}° from x" if angle else " about x"
+    axes.set(xlabel=f"tilt{about} (degrees)", ylabel="height $p_z$ (mm)")
     return figure_of(axes)
 
 
@@ -117,9 +117,11 @@ def _map(
         levels = np.linspace(-1.0, 1.0, 21) * np.abs(values).max()
     filled = axes.contourf(*at, values, levels, cmap=COLOUR_MAP)
     if found.determinant.min() < 0.0 < found.determinant.max():
-        axes.contour(*at, found.determinant, [0.0], colors="black")
+        axes.contour(*at, found.determinant, [0.0], colors="black", linewidths=1.2)
+        axes.plot([], [], color="black", label="singular")
+        legend_above(axes)
     axes.grid(visible=False)
-    figure_of(axes).colorbar(filled, ax=axes, label=_LABELS[measure])
+    figure_of(axes).colorbar(filled, ax=axes, label=_LABELS[measure], aspect=30)
 
 
 def _increasing(values: ArrayLike, name: str) -> Array:

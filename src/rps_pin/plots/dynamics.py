@@ -5,10 +5,10 @@ Each function draws on given axes, or makes a figure. No window is opened.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,7 +16,14 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
-from rps_pin.plots.style import STYLE, figure_of, legend_above, new_axes, plot_legs, three_axes
+from rps_pin.plots.curves import (
+    draw_limits,
+    legend_above,
+    names_for_figure,
+    plot_curves,
+    with_jumps,
+)
+from rps_pin.plots.style import COLUMN, figure_of, new_axes, styled, three_axes
 from rps_pin.rps.dynamics.force_causes import ForceCauses
 from rps_pin.task.sizing.sizing_sheet import SizingSheet
 from rps_pin.validation import real_array
@@ -32,15 +39,22 @@ _CAUSES = {
     "external": ("#F0E442", "--"),
 }
 _LABELS = {"coriolis": "Coriolis"}
+#: Share of the largest part that can be seen.
+_VISIBLE = 5e-3
 
 
+@styled
 def plot_force_causes(
-    time: ArrayLike, causes: ForceCauses, axes: Sequence[Axes] | None = None
+    time: ArrayLike,
+    causes: ForceCauses,
+    axes: Sequence[Axes] | None = None,
+    *,
+    limit: float = math.inf,
 ) -> Figure:
     """Draw the actuator forces over time as stacks of their causes, a panel for each actuator.
 
     Positive parts stand on zero, negative ones hang from it; the black line is the force, their
-    sum. Causes that are zero throughout are left out.
+    sum. Causes that are less than 0.5 % of the largest are left out. Jumps are upright.
 
     Parameters
     ----------
@@ -50,6 +64,8 @@ def plot_force_causes(
         Of n samples.
     axes
         Three axes to draw on; default: those of a new figure.
+    limit
+        Of the forces' magnitudes, N; drawn if they come near.
 
     Raises
     ------
@@ -63,44 +79,51 @@ def plot_force_causes(
             f"time has shape {times.shape} and the causes {total.shape}; they must be (n,) and "
             "(n, 3)"
         )
-    with matplotlib.rc_context(STYLE):
-        axes = three_axes(axes, "Actuator forces by cause")
-        shown = {name: part for name, part in causes.parts().items() if part.any()}
-        for leg, own in enumerate(axes):
-            _stacks(own, times, {name: part[:, leg] for name, part in shown.items()})
-            own.plot(times, total[:, leg], color="black", linewidth=1.2, label="sum")
-            own.axhline(0.0, color="black", linewidth=0.6)
-            own.set_ylabel(f"force $F_{leg + 1}$ (N)")
-            own.margins(x=0)
-        axes[-1].set_xlabel("time (s)")
-        legend_above(axes[0], columns=7)
+    axes = three_axes(axes, 4.6)
+    least = _VISIBLE * max(float(np.abs(part).max()) for part in causes.parts().values())
+    shown = {name: part for name, part in causes.parts().items() if np.abs(part).max() > least}
+    times, total, *parts = with_jumps(times, total, *shown.values())
+    shown = dict(zip(shown, parts, strict=True))
+    for leg, own in enumerate(axes):
+        _stacks(own, times, {name: part[:, leg] for name, part in shown.items()})
+        own.plot(times, total[:, leg], color="black", label="sum")
+        own.axhline(0.0, color="black", linewidth=0.6)
+        draw_limits(own, total[:, leg], -limit, limit, "N")
+        own.set_ylabel(f"force $F_{leg + 1}$ (N)")
+        own.margins(x=0)
+    axes[-1].set_xlabel("time (s)")
+    legend_above(axes[0])
     return figure_of(axes[0])
 
 
+@styled
 def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
     """Draw each actuator's force over its speed, and the box of the limits.
 
     A motion that keeps the limits stays within the box; the dotted curves are the limit of power.
     A limit that there is not is not drawn. Crosses mark the peak forces.
     """
-    with matplotlib.rc_context(STYLE):
-        if axes is None:
-            axes = new_axes(None, (6.4, 4.6))
-            figure_of(axes).suptitle("Force and speed of the actuators")
-        named = [one.name for one in sheet.actuators if one.name]
-        if named:
-            return _sizing_of_joints(axes, sheet)
-        labels = [f"actuator {one.actuator}" for one in sheet.actuators]
-        plot_legs(axes, sheet.speed, sheet.force, labels)
-        peak = np.abs(sheet.force).argmax(axis=0)[None]
-        x, y = (np.take_along_axis(one, peak, axis=0) for one in (sheet.speed, sheet.force))
-        plot_legs(axes, x, y, [""] * 3, marker="x", linestyle="")
+    axes = new_axes(axes, (COLUMN, 3.0))
+    axes.axhline(0.0, color="black", linewidth=0.6)
+    axes.axvline(0.0, color="black", linewidth=0.6)
+    named = [one.name for one in sheet.actuators if one.name]
+    labels = names_for_figure(named) or [f"actuator {one.actuator}" for one in sheet.actuators]
+    plot_curves(axes, sheet.speed, sheet.force, labels)
+    for line in axes.get_lines()[2:]:
+        x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+        most = int(np.abs(y).argmax())
+        axes.plot(x[most], y[most], "x", color=line.get_color())
+    limits = [sheet.limits_of(k) for k in range(len(sheet.actuators))]
+    if all((one.force, one.speed) == (limits[0].force, limits[0].speed) for one in limits):
         _limit_box(axes, sheet)
-        axes.axhline(0.0, color="black", linewidth=0.6)
-        axes.axvline(0.0, color="black", linewidth=0.6)
-        axes.set_xlabel("speed $\\dot d_i$ (m/s), positive is out")
-        axes.set_ylabel("force $F_i$ (N), positive pushes out")
-        legend_above(axes, columns=5)
+    turning = {one.angular for one in sheet.actuators}
+    of_slides, of_turns = ("speed (m/s)", "force (N)"), ("speed (rad/s)", "torque (N m)")
+    both = ("speed (m/s or rad/s)", "force (N or N m)")
+    words = both if len(turning) > 1 else of_turns if turning == {True} else of_slides
+    if not named:
+        words = ("speed $\\dot d_i$ (m/s), positive is out", "force $F_i$ (N), positive pushes out")
+    axes.set(xlabel=words[0], ylabel=words[1])
+    legend_above(axes)
     return figure_of(axes)
 
 
@@ -113,28 +136,6 @@ def _stacks(axes: Axes, time: np.ndarray, parts: dict[str, np.ndarray]) -> None:
         axes.fill_between(time, above, upper, label=_LABELS.get(name, name), **look)
         axes.fill_between(time, below, lower, **look)
         above, below = upper, lower
-
-
-def _sizing_of_joints(axes: Axes, sheet: SizingSheet) -> Figure:
-    """Draw forces over speeds of joints by their names, and the limits if they have the same."""
-    for k, one in enumerate(sheet.actuators):
-        v, f = sheet.speed[:, k], sheet.force[:, k]
-        (line,) = axes.plot(v, f, label=one.name)
-        most = int(np.abs(f).argmax())
-        axes.plot(v[most], f[most], marker="x", linestyle="", color=line.get_color())
-    limits = [sheet.limits_of(k) for k in range(len(sheet.actuators))]
-    if all((one.force, one.speed) == (limits[0].force, limits[0].speed) for one in limits):
-        _limit_box(axes, sheet)
-    axes.axhline(0.0, color="black", linewidth=0.6)
-    axes.axvline(0.0, color="black", linewidth=0.6)
-    turning = {one.angular for one in sheet.actuators}
-    of_slides, of_turns = ("speed (m/s)", "force (N)"), ("speed (rad/s)", "torque (N m)")
-    both = ("speed (m/s or rad/s)", "force (N or N m)")
-    words = both if len(turning) > 1 else of_turns if turning == {True} else of_slides
-    axes.set_xlabel(words[0])
-    axes.set_ylabel(words[1])
-    legend_above(axes, columns=3)
-    return figure_of(axes)
 
 
 def _limit_box(axes: Axes, sheet: SizingSheet) -> None:

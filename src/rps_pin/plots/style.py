@@ -1,23 +1,26 @@
-"""Style of all figures: colours and lines that all readers can tell apart, axes, legends, files."""
+"""Style of all figures: colours and lines that all readers can tell apart, sizes, axes, files.
+
+Figures are made at the size of print: `COLUMN` or `PAGE` wide, with letters of `POINTS`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec
 
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import Collection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
+
+P = ParamSpec("P")
 
 #: Okabe and Ito's colours, told apart by colour-blind readers.
 BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
@@ -27,22 +30,58 @@ COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 #: Of legs 1, 2, 3; or of x, y, z. Line styles tell them apart in print without colour.
 LEG_COLOURS = (BLUE, VERMILION, GREEN)
 LEG_STYLES = ("-", "--", "-.")
-#: From dark to light, in print without colour too.
-COLOUR_MAP = "cividis"
+#: From dark to light, in print without colour too; the viewer's.
+COLOUR_MAP = "viridis"
+#: Widths of a journal's column and of its page, inches; size of all letters, points.
+COLUMN, PAGE, POINTS = 85 / 25.4, 175 / 25.4, 8.0
 
-#: Points of an area that an SVG writes one by one, about 20 bytes each; and dots an inch of the
-#: pictures of those with more.
+#: Points of an area that an SVG writes one by one, about 20 bytes each; and dots an inch of PNGs
+#: and of the pictures of those with more.
 MOST_POINTS, PICTURE_DPI = 5000, 300
 
-#: Of all figures.
+#: Of all figures. Pictures in files have `PICTURE_DPI` by `save_figure`.
 STYLE: Any = {
+    "font.size": POINTS,
+    **dict.fromkeys(
+        ("axes.titlesize", "axes.labelsize", "xtick.labelsize", "ytick.labelsize"), POINTS
+    ),
+    **dict.fromkeys(("legend.fontsize", "figure.titlesize", "figure.labelsize"), POINTS),
     "axes.grid": True,
     "grid.alpha": 0.3,
+    "grid.linewidth": 0.5,
+    "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "figure.dpi": 150,
+    "axes.labelpad": 3.0,
+    "axes.titlepad": 4.0,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 4.0,
+    **dict.fromkeys(("xtick.major.width", "ytick.major.width", "hatch.linewidth"), 0.6),
+    **dict.fromkeys(("xtick.major.size", "ytick.major.size"), 2.5),
+    "legend.frameon": False,
+    "legend.handlelength": 1.8,
+    "legend.handletextpad": 0.5,
+    "legend.columnspacing": 1.2,
+    "legend.borderaxespad": 0.3,
+    "legend.labelspacing": 0.3,
+    "figure.dpi": 200,
     "svg.hashsalt": "rps_pin",  # the same run writes the same SVG
 }
+
+
+def styled(plot: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Let a function draw in `STYLE`, and leave Matplotlib's settings as they were."""
+
+    @wraps(plot)
+    def drawn(*args: P.args, **options: P.kwargs) -> Figure:
+        with matplotlib.rc_context(STYLE):
+            figure = plot(*args, **options)
+            for axes in figure.axes:  # ticks are made when first asked for: in this style
+                for name in axes._axis_names:  # type: ignore[attr-defined]
+                    getattr(axes, f"{name}axis").get_major_ticks(1)
+        return figure
+
+    return drawn
 
 
 def figure_of(axes: Axes) -> Figure:
@@ -57,48 +96,21 @@ def new_axes(axes: Axes | None, size: tuple[float, float]) -> Axes:
     return axes or Figure(figsize=size, layout="constrained").add_subplot()
 
 
-def three_axes(axes: Sequence[Axes] | None, title: str) -> Sequence[Axes]:
-    """Return the three axes given, or those of a new figure with a title."""
+def three_axes(axes: Sequence[Axes] | None, height: float) -> Sequence[Axes]:
+    """Return the three axes given, or those of a new figure in a column, of a height in inches."""
     if axes is None:
-        figure = Figure(figsize=(6.4, 7.2), layout="constrained")
-        figure.suptitle(title)
-        return list(figure.subplots(3, 1, sharex=True))
+        return panels(None, 3, height)
     if len(axes) != 3:
         raise InputError(f"axes: {len(axes)} given; three are needed")
     return axes
 
 
-def axes_in_space(
-    figure: Figure | None, size: tuple[float, float], place: tuple[int, int, int] = (1, 1, 1)
-) -> Axes3D:
-    """Return new three-dimensional axes on a figure, or on a new one of a size in inches."""
-    figure = figure or Figure(figsize=size, layout="constrained")
-    axes = figure.add_subplot(*place, projection="3d")
-    assert isinstance(axes, Axes3D)  # what the projection "3d" makes
-    return axes
-
-
-def plot_legs(axes: Axes, x: Array, y: Array, labels: Sequence[str], **look: Any) -> None:
-    """Draw a curve for each leg (or axis): y of shape (n, 3) over x of shape (n,) or (n, 3)."""
-    both = np.broadcast_arrays(x.T, y.T)
-    for across, up, colour, style, label in zip(
-        *both, LEG_COLOURS, LEG_STYLES, labels, strict=True
-    ):
-        own: Any = {"color": colour, "linestyle": style, "label": label}
-        axes.plot(across, up, **own | look)
-
-
-def legend_above(axes: Axes, columns: int) -> None:
-    """Put the legend in a row above the axes."""
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0, 1),
-        ncols=columns,
-        frameon=False,
-        fontsize="small",
-        columnspacing=1.0,
-        handlelength=1.6,
-    )
+def panels(figure: Figure | None, count: int, height: float) -> list[Axes]:
+    """Return axes below each other over one abscissa, of a height in inches on a new figure."""
+    figure = figure or Figure(figsize=(COLUMN, height), layout="constrained")
+    found = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+    figure.align_ylabels(found)
+    return found
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
@@ -109,7 +121,7 @@ def save_figure(figure: Figure, folder: Path, name: str) -> list[Path]:
     """
     written = []
     svg: Any = {"metadata": {"Date": None}, "dpi": PICTURE_DPI}
-    for suffix, options in ((".png", {}), (".svg", svg)):
+    for suffix, options in ((".png", {"dpi": PICTURE_DPI}), (".svg", svg)):
         path = folder / f"{name}{suffix}"
         with matplotlib.rc_context(STYLE), whole_file(path) as scratch, _large_as_pictures(figure):
             figure.savefig(scratch, **options)

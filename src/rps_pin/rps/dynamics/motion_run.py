@@ -14,6 +14,7 @@ from scipy.integrate import trapezoid
 from rps_pin.arrays import Array
 from rps_pin.errors import SingularityError
 from rps_pin.rps.kinematics.legs import PoseLegs, legs_of_pose
+from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_refusal import require_clear
 from rps_pin.task.paths.events import PathCheck
@@ -64,6 +65,8 @@ class MotionRun:
     """Of the trajectory: its smallest distance to a singularity, and where."""
     legs: PoseLegs | None = field(default=None, repr=False, compare=False)
     """Legs of the poses, of which `force_causes` need not compute them again; None if unknown."""
+    parameters: RPSParameters | None = field(default=None, repr=False, compare=False)
+    """Of the robot; None if unknown."""
 
     @property
     def singularity_distance(self) -> Array:
@@ -205,7 +208,8 @@ def run_motion(
         gap[i] = robot.mechanism.loop_gap(q[i])
     of_legs = leg_motion.length, leg_motion.speed, leg_motion.acceleration
     solved = force, reaction, gap, residual, conditioning
-    return MotionRun(time, *motion, platform.position, q, v, a, *of_legs, *solved, path_check, legs)
+    found = (*motion, platform.position, q, v, a, *of_legs, *solved, path_check, legs)
+    return MotionRun(time, *found, robot.parameters)
 
 
 def summarise(run: MotionRun, robot: RPSRobot) -> MotionSummary:

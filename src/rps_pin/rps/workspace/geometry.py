@@ -110,6 +110,14 @@ def boundary(workspace: Workspace, space: Space = "position") -> trimesh.Trimesh
 
 
 @refuses_other_kinds
+def boundary_conditioning(workspace: Workspace) -> Array:
+    """Return the conditioning (0 singular, 1 at best) at each vertex of the `boundary`, (n,)."""
+    poses = np.array(boundary(workspace, "pose").vertices)
+    side = side_of_singularity(workspace.parameters, workspace.start)
+    return evaluate(workspace.parameters, poses, side).conditioning
+
+
+@refuses_other_kinds
 def theoretical_cylinder(
     parameters: RPSParameters, lower: float, upper: float, sections: int = 96
 ) -> trimesh.Trimesh:

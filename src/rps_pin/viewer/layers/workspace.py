@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.rps.workspace import Workspace, boundary, leg_grid, workspace
-from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
+from rps_pin.rps.workspace.geometry import boundary_conditioning
 from rps_pin.viewer.layers import base
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, RobotSizedLayer
 from rps_pin.viewer.layers.colours import FIELD, colour_bar
@@ -49,7 +48,9 @@ class WorkspaceSurface(RobotSizedLayer):
         if found is None:
             found = workspace(robot, leg_grid(robot.parameters, 25))
         surface = boundary(found, "position")
-        colour, low, high = _colours(found, np.array(boundary(found, "pose").vertices))
+        value = boundary_conditioning(found)
+        low, high = float(value.min()), float(value.max())
+        colour = np.asarray(FIELD((value - low) / max(high - low, 1e-12)))[:, :3]
         points = np.array(surface.vertices)
         width = float(np.linalg.norm(np.ptp(points[:, :2], axis=0)))
         factor = self.factor or max(1.0, round_number(_WIDTH * context.radius / width))
@@ -60,11 +61,3 @@ class WorkspaceSurface(RobotSizedLayer):
         bar = colour_bar(FIELD, f"{low:.2g}", f"{high:.2g}")
         part = Part("surface", "boundary", mesh, material, np.eye(4))
         return DrawnLayer(LegendEntry("workspace", text, bar.colours[3], bar), [part])
-
-
-def _colours(found: Workspace, poses: Array) -> tuple[Array, float, float]:
-    """Return the colours (n, 3) of the boundary's poses, and the field's ends."""
-    side = side_of_singularity(found.parameters, found.start)
-    value = evaluate(found.parameters, poses, side).conditioning
-    low, high = float(value.min()), float(value.max())
-    return np.asarray(FIELD((value - low) / max(high - low, 1e-12)))[:, :3], low, high
