@@ -50,7 +50,9 @@ def test_axes_have_units_no_text_collides_and_matplotlib_is_left_as_it_was(
     assert dict(matplotlib.rcParams) == before
     assert figure.get_figwidth() in (plots.COLUMN, plots.PAGE)
     assert not faults(figure)
-    unit = re.compile(r"\((mm|m|N|s|rad|rad, m|µm|µrad|mm/s|m/s|J|1|°|degrees)\)|\(0 singular")
+    unit = re.compile(
+        r"\((mm|m|N|s|rad|rad, m|µm|µrad|N m|rad/s|mm/s|m/s|J|1|°|degrees)\)|\(0 singular"
+    )
     for axes in figure.axes:
         if name == "plot_assembly_modes":  # of one scale, without axes
             assert "120 mm" in figure.get_supxlabel()
