@@ -1,6 +1,7 @@
 """Control of the 3-RPS, and of any mechanism with a task: a status in each tick, no exceptions.
 
-- `loop`: the laws `ComputedTorque` and `PDControl` with `Gains`, `PacedTrajectory`, `LoopClock`
+- `loop`: the laws `ComputedTorque` and `PDControl` with `Gains`, `PacedTrajectory`, `LoopClock`;
+  `DriveControl`: commands of drives that take positions or speeds
 - `estimator`: `RealTimeRobot`, state estimate and inverse dynamics for other laws; `any_task`:
   `TaskEstimate`, that of a task
 - `loop_margins`: stability margins for the tuning
@@ -11,6 +12,7 @@ The robot itself is in `rps_pin.rps`; `rps_pin.viewer.server.live_view` displays
 """
 
 from rps_pin.control.any_task.estimate import TaskEstimate
+from rps_pin.control.drive_control import DriveControl
 from rps_pin.control.estimator.effective_inertia import effective_inertia
 from rps_pin.control.estimator.output_arrays import Answers
 from rps_pin.control.estimator.real_time_robot import RealTimeRobot
@@ -35,6 +37,7 @@ __all__ = [
     "Answers",
     "ComputedTorque",
     "Controller",
+    "DriveControl",
     "Encoders",
     "Fault",
     "Gains",

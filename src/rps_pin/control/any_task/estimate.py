@@ -25,7 +25,7 @@ from rps_pin.control.loop.vectors import arrays
 from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, MechanismError, RPSPinError, SingularityError, shown
 from rps_pin.one_thread import TickGuard, guarded
-from rps_pin.task import Task
+from rps_pin.task import SingularityMeasures, Task
 from rps_pin.validation import numbers, positive_number, real_vector
 
 #: What calls of a task raise where there is no answer.
@@ -202,7 +202,9 @@ class TaskEstimate(DeepCopied):
     @property
     def type_ii(self) -> float:
         """`SingularityMeasures.distance` of the estimated pose."""
-        return self.state.geometry.distance
+        if self.generated is not None and self.generated.ahead:
+            return _distance(self.task.singularities(self.answers.configuration))
+        return self._state.geometry.distance
 
     @property
     def determinant(self) -> float:
@@ -267,12 +269,11 @@ class TaskEstimate(DeepCopied):
         """Return what follows from a configuration; of rotation vectors the one near a pose."""
         task = self.task
         measures = task.singularities(q)
-        distance = float(measures.distance)
         return TaskGeometry(
             task.at(q, near),
             q[task.of_actuators],
             q,
-            distance if math.isfinite(distance) else 0.0,
+            _distance(measures),
             math.copysign(1.0, float(measures.determinant)),
         )
 
@@ -354,6 +355,12 @@ class TaskEstimate(DeepCopied):
             number |= flags.NEAR_SINGULAR
         self.status = status = STATUSES[number]
         return status
+
+
+def _distance(measures: SingularityMeasures) -> float:
+    """Return the distance to a singularity, zero where it is not known."""
+    distance = float(measures.distance)
+    return distance if math.isfinite(distance) else 0.0
 
 
 def _jump(given: ArrayLike, count: int) -> Array:

@@ -54,6 +54,8 @@ class LoopRun:
         Of the controller's model, if that is a 3-RPS.
     task : Task or None
         Of the controller's model, if that is not a 3-RPS.
+    commanded : str
+        What the command is: ``"force"``, ``"position"`` or ``"speed"``.
     time : (n,) array
         Of each tick, s.
     target, target_rate : (n, 3) arrays
@@ -71,7 +73,8 @@ class LoopRun:
     estimate : (n, 3) array
         The controller's estimate of the pose.
     command, applied : (n, 3) arrays
-        Forces commanded, and forces of the actuators until the next tick, N.
+        Forces commanded, and forces of the actuators until the next tick, N. Of drives that take
+        positions or speeds, `command` is in m or rad, or per second.
     status : (n,) array of int
         `Status` of each tick.
     type_ii : (n,) array
@@ -100,6 +103,7 @@ class LoopRun:
     gap: Array
     events: tuple[LoopEvent, ...]
     task: Task | None = None
+    commanded: str = "force"
 
     @property
     def of_pose(self) -> tuple[tuple[str, str], ...]:
@@ -255,9 +259,10 @@ class _Record:
         events = tuple(event for k, event in self._events if k < ticks)
         rows: dict[str, Any] = {name: rows[:ticks] for name, rows in self.rows.items()}
         robot = self._controller.robot
+        commanded = getattr(self._controller, "command", "force")
         if isinstance(robot, RPSRobot):
-            return LoopRun(robot.parameters, events=events, **rows)
-        return LoopRun(None, events=events, task=task_of(robot), **rows)
+            return LoopRun(robot.parameters, events=events, commanded=commanded, **rows)
+        return LoopRun(None, events=events, task=task_of(robot), commanded=commanded, **rows)
 
 
 def columns_of(coordinates: int, actuators: int) -> int:
@@ -284,8 +289,13 @@ def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
     for name in ("target", "pose", "estimate"):
         axes = (f"{name}_{axis}_{unit}" for axis, unit in run.of_pose)
         columns |= zip(axes, getattr(run, name).T, strict=True)
-    for name, which in (("reading", 1), ("length", 1), ("command", 2), ("applied", 2)):
-        legs = (f"{name}_{one[0]}_{one[which].replace(' ', '')}" for one in run.of_actuators)
+    per = "_per_s" if run.commanded == "speed" else ""
+    of_command = 2 if run.commanded == "force" else 1
+    for name, which, more in (
+        *(("reading", 1, ""), ("length", 1, "")),
+        *(("command", of_command, per), ("applied", 2, "")),
+    ):
+        legs = (f"{name}_{one[0]}_{one[which].replace(' ', '')}{more}" for one in run.of_actuators)
         columns |= zip(legs, getattr(run, name).T, strict=True)
     table = np.column_stack([*columns.values(), run.type_ii, run.status])
     with whole_file(path) as scratch:

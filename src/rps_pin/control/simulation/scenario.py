@@ -13,15 +13,17 @@ controller and the plant are arguments of their classes.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.config import YamlFile, read_yaml
+from rps_pin.control.drive_control import DriveControl
 from rps_pin.control.estimator.effective_inertia import effective_inertia
 from rps_pin.control.loop.computed_torque import ComputedTorque
 from rps_pin.control.loop.controller import Controller
@@ -32,7 +34,8 @@ from rps_pin.control.simulation.encoders import Encoders
 from rps_pin.control.simulation.faults import Fault
 from rps_pin.control.simulation.loop_run import LoopRun, run_loop
 from rps_pin.control.simulation.plant import Plant
-from rps_pin.control.simulation.scenario_schema import Machine, ScenarioEntry
+from rps_pin.control.simulation.scenario_schema import DrivesEntry, Machine, ScenarioEntry
+from rps_pin.control.simulation.servo_drives import ServoDrives
 from rps_pin.control.simulation.task_scenario import (
     TaskScenarioEntry,
     changed,
@@ -50,7 +53,15 @@ from rps_pin.task import Task
 from rps_pin.trajectories.path import Trajectory
 
 _OF_LAW = {"law", "bandwidth", "damping", "integral", "gains", "model", "speeds", "paced"}
-_OF_PLANT = {"payload", "delay", "substeps", "encoder_resolution", "encoder_noise", "seed"}
+_OF_PLANT = {
+    "payload",
+    "drives",
+    "delay",
+    "substeps",
+    "encoder_resolution",
+    "encoder_noise",
+    "seed",
+}
 
 
 @dataclass(frozen=True)
@@ -95,6 +106,15 @@ class Scenario:
         """Return a new controller."""
         entry = self.entry.controller
         settings = entry.model_dump(exclude=_OF_LAW, exclude_none=True)
+        if entry.law == "drives":
+            drives = cast("DrivesEntry", self.entry.plant.drives)
+            gains = None if drives.command == "position" else self.gains
+            return DriveControl(
+                *(self._loop_model, self.begin, gains),
+                command=drives.command,
+                period=self.entry.period,
+                **settings,
+            )
         law = ComputedTorque if entry.law == "computed_torque" else PDControl
         return law(self._loop_model, self.begin, self.gains, period=self.entry.period, **settings)
 
@@ -132,6 +152,8 @@ class Scenario:
         some = {"delay", "substeps", "force_limit"}
         settings = entry.model_dump(include=some, exclude_none=True)
         encoders = Encoders(entry.encoder_resolution, entry.encoder_noise, entry.seed)
+        if entry.drives is not None:
+            settings["drives"] = ServoDrives(**entry.drives.model_dump(exclude_none=True))
         return Plant(
             self.machine, self.begin, period=self.entry.period, encoders=encoders, **settings
         )
@@ -155,6 +177,8 @@ class Scenario:
             If gains differ from axis to axis, or are given in units of force.
         """
         entry = self.entry.controller
+        if entry.law == "drives":
+            raise InputError("the loops are those of the drives")
         gains = _placed(self.entry)
         if gains is None and entry.law == "pd":
             raise InputError("margins of gains in N/m need an inertia, which is not given")
@@ -183,7 +207,9 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
     if "mechanism" in file.values:
         return _of_mechanism(file, folder)
     entry = file.validated(ScenarioEntry, "a scenario")
-    nominal = load_robot(entry.robot, folder)
+    with file.at("robot"):
+        nominal = load_robot(entry.robot, folder)
+    _check_drives(file, entry)
     model = _changed(file, nominal, entry.controller.model, ("controller", "model"))
     machine = _changed(file, nominal, entry.plant, ("plant",))
     if entry.plant.payload is not None:
@@ -200,6 +226,7 @@ def _of_mechanism(file: YamlFile, folder: Path) -> Scenario:
     """Return the scenario of a mechanism with a task."""
     entry = file.validated(TaskScenarioEntry, "a scenario")
     nominal = task_of_file(file, folder, entry.mechanism)
+    _check_drives(file, entry)
     model = changed(nominal, entry.controller.model.masses)
     machine = changed(nominal, entry.plant.masses)
     trajectory = task_trajectory(file, folder, nominal)
@@ -208,6 +235,25 @@ def _of_mechanism(file: YamlFile, folder: Path) -> Scenario:
         gains = _gains(entry, model, trajectory).of(nominal.size)
     faults = _faults(file, entry, actuators, nominal.size)
     return Scenario(entry, model, machine, trajectory, gains, faults)
+
+
+def _check_drives(file: YamlFile, entry: ScenarioEntry | TaskScenarioEntry) -> None:
+    """Raise `InputError` unless the law and the plant's drives go together."""
+    given, drives = entry.controller, entry.plant.drives
+    if drives is None and given.law == "drives":
+        with file.at("controller", "law"):
+            raise InputError("law: drives is for a plant with drives; give plant.drives")
+    if drives is not None and given.law != "drives":
+        with file.at("plant", "drives"):
+            raise InputError(
+                f"drives take positions or speeds, and law: {given.law} commands forces; give "
+                "controller: {law: drives}"
+            )
+    if drives is not None and drives.command == "position":
+        for name in ("bandwidth", "gains"):
+            if getattr(given, name) is not None:
+                with file.at("controller", name):
+                    raise InputError(f"{name} is for drives that take speeds")
 
 
 def _faults(
@@ -242,6 +288,8 @@ def _gains(
     entry: ScenarioEntry | TaskScenarioEntry, model: RPSRobot | Task, trajectory: Trajectory
 ) -> Gains:
     given, placed = entry.controller, _placed(entry)
+    if given.law == "drives" and given.gains is None:
+        return Gains(2 * math.pi * (given.bandwidth or 0.0), 0.0)
     if placed is None:
         assert given.gains is not None  # by the schema
         return Gains(**given.gains.model_dump())

@@ -31,10 +31,26 @@ class Machine(Entry):
     friction_speed: Positive | None = None
 
 
+class DrivesEntry(Entry):
+    """Drives that take positions or speeds; see `ServoDrives`."""
+
+    command: Literal["position", "speed"] = "position"
+    bandwidth: Positive = 30.0
+    damping: Positive = 1.0
+    speed_limit: Positive | None = None
+
+    @model_validator(mode="after")
+    def _damping_of_positions(self) -> DrivesEntry:
+        if self.command == "speed" and "damping" in self.model_fields_set:
+            raise ValueError("damping is that of drives that take positions")
+        return self
+
+
 class PlantEntry(Machine):
     """See `Plant` and `Encoders`; `payload` is a mass at the platform's centre, kg."""
 
     payload: Positive | None = None
+    drives: DrivesEntry | None = None
     delay: Count | None = None
     substeps: Annotated[int, Field(ge=1)] | None = None
     encoder_resolution: NonNegative = 0.0
@@ -55,10 +71,11 @@ class ControllerEntry(Entry):
 
     Gains are given by `bandwidth` (Hz), `damping` and `integral`, as `Gains.placed` takes them; for
     ``law: pd`` they are multiplied by `effective_inertia` at the trajectory's start. Or they are
-    given by `gains`, in the law's own units.
+    given by `gains`, in the law's own units. ``law: drives`` is `DriveControl`, for a plant with
+    drives: without gains for positions; for speeds Kp is 2 pi `bandwidth`, or none.
     """
 
-    law: Literal["computed_torque", "pd"] = "computed_torque"
+    law: Literal["computed_torque", "pd", "drives"] = "computed_torque"
     space: Literal["actuator", "task"] | None = None
     compensation: Literal["gravity", "feed_forward", "none"] | None = None
     bandwidth: Positive | None = None
@@ -80,12 +97,23 @@ class ControllerEntry(Entry):
     @model_validator(mode="after")
     def _gains_once(self) -> ControllerEntry:
         placed = (self.bandwidth, self.damping, self.integral)
+        if self.law == "drives":
+            return self._for_drives()
         if (self.gains is None) == (self.bandwidth is None):
             raise ValueError("it needs either bandwidth (Hz) or gains")
         if self.gains is not None and any(one is not None for one in placed):
             raise ValueError("damping and integral go with bandwidth, not with gains")
         if self.law == "computed_torque" and self.compensation is not None:
             raise ValueError("compensation is for law: pd; computed torque has its own")
+        return self
+
+    def _for_drives(self) -> ControllerEntry:
+        """Refuse what commands of drives have no use for."""
+        for name in ("space", "compensation", "damping", "integral", "force_limit"):
+            if getattr(self, name) is not None:
+                raise ValueError(f"{name} is not for law: drives")
+        if self.gains is not None and self.bandwidth is not None:
+            raise ValueError("it takes bandwidth (Hz) or gains, not both")
         return self
 
 

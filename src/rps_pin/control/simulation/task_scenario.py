@@ -21,6 +21,7 @@ from rps_pin.config import Entry, Finite, NonNegative, Positive, Text, YamlFile
 from rps_pin.control.simulation.scenario_schema import (
     ControllerEntry,
     Count,
+    DrivesEntry,
     FaultEntry,
     GainsEntry,
 )
@@ -43,6 +44,7 @@ class TaskMachine(Entry):
 class TaskPlantEntry(TaskMachine):
     """See `Plant` and `Encoders`."""
 
+    drives: DrivesEntry | None = None
     delay: Count | None = None
     substeps: Annotated[int, Field(ge=1)] | None = None
     encoder_resolution: NonNegative = 0.0
