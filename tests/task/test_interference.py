@@ -16,6 +16,7 @@ from rps_pin import ClosedLoopModel, InputError, LoopClosure
 from rps_pin.closed_loop import Part, compose, composed_shapes
 from rps_pin.errors import MechanismError
 from rps_pin.task import PathCheck, Task, check_path
+from rps_pin.trajectories.path import PathSample
 from tests.closed_loop.interference import shaped
 from tests.closed_loop.interference.shaped import joint, link, robot, rod, shape
 from tests.reference import five_bar
@@ -262,6 +263,84 @@ def test_a_ball_through_the_wall_of_a_hollow_mesh(engine: Any, tmp_path: Path) -
     assert events(found) == 2 * [("begins", "a", "b"), ("ends", "a", "b")]
     walls = np.array([-0.51, -0.39, 0.39, 0.51]) + 0.7
     assert worst(np.array(times(found)) - walls) < 1e-7
+
+
+# Against many samples -----------------------------------------------------------------------------
+
+FORMS = (
+    '<sphere radius="0.2"/>', '<box size="0.3 0.5 0.2"/>', '<cylinder radius="0.1" length="0.6"/>',
+    '<capsule radius="0.1" length="0.5"/>', '<ellipsoid a="0.1" b="0.2" c="0.3"/>',
+    '<mesh filename="{u}"/>',
+)  # fmt: skip
+
+
+class Swings:
+    """Coordinates that swing, each by its own sine."""
+
+    duration = 2.0
+
+    def __init__(self, rng: np.random.Generator, size: int) -> None:
+        self.middle, self.reach = rng.uniform(-0.5, 0.5, size), rng.uniform(0.2, 1.2, size)
+        self.w, self.phase = rng.uniform(1, 5, size), rng.uniform(0, 6, size)
+
+    def sample(self, t: Any) -> PathSample:
+        angle = self.w * np.asarray(t, float)[..., None] + self.phase
+        across = self.reach * np.sin(angle)
+        return PathSample(
+            self.middle + across, self.reach * self.w * np.cos(angle), -(self.w**2) * across
+        )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_events_are_the_changes_of_sign_of_many_samples(seed: int, tmp_path: Path) -> None:
+    """Two shapes that slide and turn at random."""
+    shaped.write_mesh(tmp_path / "u.stl", *shaped.channel())
+    rng = np.random.default_rng(seed)
+    forms = [FORMS[k].format(u=tmp_path / "u.stl") for k in rng.integers(0, len(FORMS), 2)]
+    axes = [" ".join(map(str, axis)) for axis in rng.normal(size=(2, 3))]
+    parts = [
+        link("root"), link("ca"), link("cb"),
+        link("a", shape(forms[0], "0.1 0 0.05", "0.3 0.2 0.1")),
+        link("b", shape(forms[1], "0 0.1 0", "0.1 1 2")),
+        joint("xa", "root", "ca", "prismatic", axis="1 0 0"),
+        joint("ra", "ca", "a", xyz="0 0 0.05", axis=axes[0]),
+        joint("xb", "root", "cb", "prismatic", "0 0.5 0.2", "0 1 0"),
+        joint("rb", "cb", "b", xyz="0.05 0 0", axis=axes[1]),
+    ]  # fmt: skip
+    names = ["xa", "ra", "xb", "rb"]
+    model = ClosedLoopModel.from_urdf(robot(*parts), [], names)
+    path = Swings(rng, 4)
+    found = check(Task(model, joints=names, characteristic_length=1.0), path)
+    distances = model.link_distances()
+    assert distances.pairs == [("a", "b")]
+    times_of = np.linspace(0, path.duration, 2001)
+    values = np.empty(times_of.size)
+    for k, q in enumerate(path.sample(times_of).pose):
+        distances.set_state(q)
+        values[k] = distances.distance(0).distance
+    cuts = np.flatnonzero((values[1:] < 0) != (values[:-1] < 0))
+    told = [e.time for e in found.touching if e.kind in ("begins", "ends")]
+    assert len(told) == len(cuts)
+    for time, cut in zip(told, cuts, strict=True):
+        assert times_of[cut] <= time <= times_of[cut + 1]
+    assert (values[0] < 0) == any(e.kind in ("starts inside", "throughout") for e in found.touching)
+    assert found.interference is not None
+    assert values.min() - 1e-3 < found.interference.minimum_distance < values.min() + 1e-3
+
+
+def test_a_floor_of_mujoco_is_met_at_a_known_time() -> None:
+    """A ball that sinks: the half space is endless, and the nearest pair nevertheless."""
+    pytest.importorskip("mujoco")
+    text = """<mujoco><worldbody><geom name="floor" type="plane" size="1 1 1" pos="0 0 -1"/>
+      <body name="a"><joint name="down" type="slide" axis="0 0 -1"/>
+        <geom size="0.1" contype="0" conaffinity="0"/>
+        <body name="b"><joint name="side" type="slide" axis="1 0 0"/><geom size="0.1"/></body>
+      </body></worldbody></mujoco>"""
+    model = ClosedLoopModel.from_mjcf(text, actuated=["down", "side"])
+    one = Task(model, joints=["down", "side"], characteristic_length=1.0)
+    found = check(one, uniform([0.0, 0.0], [1.8, 3.0], 1.0))
+    assert events(found) == [("begins", "b", "world")]
+    assert found.touching[0].time == pytest.approx(0.5, abs=1e-9)
 
 
 # Several files ------------------------------------------------------------------------------------

@@ -172,9 +172,7 @@ class ClosedLoopModel:
         self.name: str = name or model.name
         self.notes = tuple(notes)
         self._task = None if task is None else dict(task)
-        if isinstance(collision, pin.GeometryModel):
-            collision = shapes_of(model, collision)
-        self.collision_shapes: CollisionShapes = collision or CollisionShapes()
+        self.collision_shapes = shapes_of(model, collision)
         self._home: Array | None = None
         self._start: Array = pin.neutral(model)
         self._given_length = characteristic_length
@@ -430,9 +428,8 @@ class ClosedLoopModel:
         InputError
             If a shape is on a joint that there is not, or `ignore` holds no pairs of names.
         """
-        if isinstance(collision, pin.GeometryModel):
-            collision = shapes_of(self.model, collision)
-        options = self._options() | {"collision": collision.ignoring(ignore)}
+        shapes = shapes_of(self.model, collision).ignoring(ignore)
+        options = self._options() | {"collision": shapes}
         return type(self)(self.model, self.closures, self.actuated, home=self._home, **options)
 
     def link_distances(self, ignore: Any = ()) -> LinkDistances:
@@ -477,7 +474,8 @@ class ClosedLoopModel:
             As `link_distances`; or if q or the clearance do not fit.
         """
         q_, least = self._configuration(q), non_negative_number(clearance, "clearance", "m")
-        distances = self._distances if not ignore else self.link_distances(ignore)
+        pairs = pairs_of(ignore)
+        distances = self.link_distances(pairs) if pairs else self._distances
         return interference_at(distances, q_, least)
 
     @cached_property

@@ -8,6 +8,7 @@ import pickle
 import numpy as np
 import pinocchio as pin
 import pytest
+from pinocchio import coal
 from scipy.optimize import lsq_linear
 
 from rps_pin import ClosedLoopModel, InputError
@@ -114,6 +115,33 @@ def test_an_ellipsoid_and_cylinders_by_their_supports() -> None:
             turned = pin.SE3(pin.exp3(np.array([angle, 0, 0])), np.array([0.15 + gap, 0.0, 0.0]))
             found = distance(rods, place(pin.SE3.Identity(), turned))
             assert found == pytest.approx(gap, abs=1e-8), (angle, gap)
+
+
+SUPPORTS = {  # how far they reach in directions (n, 3)
+    '<box size="0.3 0.5 0.2"/>': lambda n: np.abs(n) @ [0.15, 0.25, 0.1],
+    '<sphere radius="0.2"/>': lambda n: np.full(len(n), 0.2),
+    '<cylinder radius="0.1" length="0.6"/>': lambda n: (
+        0.1 * np.hypot(n[:, 0], n[:, 1]) + 0.3 * np.abs(n[:, 2])
+    ),
+    '<capsule radius="0.1" length="0.5"/>': lambda n: 0.1 + 0.25 * np.abs(n[:, 2]),
+    '<ellipsoid a="0.1" b="0.2" c="0.3"/>': lambda n: np.linalg.norm(n * [0.1, 0.2, 0.3], axis=1),
+}
+
+
+@pytest.mark.parametrize("one", SUPPORTS)
+@pytest.mark.parametrize("other", SUPPORTS)
+def test_depths_are_the_shortest_ways_out(one: str, other: str) -> None:
+    """The least of h_a(n) + h_b(-n) - n . x over directions n, here over 20,000."""
+    two = floating(one, other)
+    directions = RNG.normal(size=(20_000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    for a, b in random_places(4, 0.07):
+        reach = SUPPORTS[one](directions @ a.rotation)
+        reach = reach + SUPPORTS[other](-directions @ b.rotation)
+        out = float((reach - directions @ (b.translation - a.translation)).min())
+        depth = -distance(two, place(a, b))
+        assert out > 0.02
+        assert out - 0.01 < depth < out + 1e-6, (depth, out)
 
 
 def test_points_are_the_nearest_ones_and_the_order_of_links_does_not_matter() -> None:
@@ -235,3 +263,46 @@ def test_clearance_counts() -> None:
     assert [(one.link_a, one.link_b) for one in found.found] == [("a", "b")]
     with pytest.raises(InputError, match="q has shape"):
         two.interference(q[:-1])
+
+
+def test_shapes_on_a_model_without_links_can_be_given() -> None:
+    """A model that was made by hand has joints' frames only, and perhaps none."""
+    model, shapes = pin.Model(), pin.GeometryModel()
+    for k, name in enumerate("ab"):
+        at = pin.SE3(np.eye(3), np.array([0.0, 0.1 * k, 0.0]))
+        number = model.addJoint(0, pin.JointModelPX(), at, name)
+        model.addJointFrame(number)
+        ball = pin.GeometryObject(f"ball {name}", number, pin.SE3.Identity(), coal.Sphere(0.08))
+        shapes.addGeometryObject(ball)
+    one = ClosedLoopModel(model, [], ["a", "b"], collision=shapes)
+    nearest = one.interference([0.0, 0.3]).nearest
+    assert nearest is not None
+    assert nearest[:2] == ("a", "b")
+    assert nearest.distance == pytest.approx(np.hypot(0.1, 0.3) - 0.16, abs=1e-12)
+    assert one.interference([0, 0], ignore=[("a", "b")]).pairs == 0
+    again = pickle.loads(pickle.dumps(one))
+    assert not again.interference([0.0, 0.0]).ok
+    with pytest.raises(InputError, match=r"collision = 3: it must be CollisionShapes or"):
+        ClosedLoopModel(model, [], ["a"], collision=3)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="it must be CollisionShapes"):
+        one.with_collision("shapes")  # type: ignore[arg-type]
+    plane = pin.GeometryObject("plane", 1, pin.SE3.Identity(), coal.Plane(np.eye(3)[2], 0.0))
+    shapes.addGeometryObject(plane)
+    odd = ClosedLoopModel(model, [], ["a", "b"], collision=shapes)
+    with pytest.raises(InputError, match="shapes of the kind Plane are not checked"):
+        odd.interference([0.0, 0.0])
+
+
+def test_distances_of_many_configurations_refuse_what_does_not_fit() -> None:
+    distances = floating('<sphere radius="0.3"/>', '<sphere radius="0.2"/>').link_distances()
+    assert distances.distance(0).distance == pytest.approx(-0.5, abs=1e-12)  # the neutral one
+    with pytest.raises(InputError, match=r"rates need a velocity: set_state\(q, v\)"):
+        distances.with_rate(0)
+    for wrong in (1, -1):
+        with pytest.raises(InputError, match="no pair of links"):
+            distances.distance(wrong)
+    for q, v in ((np.zeros(3), None), (np.full(14, np.nan), None), (np.zeros(14), np.zeros(3))):
+        with pytest.raises(InputError):
+            distances.set_state(q, v)
+    with pytest.raises(InputError, match="pair = 'a': it must be int"):
+        distances.distance("a")  # type: ignore[arg-type]

@@ -26,9 +26,13 @@ from rps_pin.closed_loop.interference.geometry import scaled
 from rps_pin.closed_loop.interference.meshes import is_inside, triangles_of
 from rps_pin.closed_loop.interference.pairs import pairs_of_links
 from rps_pin.closed_loop.interference.shapes import CollisionShapes
+from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
+from rps_pin.validation import real_vector
 
-#: Tolerance of Coal's searches, in characteristic lengths.
-_TOLERANCE = 1e-10
+#: Tolerances of Coal's searches, in characteristic lengths: of distances, and of depths. Below the
+#: latter its search of round shapes fails: of 400 random overlaps 38 at 1e-10, none at 1e-6.
+_TOLERANCE, _TOLERANCE_OF_DEPTH = 1e-10, 1e-6
 #: Surfaces that cut each other have this depth, and what is inside one at least this, in
 #: characteristic lengths.
 _CUTTING = 1e-9
@@ -77,8 +81,11 @@ class _Nearest(NamedTuple):
     shape_b: int
 
 
+@refuses_other_kinds
 class LinkDistances:
     """Distances of the pairs of links of a mechanism that are checked.
+
+    `ClosedLoopModel.link_distances` makes it. An object serves one thread at a time.
 
     Parameters
     ----------
@@ -124,7 +131,8 @@ class LinkDistances:
                 self.pairs.append((a, b))
                 self._of_pair.append(both)
         self._request = coal.DistanceRequest()
-        self._request.gjk_tolerance = self._request.epa_tolerance = _TOLERANCE
+        self._request.gjk_tolerance = _TOLERANCE
+        self._request.epa_tolerance = _TOLERANCE_OF_DEPTH
         self._coarse = coal.DistanceRequest()
         self._result = coal.DistanceResult()
         one, other = np.array([s for p in self._of_pair for s in p], np.intp).reshape(-1, 2).T
@@ -135,22 +143,33 @@ class LinkDistances:
         self._joints = sorted({shape.joint for shape in self._shapes})
         self._of_joint = np.array([self._joints.index(s.joint) for s in self._shapes], np.intp)
         self._places: dict[int, tuple[pin.SE3, Any]] = {}
-        self._middles, self._twists = np.zeros((0, 3)), np.zeros((0, 6))
+        self._middles = np.zeros((0, 3))
+        self._twists: Array | None = None
+        self.set_state(pin.neutral(model))
 
     # At one configuration -------------------------------------------------------------------------
 
     def set_state(self, q: Array, v: Array | None = None) -> None:
-        """Take a configuration (nq,), and a velocity (nv,) for rates."""
+        """Take a configuration (nq,), and a velocity (nv,) for rates.
+
+        Raises
+        ------
+        InputError
+            If a shape does not fit, or a number is not finite.
+        """
         self._places.clear()
+        q = real_vector(q, self._model.nq, "q")
         if v is None:
             pin.forwardKinematics(self._model, self._data, q)
         else:
+            v = real_vector(v, self._model.nv, "v")
             pin.forwardKinematics(self._model, self._data, q, v)
         joints = [(self._data.oMi[joint], joint) for joint in self._joints]
         turns = np.array([at.rotation for at, _ in joints]).reshape(-1, 3, 3)
         ways = np.array([at.translation for at, _ in joints]).reshape(-1, 3) / self._length
         own = self._centres[:, None, :] @ np.swapaxes(turns, 1, 2)[self._of_joint]
         self._middles = own[:, 0] + ways[self._of_joint]
+        self._twists = None
         if v is not None:
             twists = [at.act(self._data.v[joint]).vector for at, joint in joints]
             self._twists = np.array(twists).reshape(-1, 6)[self._of_joint]
@@ -167,7 +186,8 @@ class LinkDistances:
 
         That is the largest speed of points of one link relative to the other.
         """
-        relative = self._twists[self._one] - self._twists[self._other]
+        twists = self._moving()
+        relative = twists[self._one] - twists[self._other]
         turning = np.linalg.norm(relative[:, 3:], axis=1)
         found = np.full(turning.shape, np.inf)
         for shape in (self._one, self._other):
@@ -179,28 +199,40 @@ class LinkDistances:
         return np.maximum.reduceat(found, self._first) if found.size else found
 
     def distance(self, pair: int) -> LinkDistance:
-        """Return the distance of a pair, by its number."""
+        """Return the distance of a pair, by its number.
+
+        Raises
+        ------
+        InputError
+            If there is no such pair.
+        """
         near, length = self._nearest(pair), self._length
         a, b = self.pairs[pair]
         points = length * near.point_a, length * near.point_b
         return LinkDistance(a, b, length * near.distance, *points)
 
     def with_rate(self, pair: int) -> tuple[float, float]:
-        """Return the distance of a pair, m, and its rate, m/s; needs a velocity."""
-        near, length = self._nearest(pair), self._length
-        speed = self._speed(near.shape_b, length * near.point_b, near.normal)
-        speed -= self._speed(near.shape_a, length * near.point_a, near.normal)
+        """Return the distance of a pair, m, and its rate, m/s; needs a velocity.
+
+        Raises
+        ------
+        InputError
+            If there is no such pair, or no velocity was given.
+        """
+        near, length, twists = self._nearest(pair), self._length, self._moving()
+        speed = _speed(twists[near.shape_b], length * near.point_b, near.normal)
+        speed -= _speed(twists[near.shape_a], length * near.point_a, near.normal)
         return length * near.distance, speed
 
-    def _speed(self, shape: int, point: Array, along: Array) -> float:
-        """Return the speed of a point of a shape along a direction, in world axes, m/s."""
-        (px, py, pz), (nx, ny, nz) = point.tolist(), along.tolist()
-        vx, vy, vz, wx, wy, wz = self._twists[shape].tolist()
-        moves = nx * (vx + wy * pz - wz * py) + ny * (vy + wz * px - wx * pz)
-        return float(moves + nz * (vz + wx * py - wy * px))
+    def _moving(self) -> Array:
+        if self._twists is None:
+            raise InputError("rates need a velocity: set_state(q, v)")
+        return self._twists
 
     def _nearest(self, pair: int) -> _Nearest:
         """Return the least distance of a pair's shapes, in characteristic lengths."""
+        if not 0 <= pair < len(self.pairs):
+            raise InputError(f"no pair of links {shown(pair)}; there are {len(self.pairs)}")
         return min((self._between(*both) for both in self._of_pair[pair]), key=_distance_of)
 
     def _placed(self, number: int) -> tuple[pin.SE3, Any]:
@@ -235,6 +267,14 @@ class LinkDistances:
         if not abs(float(normal @ normal) - 1.0) < 1e-6:
             normal = _direction(at_b.translation - at_a.translation)
         return _Nearest(float(distance), normal, *points, i, j)
+
+
+def _speed(twist: Array, point: Array, along: Array) -> float:
+    """Return the speed of a point of a body along a direction, in world axes, m/s."""
+    (px, py, pz), (nx, ny, nz) = point.tolist(), along.tolist()
+    vx, vy, vz, wx, wy, wz = twist.tolist()
+    moves = nx * (vx + wy * pz - wz * py) + ny * (vy + wz * px - wx * pz)
+    return float(moves + nz * (vz + wx * py - wy * px))
 
 
 def _distance_of(near: _Nearest) -> float:

@@ -32,10 +32,10 @@ def collision_geometry(model: pin.Model, shapes: CollisionShapes) -> pin.Geometr
     counts: dict[str, int] = {}
     for shape in shapes.shapes:
         counts[shape.link] = counts.get(shape.link, 0) + 1
-        if not model.existFrame(shape.link, pin.FrameType.BODY):
+        frame = link_frame(model, shape.link)
+        if frame is None:
             faults.append(f"{shape.where}: link {shape.link!r} is not in the model any more")
             continue
-        frame = model.getFrameId(shape.link, pin.FrameType.BODY)
         joint, at = model.frames[frame].parentJoint, model.frames[frame].placement
         try:
             path, geometry = _built(shape, shapes.package_path, loader)
@@ -50,6 +50,14 @@ def collision_geometry(model: pin.Model, shapes: CollisionShapes) -> pin.Geometr
     if faults:
         raise InputError(f"collision shapes that cannot be used: {few(faults, 3)}")
     return found
+
+
+def link_frame(model: pin.Model, name: str) -> int | None:
+    """Return the index of a link's frame, or of another one if no link has the name; or None."""
+    if model.existFrame(name, pin.FrameType.BODY):
+        return int(model.getFrameId(name, pin.FrameType.BODY))
+    found = [index for index, frame in enumerate(model.frames) if frame.name == name]
+    return found[0] if found else None
 
 
 def _built(shape: LinkShape, package_path: Sequence[str], loader: Any) -> tuple[str, Any]:

@@ -76,7 +76,7 @@ def pairs_of_links(
         If a link that is to be ignored is not in the model.
     """
     left_out = {frozenset(pair) for pair in ignored}
-    check_links(model, ignored)
+    check_links(model, ignored, links)
     rigid, connections = _connections(model, closures)
     body = _joined(model.njoints, rigid)
     shaped = {body[joint] for joint in links.values()}
@@ -90,9 +90,10 @@ def pairs_of_links(
     ]
 
 
-def check_links(model: pin.Model, pairs: Iterable[Sequence[str]]) -> None:
-    """Refuse names that no link has."""
+def check_links(model: pin.Model, pairs: Iterable[Sequence[str]], more: Iterable[str] = ()) -> None:
+    """Refuse names that no link has, and none of some more frames."""
     known = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
+    known += [name for name in more if name not in known]
     for name in (name for pair in pairs for name in pair):
         if name not in known:
             raise MechanismError(

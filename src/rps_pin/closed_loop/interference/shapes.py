@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-import numpy as np
 import pinocchio as pin
 
 from rps_pin.errors import InputError, shown
@@ -133,16 +132,22 @@ def composed_shapes(parts: Mapping[str, CollisionShapes]) -> CollisionShapes:
     )
 
 
-def shapes_of(model: pin.Model, given: pin.GeometryModel) -> CollisionShapes:
-    """Return the shapes of a `pin.GeometryModel` of a model.
+def shapes_of(model: pin.Model, given: Any) -> CollisionShapes:
+    """Return what is given as shapes of a model: `CollisionShapes`, a `pin.GeometryModel`, or None.
 
-    A shape belongs to the link that is the first frame of its joint if it names no frame of a link.
+    A shape that names no frame of a link belongs to the first link of its joint.
 
     Raises
     ------
     InputError
-        If a shape is on a joint that the model does not have.
+        If it is none of these, or a shape is on a joint that the model does not have.
     """
+    if given is None or isinstance(given, CollisionShapes):
+        return given or CollisionShapes()
+    if not isinstance(given, pin.GeometryModel):
+        raise InputError(
+            f"collision = {shown(given)}: it must be CollisionShapes or a pin.GeometryModel"
+        )
     found = []
     for item in given.geometryObjects:
         joint = int(item.parentJoint)
@@ -150,11 +155,9 @@ def shapes_of(model: pin.Model, given: pin.GeometryModel) -> CollisionShapes:
             raise InputError(f"shape {item.name!r} is on joint {joint}, of {model.njoints}")
         frame = _link_frame(model, item)
         at = model.frames[frame].placement.actInv(item.placement)
-        scale = np.ravel(item.meshScale)
-        fault = "" if np.isfinite(scale).all() else "its scale is not finite"
         where = f"shape {item.name!r}"
         name = model.frames[frame].name
-        found.append(LinkShape(name, where, "given", (), at, item.geometry, fault))
+        found.append(LinkShape(name, where, "given", (), at, item.geometry))
     return CollisionShapes(tuple(found))
 
 

@@ -25,6 +25,8 @@ from rps_pin.task.paths.signals import TaskSignals, lowest
 
 #: What is said where there is nothing to check.
 NO_SHAPES = "no collision shapes"
+#: Values that are looked at together.
+_BLOCK = 100_000
 _KINDS = {"leaves": "begins", "returns": "ends", "starts outside": "starts inside"}
 
 
@@ -100,8 +102,9 @@ class PairSignals:
         Of the samples, s, shape (n,).
     values, slopes
         Signals and rates there, (n, near); of a pair that is far away a lower bound, and 0.
-    speeds
-        Largest relative speeds of the links of a pair there, m/s, (n, near).
+    ways
+        Between the samples, how far the links of a pair move against each other at most, if no
+        faster than at them, m, (n - 1, near).
     """
 
     kinds: tuple[Signal, ...] = ()
@@ -110,20 +113,20 @@ class PairSignals:
         self.path, self.distances, self.clearance = path, distances, clearance
         self.duration, self.tolerance, self.scale = path.duration, path.tolerance, path.scale
         self.times, self._state = path.states()
-        bounds = self._bounds()
-        slack = np.abs(np.diff(bounds, axis=0)).max(axis=0, initial=0.0)
-        close = bounds <= max(self._some_distance(bounds), clearance) + slack
+        bounds, speeds = self._bounds()
+        ways = np.maximum(speeds[:-1], speeds[1:]) * np.diff(self.times)[:, None]
+        enough = max(self._some_distance(bounds), clearance) + ways.max(axis=0, initial=0.0)
+        close = bounds <= enough
         self.near = np.flatnonzero(close.any(axis=0))
         self.limits = tuple(
             Signal("distance", int(number), "lower", clearance, "m") for number in self.near
         )
         close, self.values = close[:, self.near], bounds[:, self.near] - clearance
         self.slopes = np.zeros_like(self.values)
-        self.speeds = np.zeros_like(self.values)
+        self.ways = ways[:, self.near]
         for k, i in np.argwhere(close).tolist():
             if not close[k, :i].any():
                 self._take(self._state, k)
-                self.speeds[k] = distances.largest_speeds()[self.near]
             self.values[k, i], self.slopes[k, i] = self._one(i)
 
     def sample(self, times: Array) -> tuple[Array, Array]:
@@ -153,8 +156,12 @@ class PairSignals:
         return found[0], found[1]
 
     def matters(self, sizes: Array, slopes: Array, steps: Array, threshold: float) -> Bools:
-        """Return which turning points may be a contact."""
-        return np.asarray(lowest(sizes, slopes, steps) <= 0.0)
+        """Return which turning points may be a contact, of some signals at a time."""
+        block = max(_BLOCK // max(len(sizes), 1), 1)
+        parts = [slice(k, k + block) for k in range(0, sizes.shape[1], block)]
+        return np.concatenate(
+            [lowest(sizes[:, one], slopes[:, one], steps) <= 0.0 for one in parts], axis=1
+        )
 
     def may_jump(self, values: Array) -> Bools:
         """Return False: distances do not jump."""
@@ -171,12 +178,13 @@ class PairSignals:
         distance, rate = self.distances.with_rate(int(self.near[signal]))
         return distance - self.clearance, rate
 
-    def _bounds(self) -> Array:
-        found = np.empty((self.times.size, len(self.distances.pairs)))
-        for k, q in enumerate(self._state.q):
-            self.distances.set_state(q)
-            found[k] = self.distances.bounds()
-        return found
+    def _bounds(self) -> tuple[Array, Array]:
+        """Return a lower bound of each distance and its largest rate, shape (n, pairs) each."""
+        found = np.empty((2, self.times.size, len(self.distances.pairs)))
+        for k in range(self.times.size):
+            self._take(self._state, k)
+            found[:, k] = self.distances.bounds(), self.distances.largest_speeds()
+        return found[0], found[1]
 
     def _some_distance(self, bounds: Array) -> float:
         """Return the least distance of pairs at the samples where their balls are nearest."""
@@ -226,9 +234,7 @@ class PairFindings(Findings):
     def hidden(self) -> float:
         """Return how deep a contact between samples can be that was not found, m."""
         both = (self.values[:-1] > 0) & (self.values[1:] > 0)
-        ways = np.maximum(self.path.speeds[:-1], self.path.speeds[1:])
-        ways = ways * np.diff(self.times)[:, None]
-        deep = np.where(both, ways - self.values[:-1] - self.values[1:], 0.0) / 2
+        deep = np.where(both, self.path.ways - self.values[:-1] - self.values[1:], 0.0) / 2
         return float(deep.max(initial=0.0))
 
     def _event(self, found: LimitEvent, alone: bool) -> InterferenceEvent:

@@ -10,6 +10,7 @@ from typing import Any
 import pinocchio as pin
 from lxml import etree
 
+from rps_pin.closed_loop.interference.geometry import link_frame
 from rps_pin.closed_loop.interference.shapes import CollisionShapes, LinkShape, MeshFile
 from rps_pin.closed_loop.io.urdf.packages import file_of
 from rps_pin.closed_loop.io.write.links import Hung
@@ -90,10 +91,10 @@ def add_collisions(
     names: dict[str, str] = {}
     for shape in shapes.shapes:
         form = _stated(shape, shapes.package_path)
-        if isinstance(form, str) or not model.existFrame(shape.link, pin.FrameType.BODY):
+        frame = link_frame(model, shape.link)
+        if isinstance(form, str) or frame is None:
             left_out.append(f"{shape.where} ({form if isinstance(form, str) else 'no link'})")
             continue
-        frame = model.getFrameId(shape.link, pin.FrameType.BODY)
         hung = links[frame]
         at = hung.placement.actInv(model.frames[frame].placement * shape.placement)
         collision = etree.SubElement(elements[hung.link], "collision")
