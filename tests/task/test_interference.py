@@ -418,6 +418,9 @@ def test_bad_input_is_refused() -> None:
     for clearance in (-1e-3, np.nan, np.inf):
         with pytest.raises(InputError, match="clearance"):
             check(balls(), path, clearance=clearance)
+    for asked in ("yes", 1, []):
+        with pytest.raises(InputError, match="interference = .*: it must be True, False or None"):
+            check(balls(), path, interference=asked)
 
 
 def test_where_the_assembly_mode_ends_the_rest_is_not_checked(tmp_path: Path) -> None:

@@ -122,6 +122,14 @@ def test_a_link_that_is_merged_away_is_told(tmp_path: Path) -> None:
         one.interference(one.home)
 
 
+def test_packages_are_several_folders() -> None:
+    ball = floating('<sphere radius="1"/>', '<sphere radius="1"/>').collision_shapes
+    assert ball.in_packages([Path("b"), "c"]).in_packages(["a"]).package_path == ("a", "b", "c")
+    for wrong in ("folder", Path("folder")):
+        with pytest.raises(InputError, match="it must be several paths"):
+            ball.in_packages(wrong)  # type: ignore[arg-type]
+
+
 # Meshes -------------------------------------------------------------------------------------------
 
 

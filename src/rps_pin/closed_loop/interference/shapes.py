@@ -98,7 +98,15 @@ class CollisionShapes:
     package_path: tuple[str, ...] = ()
 
     def in_packages(self, folders: Iterable[str | os.PathLike[str]]) -> CollisionShapes:
-        """Return the same shapes, whose meshes are looked for in further folders first."""
+        """Return the same shapes, whose meshes are looked for in further folders first.
+
+        Raises
+        ------
+        InputError
+            If a path is given in place of several.
+        """
+        if isinstance(folders, (str, bytes, os.PathLike)):
+            raise InputError(f"folders = {shown(folders)}: it must be several paths: [...]")
         return replace(self, package_path=(*map(str, folders), *self.package_path))
 
     def ignoring(self, pairs: Any) -> CollisionShapes:

@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop.interference.distances import LinkDistances
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, shown
 from rps_pin.task.paths.events import InterferenceEvent, LimitEvent, PathInterference
 from rps_pin.task.paths.findings import Findings, Signal
 from rps_pin.task.paths.signals import TaskSignals, lowest
@@ -52,7 +52,9 @@ def path_interference(
         If it is asked for, and there are no shapes or one cannot be read.
     """
     mechanism = path.task.mechanism
-    if asked is False:
+    if not (asked is None or isinstance(asked, (bool, np.bool_))):
+        raise InputError(f"interference = {shown(asked)}: it must be True, False or None")
+    if asked is not None and not asked:
         return None
     stated = mechanism.collision_shapes
     if not (stated.shapes or stated.faults):
