@@ -419,7 +419,7 @@ def test_bad_input_is_refused() -> None:
         with pytest.raises(InputError, match="clearance"):
             check(balls(), path, clearance=clearance)
     for asked in ("yes", 1, []):
-        with pytest.raises(InputError, match="interference = .*: it must be True, False or None"):
+        with pytest.raises(InputError, match=r"interference = .*: it must be True, False or None"):
             check(balls(), path, interference=asked)
 
 

@@ -166,7 +166,7 @@ def _adjacent(
             here = waiting.pop()
             for reached, more in beside[here]:
                 slides = fewest[here] + more
-                if slides > 1 or slides >= fewest.get(reached, 2):
+                if slides >= fewest.get(reached, 2):  # two slides, or another way with fewer
                     continue
                 fewest[reached] = slides
                 if reached[0] == "body":
