@@ -80,9 +80,8 @@ def pd_control(
         speed_wanted, _ = of.motion(*setpoint)
         e = vectors.difference(setpoint.geometry.length, geometry.length)
         c = feedback(e, speed_wanted, speed)
-    base: Any = vectors.zero
-    if compensation == "gravity":
-        base = dynamics(geometry, vectors.zero, vectors.zero)
-    elif compensation == "feed_forward":
-        base = dynamics(*setpoint)
+    if compensation == "none":
+        return c
+    still = geometry, vectors.zero, vectors.zero
+    base = dynamics(*(still if compensation == "gravity" else setpoint))
     return None if base is None else vectors.total(base, c)

@@ -21,7 +21,9 @@ class ControlModel(Protocol):
 
     vectors: Vectors
     size: int
-    """Number of coordinates, and of actuators."""
+    """Number of coordinates."""
+    actuators: int
+    """Number of actuators."""
     units: tuple[str, ...]
     """Of the coordinates."""
     rows: str

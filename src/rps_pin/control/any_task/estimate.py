@@ -23,7 +23,14 @@ from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.control.loop.vectors import arrays
 from rps_pin.copies import DeepCopied
-from rps_pin.errors import InputError, MechanismError, RPSPinError, SingularityError, shown
+from rps_pin.errors import (
+    ClosureError,
+    InputError,
+    MechanismError,
+    RPSPinError,
+    SingularityError,
+    shown,
+)
 from rps_pin.one_thread import TickGuard, guarded
 from rps_pin.task import SingularityMeasures, Task
 from rps_pin.validation import numbers, positive_number, real_vector
@@ -37,6 +44,9 @@ _LARGEST, _LARGEST_SPEED = 1e6, 1e9
 #: Largest change of a position, and of a target, that is followed in one tick: its way is followed
 #: step by step. In rad or characteristic lengths.
 FARTHEST = 10.0
+#: Gauss-Newton steps that fit more readings than coordinates, and the size of the last, in rad or
+#: characteristic lengths.
+_FITTING_STEPS, _FITTED = 12, 1e-11
 #: Joints are beyond their limits by more than that, m or rad.
 _SLACK = 1e-9
 
@@ -51,8 +61,9 @@ class TaskEstimate(DeepCopied):
     Parameters
     ----------
     task
-        The task, with as many actuators as coordinates; in generated code from `Task.compile`. Its
-        scratch memory is used.
+        The task, with as many actuators as coordinates or more; in generated code from
+        `Task.compile`. Its scratch memory is used. With more, the coordinates that fit the
+        positions with the least sum of squares are taken.
     near
         The coordinates at the start, shape (m,), in the assembly mode of home.
     period
@@ -82,7 +93,7 @@ class TaskEstimate(DeepCopied):
     InputError
         If an argument has the wrong shape or type, or is out of its range.
     MechanismError
-        If there are not as many actuators as coordinates.
+        If there are fewer actuators than coordinates.
     ClosureError, SingularityError
         If the coordinates are out of reach, or the mechanism is singular there.
     """
@@ -100,9 +111,9 @@ class TaskEstimate(DeepCopied):
         mechanism = task.mechanism
         actuators = mechanism.actuated_indices
         count = self._count = actuators.size
-        if count != task.size:
+        if count < task.size:
             raise MechanismError(
-                f"{count} actuators for {task.size} coordinates: control needs as many"
+                f"{count} actuators for {task.size} coordinates: control needs as many at least"
             )
         self.task, self.guard = task, TickGuard()
         length = task.characteristic_length
@@ -258,12 +269,42 @@ class TaskEstimate(DeepCopied):
     def _followed(self, d: Array, speeds: Array, last: TaskGeometry) -> TaskMotion | None:
         """Return the motion of a reading, continued from the last pose; None if it overflows."""
         task = self.task
+        if self._count > task.size:
+            return self._fitted(d, speeds, last)
         q = task.configuration_of(d, last.configuration, within_limits=False)
         geometry = self.geometry_of(q, last.pose)
         rate = task.rate(q, task.velocity_of(q, speeds))
         if not np.isfinite(rate).all():
             return None
         return TaskMotion(geometry, rate, speeds, self._jacobian(geometry))
+
+    def _fitted(self, d: Array, speeds: Array, last: TaskGeometry) -> TaskMotion:
+        """Return the motion that fits more readings than coordinates best, in one unit.
+
+        By Gauss-Newton steps in the task's coordinates, x += K^+ (d - a(x)).
+        """
+        task, x, q = self.task, last.pose, last.configuration
+        for _ in range(_FITTING_STEPS):
+            step = self.least_rate(task.jacobian(q), d - q[task.of_actuators])
+            x = x + step
+            q = task.configuration(x, q, within_limits=False)
+            if (np.abs(step) * task.scale).max() < _FITTED * task.characteristic_length:
+                geometry = self.geometry_of(q, x)
+                jacobian = self._jacobian(geometry)
+                return TaskMotion(geometry, self.least_rate(jacobian.K, speeds), speeds, jacobian)
+        raise ClosureError("no coordinates fit the positions: the steps do not end", math.nan)
+
+    def least_rate(self, K: Array, speed: Array) -> Array:
+        """Return x' of K x' = the actuators' speeds, of the least error in one unit."""
+        if len(K) == self.task.size:
+            return np.asarray(np.linalg.solve(K, speed))
+        return np.asarray(np.linalg.lstsq(K / self._scale[:, None], speed / self._scale)[0])
+
+    def least_force(self, K: Array, wrench: Array) -> Array:
+        """Return f of K' f = wrench, of the least norm in one unit."""
+        if len(K) == self.task.size:
+            return np.asarray(np.linalg.solve(K.T, wrench))
+        return np.asarray(np.linalg.lstsq(K.T / self._scale, wrench)[0]) / self._scale
 
     def geometry_of(self, q: Array, near: Array) -> TaskGeometry:
         """Return what follows from a configuration; of rotation vectors the one near a pose."""

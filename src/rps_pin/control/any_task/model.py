@@ -39,8 +39,8 @@ class TaskModel:
         self.task = task
         self.estimate = TaskEstimate(task, near, **settings)
         self.size, self.vectors = task.size, arrays(task.size)
+        self.actuators = task.of_actuators.size
         self._per_length = task.scale / task.characteristic_length
-        self._nothing = np.full(task.size, np.nan)
         self.units = tuple("rad" if one else "m" for one in task.angular)
         if task.compiled:  # what is generated when it is first called, is so before the loop
             self.mass(self.estimate.state.geometry)
@@ -153,7 +153,8 @@ class TaskModel:
         try:
             state = self.task.motion(geometry.configuration, rate, acceleration)
         except REFUSED:
-            return self._nothing, self._nothing
+            unknown = np.full(self.actuators, np.nan)
+            return unknown, unknown
         return state.v[indices], state.a[indices]
 
     def forces(self, geometry: TaskGeometry, rate: Array, acceleration: Array) -> Array | None:
@@ -170,17 +171,17 @@ class TaskModel:
 
     def pose_rate(self, jacobian: TaskJacobian, speed: Array) -> Array:
         """Return x' of K x' = the actuators' speeds, NaN if it is not determined."""
-        return self._solved(jacobian.K, speed)
+        try:
+            return self.estimate.least_rate(jacobian.K, speed)
+        except np.linalg.LinAlgError:
+            return np.full(self.size, np.nan)
 
     def force_of_wrench(self, jacobian: TaskJacobian, wrench: Array) -> Array:
-        """Return f of K' f = wrench, NaN if it is not determined."""
-        return self._solved(jacobian.K.T, wrench)
-
-    def _solved(self, matrix: Array, right: Array) -> Array:
+        """Return f of K' f = wrench, of the least norm; NaN if it is not determined."""
         try:
-            return np.asarray(np.linalg.solve(matrix, right))
+            return self.estimate.least_force(jacobian.K, wrench)
         except np.linalg.LinAlgError:
-            return self._nothing
+            return np.full(self.actuators, np.nan)
 
     def speed_of_rate(self, jacobian: TaskJacobian, rate: Array) -> Array:
         """Return K x'."""

@@ -41,7 +41,7 @@ class LegModel(LegFormulas):
         Likewise.
     """
 
-    size = 3
+    size = actuators = 3
     units: tuple[str, ...] = ("m", "rad", "rad")
     rows = "triples"
     coordinates = staticmethod(three_floats)

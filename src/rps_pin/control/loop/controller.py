@@ -68,8 +68,9 @@ class Controller(DeepCopied, ABC):
     ----------
     robot
         The controller's model of the robot, with payload and friction: an `RPSRobot`; or a `Task`
-        with as many actuators as coordinates, or a `ClosedLoopModel` that has one. What is said of
-        legs and of the pose holds for the actuators and the coordinates of a task.
+        with as many actuators as coordinates or more, or a `ClosedLoopModel` that has one. What is
+        said of legs and of the pose holds for the actuators and the coordinates of a task. Forces
+        of more actuators than coordinates are those of least norm, within the limits.
     near
         The pose at the start, shape (m,), m and rad; also the first setpoint, at rest. Of a task in
         the assembly mode of home.
@@ -131,7 +132,7 @@ class Controller(DeepCopied, ABC):
     SingularityError
         If the pose is nearer to a singularity than `near_singular`.
     MechanismError
-        If a mechanism has no task, or not as many actuators as coordinates.
+        If a mechanism has no task, or fewer actuators than coordinates.
     CompileError
         If there is no generated code, with ``compiled=True``.
     """
@@ -179,6 +180,12 @@ class Controller(DeepCopied, ABC):
             largest_jump=largest_jump,
         )
         self._vectors, self.estimate = self._model.vectors, self._model.estimate
+        self._no_force = self._vectors.of([0.0] * self._model.actuators)
+        if self._model.actuators > self._model.size and not self._in_task_space:
+            raise InputError(
+                f"space = 'actuator': errors of {self._model.actuators} actuators are not free; "
+                f"take space='task', of {self._model.size} coordinates"
+            )
         self._quiet = isinstance(self._model, LegModel)  # floats overflow without a warning
         self._guard = self.estimate.guard
         self.period, self.gains = period, gains.of(self._model.size)
@@ -191,7 +198,7 @@ class Controller(DeepCopied, ABC):
         self._limits = ForceLimits(tuple(force_limits(robot, force_limit).tolist()))
         self._rate_filter = SetpointRateFilter(cut_off, self._vectors)
         self._near, self._stop = near_singular, stop_singular
-        self.forces: Array = np.zeros(self._model.size)
+        self.forces: Array = np.zeros(self._model.actuators)
         self._generated: GeneratedTick | None = None
         self._speed_measured = False
         self.reset(near)
@@ -241,7 +248,7 @@ class Controller(DeepCopied, ABC):
         self._rest: Setpoint | None = None
         self._pace = 1.0
         self.status = Status.OK
-        self._wanted: Any = self._vectors.zero
+        self._wanted: Any = self._no_force
         self._send(self._limits.clipped(self._weight()))
         self._to_generated_code()
 
@@ -478,7 +485,7 @@ class Controller(DeepCopied, ABC):
         geometry = self._setpoints.current.geometry if near else state.geometry
         zero = self._vectors.zero
         force = self._solve(geometry, zero, zero)
-        return zero if force is None or not math.isfinite(sum(force)) else force
+        return self._no_force if force is None or not math.isfinite(sum(force)) else force
 
     def _stopped(self, number: int, elapsed: float, reason: str = "") -> Status:
         """Stop, or stay stopped: hold the first pose estimated since, else the weight."""

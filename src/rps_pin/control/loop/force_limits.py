@@ -39,6 +39,8 @@ _RECOVERY = 0.2
 #: Of ProxQP, with variables scaled by the limits.
 _TOLERANCE = 1e-11
 _MOST_ITERATIONS = 100
+#: Weight of forces without effect, where there are more actuators than coordinates.
+_NEAREST = 1e-7
 #: Kinetic energy of the target's motion, J, below which it has no direction.
 _AT_REST = 1e-18
 
@@ -134,6 +136,8 @@ class ForceLimits:
         share = goal / self._size
         scale = sum(hessian.diagonal().tolist())
         hessian /= scale * max(1.0, *map(abs, share.tolist()))
+        if len(mass) < len(goal):  # forces without effect: among equals the nearest
+            hessian += _NEAREST * np.eye(len(goal))
         self._problem.update(H=hessian, g=-hessian.dot(share))
         self._problem.solve()
         results = self._problem.results
