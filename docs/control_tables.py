@@ -34,7 +34,9 @@ from rps_pin.control.simulation.loop_summary import LoopSummary, TrackingErrors,
 from rps_pin.control.simulation.plant import Plant
 from rps_pin.control.simulation.scenario import load_scenario
 from rps_pin.control.simulation.wrong_parameters import wrong_parameters
-from rps_pin.plots import plot_loop_forces, save_figure
+from rps_pin.plots import COLOURS, LEG_STYLES, plot_loop_forces, styled
+from rps_pin.plots.curves import legend_above
+from rps_pin.plots.style import figure_of, panels
 from rps_pin.trajectories import Trajectory
 
 ROOT = Path(__file__).parent.parent
@@ -209,7 +211,7 @@ def faults() -> str:
     worst = np.abs(run.command).max()
     lines += ["", f"Largest force of the run: {worst:.4g} N; all finite: "]
     lines[-1] += f"{bool(np.isfinite(run.command).all())}."
-    save_figure_named(run, "control_faults")
+    save_named(plot_loop_forces(run), "control_faults")
     return "\n".join(lines)
 
 
@@ -289,11 +291,9 @@ def profile() -> str:
     return "\n".join([*lines, f"{measured['machine']}."])
 
 
-def save_figure_named(run: LoopRun, name: str) -> None:
-    """Write the forces and statuses of a run as PNG."""
-    for path in save_figure(plot_loop_forces(run), IMAGES, name):
-        if path.suffix == ".svg":
-            path.unlink()
+def save_named(figure: Figure, name: str) -> None:
+    """Write a figure as PNG."""
+    figure.savefig(IMAGES / f"{name}.png")
 
 
 def picture() -> None:
@@ -307,23 +307,25 @@ def picture() -> None:
         ),
         "computed torque": scenario.run(),
     }
-    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
-    axes = figure.subplots(2, 1, sharex=True)
-    for (name, run), style in zip(runs.items(), ("--", "-"), strict=True):
+    save_named(tracking_errors(runs), "control_errors")
+
+
+@styled
+def tracking_errors(runs: dict[str, LoopRun]) -> Figure:
+    """Return the errors of centre and orientation of several runs, from 1 s on."""
+    axes = panels(None, 2, 3.4)
+    for (name, run), colour, style in zip(runs.items(), COLOURS, LEG_STYLES, strict=False):
         errors, here = TrackingErrors.of(run), run.time >= 1.0
-        centre = 1e6 * np.linalg.norm(errors.centre, axis=1)
-        axes[0].semilogy(run.time[here], centre[here], style, color="black", label=name)
-        axes[1].semilogy(run.time[here], 1e6 * errors.turn[here], style, color="black")
-    axes[0].set_ylabel("centre (µm)")
-    axes[1].set_ylabel("orientation (µrad)")
-    axes[1].set_xlabel("time (s)")
-    axes[0].legend(loc="center right")
-    for own in axes:
-        own.grid(alpha=0.3)
-        own.set_xlim(1.0, 2.0)
-    for path in save_figure(figure, IMAGES, "control_errors"):
-        if path.suffix == ".svg":
-            path.unlink()
+        values = np.linalg.norm(errors.centre, axis=1), errors.turn
+        for own, error in zip(axes, values, strict=True):
+            shown = 1e6 * error[here]
+            shown[shown < 1e-2 * np.median(shown)] = np.nan  # at the start it is 0
+            own.semilogy(run.time[here], shown, style, color=colour, label=name)
+    for own, label in zip(axes, ("centre error (µm)", "turn error (µrad)"), strict=True):
+        own.set(xlim=(1.0, 2.0), ylabel=label)
+    axes[-1].set_xlabel("time (s)")
+    legend_above(axes[0])
+    return figure_of(axes[0])
 
 
 if __name__ == "__main__":

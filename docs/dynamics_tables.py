@@ -23,7 +23,7 @@ from marked import block, replaced
 
 from rps_pin import RPSRobot, helix
 from rps_pin.paper import lagrange_forces, virtual_work_forces
-from rps_pin.plots import STYLE, plot_force_causes
+from rps_pin.plots import plot_force_causes
 from rps_pin.rps import Payload, force_causes, time_optimal
 from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
 from rps_pin.rps.motion.trajectory_file import load_trajectory
@@ -173,7 +173,7 @@ def picture() -> None:
     run: MotionRun = run_motion(robot, circle(height=0.223, tilt=0.1, duration=0.6), 1000.0)
     causes = force_causes(robot, run.pose, run.rate, run.acceleration)
     figure = plot_force_causes(run.time, causes)
-    figure.savefig(ROOT / "docs" / "images" / "forces_by_cause.png", dpi=STYLE["figure.dpi"] // 2)
+    figure.savefig(ROOT / "docs" / "images" / "forces_by_cause.png")
 
 
 # Inner workings -----------------------------------------------------------------------------------

@@ -37,8 +37,11 @@ from rps_pin.control import (
 )
 from rps_pin.errors import RPSPinError
 from rps_pin.files import whole_file
+from rps_pin.plots import COLUMN, LEG_COLOURS, LEG_STYLES, styled
 from rps_pin.trajectories import circle
 from rps_pin.viewer import LiveView
+
+Array = NDArray[np.float64]
 
 PERIOD = 1e-3  # s
 REST = 0.5  # s at the start, before it moves: the integral learns the weight
@@ -128,18 +131,30 @@ def write(folder: Path, robot: RPSRobot, log: NDArray[np.void]) -> list[Path]:
         print(f"centre error: at most {centre[moving].max():.3g} um")
         print(f"tilt error: at most {tilt[moving].max():.3g} urad")
 
-    figure = Figure(figsize=(7, 6), layout="constrained")
-    axes = figure.subplots(3, 1, sharex=True)
-    labels = ("centre error (um)", "tilt error (urad)", "force (N)")
-    for own, label, values in zip(axes, labels, (centre, tilt, log["force"]), strict=True):
-        own.plot(log["time"], values)
-        own.set_ylabel(label)
-    axes[2].legend(["leg 1", "leg 2", "leg 3"])
-    axes[2].set_xlabel("time (s)")
+    figure = drawn(log["time"], centre, tilt, log["force"])
     picture = folder / "loop.png"
     with whole_file(picture) as scratch:
-        figure.savefig(scratch, dpi=150)
+        figure.savefig(scratch, dpi=300)
     return [table, picture]
+
+
+@styled
+def drawn(time: Array, centre: Array, tilt: Array, force: Array) -> Figure:
+    """Return a figure of both errors (um, urad) and of the forces (N) over time (s)."""
+    figure = Figure(figsize=(COLUMN, 4.4), layout="constrained")
+    axes = figure.subplots(3, 1, sharex=True)
+    axes[0].plot(time, centre, color="black")
+    axes[1].plot(time, tilt, color="black")
+    for leg, (colour, style) in enumerate(zip(LEG_COLOURS, LEG_STYLES, strict=True)):
+        axes[2].plot(time, force[:, leg], style, color=colour, label=f"leg {leg + 1}")
+    axes[2].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
+    for own, label in zip(
+        axes, ("centre error (µm)", "tilt error (µrad)", "force (N)"), strict=True
+    ):
+        own.set_ylabel(label)
+        own.margins(x=0)
+    axes[2].set_xlabel("time (s)")
+    return figure
 
 
 if __name__ == "__main__":

@@ -37,7 +37,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import casadi as ca
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -45,7 +44,7 @@ from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel
 from rps_pin.errors import RPSPinError
-from rps_pin.plots import COLOURS, LEG_STYLES, STYLE, save_figure
+from rps_pin.plots import COLOURS, LEG_STYLES, PAGE, save_figure, styled
 
 Array = NDArray[np.float64]
 
@@ -247,31 +246,26 @@ def simulated(engine: Any, plan: Motion) -> Any:
 # The figure ---------------------------------------------------------------------------------------
 
 
+@styled
 def drawn(robot: ClosedLoopModel, plan: Motion, plain: Motion, limit: float) -> Figure:
     """Return a figure of both motions: links and paths of the tip, torques, speeds."""
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(7.2, 3.6), layout="constrained")
-        axes = figure.subplot_mosaic([["swing", "torque"], ["swing", "speed"]])
-        draw_swing(axes["swing"], robot, plan, plain)
-        for motion, style in ((plan, LEG_STYLES[0]), (plain, LEG_STYLES[1])):
-            for joint, name in enumerate(("left", "right")):
-                label = f"{name}, {'least energy' if motion is plan else 'minimum jerk'}"
-                look: Any = {"color": COLOURS[joint], "linestyle": style, "label": label}
-                axes["torque"].plot(motion.time, motion.tau[:, joint], **look)
-                axes["speed"].plot(motion.time, motion.u[:, joint], **look)
-        for bound in (-limit, limit):
-            axes["torque"].axhline(bound, color=COLOURS[-1], linewidth=0.8, linestyle=":")
-        axes["torque"].set_ylabel("torque (N m)")
-        axes["torque"].tick_params(labelbottom=False)
-        axes["speed"].set_ylabel("speed (rad/s)")
-        axes["speed"].set_xlabel("time (s)")
-        figure.legend(
-            *axes["speed"].get_legend_handles_labels(),
-            loc="outside upper right",
-            ncols=2,
-            frameon=False,
-            fontsize="small",
-        )
+    figure = Figure(figsize=(PAGE, 3.3), layout="constrained")
+    axes = figure.subplot_mosaic([["swing", "torque"], ["swing", "speed"]])
+    draw_swing(axes["swing"], robot, plan, plain)
+    for motion, style in ((plan, LEG_STYLES[0]), (plain, LEG_STYLES[1])):
+        for joint, name in enumerate(("left", "right")):
+            label = f"{name}, {'least energy' if motion is plan else 'minimum jerk'}"
+            look: Any = {"color": COLOURS[joint], "linestyle": style, "label": label}
+            axes["torque"].plot(motion.time, motion.tau[:, joint], **look)
+            axes["speed"].plot(motion.time, motion.u[:, joint], **look)
+    for bound in (-limit, limit):
+        axes["torque"].axhline(bound, color=COLOURS[-1], linewidth=0.8, linestyle=":")
+    axes["torque"].plot([], [], ":", color=COLOURS[-1], linewidth=0.8, label="limit of torque")
+    axes["torque"].set_ylabel("torque (N m)")
+    axes["torque"].tick_params(labelbottom=False)
+    axes["speed"].set(xlabel="time (s)", ylabel="speed (rad/s)")
+    handles, labels = axes["torque"].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
 
 
@@ -281,7 +275,7 @@ def draw_swing(axes: Axes, robot: ClosedLoopModel, plan: Motion, plain: Motion) 
     for k, shade in zip(shown, np.linspace(0.25, 1.0, len(shown)), strict=True):
         for arm, colour in zip(("left", "right"), COLOURS, strict=False):
             x, z = np.array([at(robot, plan.q[k], frame) for frame in frames(arm)]).T
-            axes.plot(x, z, "-o", color=colour, alpha=shade, markersize=2.5, linewidth=1.2)
+            axes.plot(x, z, "-o", color=colour, alpha=shade, markersize=2.0, linewidth=1.0)
     for motion, style in ((plan, LEG_STYLES[0]), (plain, LEG_STYLES[1])):
         x, z = np.array([at(robot, q, "left_tip") for q in motion.q]).T
         axes.plot(x, z, color=COLOURS[-1], linestyle=style, linewidth=1.0)

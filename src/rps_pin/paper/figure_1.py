@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
@@ -29,6 +30,8 @@ def plot_mechanism(robot: RPSRobot) -> Figure:
     feet = robot.parameters.base_radius * RADIAL
     tips = p + robot.parameters.platform_radius * RADIAL @ turn.T  # Eq. 1
     figure = Figure(figsize=(PAGE, 3.5))
+    # Notebooks cut to what is drawn, without texts in space: this is as large as the figure.
+    figure.add_artist(Rectangle((0, 0), 1, 1, transform=figure.transFigure, fill=False, lw=0))
     figure.subplots_adjust(left=0.03, right=1.03, bottom=0, top=0.93, wspace=0)
     for column, (title, draw) in enumerate(
         (("(a) joints and legs", _draw_joints), ("(b) vectors of leg 1", _draw_vectors))
@@ -78,7 +81,7 @@ def _draw_vectors(axes: Axes3D, feet: Array, tips: Array, p: Array) -> None:
          0.02 * _RIGHT),
         (np.zeros(3), tips[0], r"$\mathbf{q}_1$", LEG_COLOURS[2], 0.02 * _RIGHT),
         (np.zeros(3), p, r"$\mathbf{p}$", black, -0.06 * _RIGHT),
-        (p, tips[0], r"$\mathbf{R}\,\mathbf{b}_1$", "#CC79A7", -0.02 * _RIGHT + [0, 0, 0.07]),
+        (p, tips[0], r"$\mathbf{R}\,\mathbf{b}_1$", "#CC79A7", 0.1 * _RIGHT + [0, 0, 0.04]),
     )  # fmt: skip
     for start, end, name, colour, shift in arrows:
         axes.quiver(*start, *(end - start), color=colour, lw=1.4, arrow_length_ratio=0.07)

@@ -47,6 +47,7 @@ STYLE: Any = {
     ),
     **dict.fromkeys(("legend.fontsize", "figure.titlesize", "figure.labelsize"), POINTS),
     "axes.grid": True,
+    "axes.axisbelow": True,
     "grid.alpha": 0.3,
     "grid.linewidth": 0.5,
     "axes.linewidth": 0.6,
