@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +13,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop.assembly.approach import approached
 from rps_pin.closed_loop.assembly.closing import close, is_closed
-from rps_pin.closed_loop.assembly.continuation import Followed, Path, coordinates_of
+from rps_pin.closed_loop.assembly.continuation import Followed, Path
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError, InputError, SingularityError
 from rps_pin.validation import numbers, real_vector
@@ -73,7 +75,14 @@ def by_name(
 def with_values(system: ConstraintSystem, q: Array, values: Mapping[str, ArrayLike]) -> Array:
     """Return a configuration in which joints have given values, shape (nq,)."""
     model, changed = system.model, q.copy()
-    system.velocity_indices(list(values), "to give a value")
+    at = system.velocity_indices(list(values), "to give a value")
+    coordinates = system.coordinates_of(at)
+    each: list[Any] = list(values.values())
+    plain = [x for x in each if isinstance(x, float) and isfinite(x)]
+    if len(plain) == len(values) == coordinates.size and values.keys() <= system.joint_names:
+        # Joints of one coordinate each: in one step.
+        changed[coordinates[np.argsort(np.argsort(at))]] = plain
+        return system.normalised(changed, "q_guess")
     for name, value in values.items():
         if not model.existJointName(name):
             raise InputError(f"{name!r} is a part of a joint: give all of its coordinates in q")
@@ -196,7 +205,7 @@ def _overdetermined(
     target: Array,
 ) -> Array:
     """Return the configuration with more given values than there are motions."""
-    q, left = approached(system, given, coordinates_of(system.model, given), start, target)
+    q, left = approached(system, given, system.coordinates_of(given), start, target)
     wanted = with_values(system, q, named)
     try:
         ended = close(system, wanted, fixed=list(named), within_limits=False)

@@ -123,7 +123,9 @@ class Path:
 
     def __init__(self, system: ConstraintSystem, given: Indices, start: Array, target: Array):
         self.system, self.given = system, given
-        self.others = np.setdiff1d(np.arange(system.model.nv), given)
+        free = np.ones(system.model.nv, dtype=bool)
+        free[given] = False
+        self.others = np.flatnonzero(free)
         self._start, self._target = start, target
         self._rate = pin.difference(system.model, start, target)[given]
         self._scale, self._length = system.column_scale, system.equations.length
@@ -131,7 +133,7 @@ class Path:
         self._closed_gap = 10 * closed_gap(system, start) + rule.gap
         self._no_rank = max(_NO_RANK, rule.tolerance)
         self._inconsistent = max(_INCONSISTENT, rule.consistent)
-        self._of_given = coordinates_of(system.model, given)
+        self._of_given = system.coordinates_of(given)
 
     def follow(self) -> Followed:
         """Follow the path to its end, or to a singularity."""
@@ -234,13 +236,3 @@ class Path:
         velocity[self.others] = self._scale[self.others] * step
         moved: Array = pin.integrate(self.system.model, q, velocity)
         return moved
-
-
-def coordinates_of(model: pin.Model, velocities: Indices) -> Indices:
-    """Return the indices in q of the joints that velocities belong to."""
-    wanted: set[int] = set(velocities.tolist())
-    found: list[int] = []
-    for joint in list(model.joints)[1:]:
-        if joint.idx_v in wanted:
-            found += range(joint.idx_q, joint.idx_q + joint.nq)
-    return np.array(found, dtype=np.intp)

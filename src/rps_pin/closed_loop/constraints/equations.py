@@ -84,6 +84,22 @@ class HeldCoordinates(NamedTuple):
     """The rows of the rotation vector, which are the last."""
 
 
+class _Together:
+    """Gaps of all spherical closures in one step, from Pinocchio's own memory."""
+
+    def __init__(self, points: Sequence[ClosedFrames]) -> None:
+        at = [range(frames.rows.start, frames.rows.stop) for frames in points]
+        self.rows = np.array(at, dtype=np.intp).ravel()
+        self._apart = [frames.constraint_data.c1Mc2.translation for frames in points]
+        self._turns = [frames.constraint_data.oMc1.rotation for frames in points]
+
+    def gaps(self) -> Array:
+        """Return -R p of each, in world axes, (3 n,)."""
+        apart = np.concatenate(self._apart).reshape(-1, 3, 1)
+        turns = np.concatenate(self._turns).reshape(-1, 3, 3)
+        return np.asarray(-(turns @ apart).ravel())
+
+
 class ClosureEquations:
     """The closure equations of one model, with the scratch memory to evaluate them.
 
@@ -201,6 +217,7 @@ class ClosureEquations:
         self.open_limit = OPEN * self.length
         self._open_points, self._open_frames = self._open_tests()
         self._only_spherical = len(self._open_points) == len(self.closures)
+        self._together = _Together(self._points)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Give copies scratch memory of their own."""
@@ -297,7 +314,9 @@ class ClosureEquations:
         """Return e(q), from the placements that `jacobian` or `gaps` has computed at q."""
         gaps = np.empty(self.size)
         self.look_at(q)
-        for frames in self.closed_frames:
+        if self._points:
+            gaps[self._together.rows] = self._together.gaps()
+        for frames in self._frames:
             gap = frames.selected.gap(frames.constraint_data.c1Mc2)
             if frames.in_world:
                 gap = (gap.reshape(-1, 3) @ frames.constraint_data.oMc1.rotation.T).ravel()

@@ -232,7 +232,7 @@ class DistanceRows(Rows):
 
     def gap(self, placement: pin.SE3) -> Array:
         """Return L - |p|."""
-        return np.array([self.distance - np.linalg.norm(placement.translation)])
+        return np.array([self.distance - math.hypot(*placement.translation.tolist())])
 
     def wrenches(self, placement: pin.SE3) -> Array:
         """Return (u, 0), u = p / |p|."""

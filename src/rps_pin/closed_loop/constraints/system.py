@@ -99,6 +99,12 @@ class ConstraintSystem:
         if effects is not None and effects.damping.size != model.nv:
             raise InputError(f"effects are of {effects.damping.size} velocities, not {model.nv}")
         self.data = equations.data
+        #: Names of the joints, and indices of velocities that were asked for by name.
+        self.joint_names, self._velocities = frozenset(model.names), dict[str, list[int]]()
+        #: The joint of each coordinate, and of each velocity.
+        joints = list(model.joints)[1:]
+        self._joint_of_q = np.repeat(np.arange(len(joints)), [joint.nq for joint in joints])
+        self._joint_of_v = np.repeat(np.arange(len(joints)), [joint.nv for joint in joints])
         self.actuated = self.velocity_indices(self.actuated_names, "to actuate")
         self.passive = np.setdiff1d(np.arange(model.nv), self.actuated)
         self.passive_size = self.passive.size
@@ -217,13 +223,20 @@ class ConstraintSystem:
         """
         indices: list[int] = []
         for name in names_of(joints, f"joint {purpose}"):
-            found = named_velocities(self.model, name)
+            found = self._velocities.get(name) or named_velocities(self.model, name)
             if found is None:
                 raise MechanismError(f"no joint {name!r} {purpose}; {self._possible(name)}")
+            self._velocities[name] = found
             if not set(found).isdisjoint(indices):
                 raise MechanismError(f"a coordinate of {name!r} {purpose} is named twice")
             indices.extend(found)
         return np.array(indices, dtype=np.intp)
+
+    def coordinates_of(self, velocities: Indices) -> Indices:
+        """Return the indices in q of the joints that velocities belong to."""
+        wanted = np.zeros(self.model.njoints, dtype=bool)
+        wanted[self._joint_of_v[velocities]] = True
+        return np.flatnonzero(wanted[self._joint_of_q])
 
     def _possible(self, name: str) -> str:
         """Return what could have been named: the coordinates of a joint, or all joints."""
