@@ -18,6 +18,7 @@ from rps_pin.closed_loop import (
     Simulation,
     Stepper,
 )
+from rps_pin.closed_loop.visuals import skeleton
 from rps_pin.codegen import CompiledMechanism
 from rps_pin.codegen.engine.forces import GeneratedForces
 from rps_pin.control import ComputedTorque, Gains, Plant
@@ -125,6 +126,7 @@ ARGUMENTS = {
     "simulate": "q v",
     "describe": "q",
     "closure_at": "q",
+    "interference": "q",
     "search_start": "q_guess",
     "assembly_modes": "values q_guess",
     "step": "q v tau",
@@ -152,7 +154,8 @@ OTHERS: dict[str, dict[str, Any]] = {
 
 @cache
 def _pinocchio() -> ClosedLoopModel:
-    return ClosedLoopModel.load("urdf/four_bar.yaml")
+    mechanism = ClosedLoopModel.load("urdf/four_bar.yaml")
+    return mechanism.with_collision(skeleton(mechanism))  # bars, whose distances are computed
 
 
 @cache
