@@ -28,7 +28,7 @@ from rps_pin.errors import (
 )
 from rps_pin.rps import ActuatorLimits
 from rps_pin.rps import time_optimal as rps_time_optimal
-from rps_pin.task import MotionLimits, Task, time_optimal
+from rps_pin.task import MotionLimits, Payload, Task, time_optimal
 from rps_pin.task.motion import task_dynamics
 from rps_pin.task.motion.limited_motion import LimitedMotion
 from rps_pin.task.motion.task_dynamics import TaskDynamics
@@ -246,8 +246,9 @@ def test_the_3_rps_without_its_closed_forms(force: float) -> None:
     line = LineCurve([0.40, 0.05, 0.0], [0.45, -0.05, 0.1])
     expected = rps_time_optimal(robot, line, limits=ActuatorLimits(force, 0.5))
     limits = MotionLimits(force=force, speed=0.5)
-    plain = Task(robot.mechanism, "platform", ["z", "rx", "ry"]).compile()
-    for task in (plain, robot.task.compile()):
+    plain = Task(robot.mechanism, "platform", ["z", "rx", "ry"])
+    plain = plain.compile(functions=("kinematics", "closing", "dynamics"))
+    for task in (plain, robots.compiled("sokolov")):
         found = time_optimal(task, line, limits=limits)
         assert found.duration == pytest.approx(expected.duration, rel=1e-6)
         t = np.linspace(0, found.duration, 200)
@@ -308,6 +309,22 @@ def test_a_wrench_is_held_along_the_way() -> None:
     limit = mechanism.model.effortLimit[mechanism.actuated_indices]
     np.testing.assert_allclose(found.use(t).force, np.array(forces) / limit, atol=1e-8)
     assert worst(np.abs(forces) / limit) <= 1 + KEPT
+
+
+def test_a_payload_is_carried_along(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the 3-RPS's closed forms have it, and a heavier mass on a slide."""
+    monkeypatch.setattr(task_dynamics, "_FEW_TIMES", 101)
+    load = Payload(3.0, (0.05, -0.02, 0.1))
+    robot = RPSRobot.from_preset("sokolov")
+    line = LineCurve([0.42, 0.0, 0.0], [0.44, -0.02, 0.05])
+    expected = rps_time_optimal(
+        robot.with_payload(load), line, limits=ActuatorLimits(60.0, 0.5), intervals=8
+    )
+    limits = MotionLimits(force=60.0, speed=0.5)
+    found = time_optimal(robot.task, line, limits=limits, payload=load, intervals=8)
+    assert found.duration == pytest.approx(expected.duration, rel=1e-5)
+    free = rps_time_optimal(robot, line, limits=ActuatorLimits(60.0, 0.5), intervals=8)
+    assert found.duration > 1.001 * free.duration
 
 
 def test_friction_in_the_joints_is_overcome() -> None:
@@ -372,8 +389,9 @@ def test_other_paths_are_refused() -> None:
         time_optimal(slide(), 3.0, limits=limits)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"have shape \(2,\); the task has 1 coordinates: slide"):
         time_optimal(slide(), LineCurve([0, 0], [1, 1]), limits=limits)
-    with pytest.raises(MechanismError, match="no output frame for a wrench"):
-        time_optimal(slide(), ALONG, limits=limits, wrench=np.zeros(6))
+    for load in ({"wrench": np.zeros(6)}, {"payload": Payload(1.0)}):
+        with pytest.raises(MechanismError, match="no output frame for a payload or a wrench"):
+            time_optimal(slide(), ALONG, limits=limits, **load)
     with pytest.raises(ClosureError, match=r"at u = 0\.75\d* of 1: .*slide"):
         time_optimal(slide(), LineCurve([0.7], [1.1]), limits=limits)
 

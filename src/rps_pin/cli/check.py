@@ -14,7 +14,9 @@ import typer
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
 from rps_pin.cli import mechanism_options as options
+from rps_pin.cli import motion_options as motions
 from rps_pin.cli import task_options as tasks
+from rps_pin.cli.degrees import check_in_degrees
 from rps_pin.errors import InputError
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.singularity.path_check import check_path
@@ -74,7 +76,12 @@ def check_command(
         float,
         typer.Option(help="Distance to a singularity (0 to 1) below which a path grazes it."),
     ] = GRAZE,
+    fastest: motions.FastestOption = False,
+    payload: motions.PayloadOption = None,
+    payload_centre: motions.PayloadCentreOption = (0.0, 0.0, 0.0),
+    wrench: motions.WrenchOption = None,
     mechanism: tasks.MechanismOption = None,
+    degrees: tasks.DegreesOption = False,
     clearance: ClearanceOption = 0.0,
     ignore: IgnoreOption = None,
     interference: InterferenceOption = Interference.AUTO,
@@ -85,8 +92,8 @@ def check_command(
 
     That is a helix of a 3-RPS, or a trajectory file; with **--mechanism**, a trajectory of the
     coordinates of its task. Each event is located to a nanosecond, or to 1e-10 of the duration. Of
-    a mechanism, speeds and forces of the actuators are checked too, and where its description has
-    collision shapes, the interference of its links.
+    a mechanism, speeds and forces of the actuators are checked too, under payload and wrench, and
+    where its description has collision shapes, the interference of its links.
 
     Exit status: 0 the path is clear; 1 it is not; 2 wrong usage.
 
@@ -106,21 +113,30 @@ def check_command(
         if trajectory is None:
             told = "a mechanism has no helix: give a trajectory file"
             raise typer.BadParameter(told, param_hint="TRAJECTORY")
+        load = motions.payload_of(payload, payload_centre, wrench)
         task = _task(mechanism, package_path)
         choice = {Interference.YES: True, Interference.NO: False}.get(interference)
         pairs = _pairs(ignore or ())
         asked = {"interference": choice, "clearance": clearance, "ignore": pairs}
-        _of_task(task, trajectory, threshold, asked, as_json)
+        asked |= {"threshold": threshold}
+        loads = {"payload": load, "wrench": wrench}
+        _of_task(task, trajectory, asked, loads, fastest, degrees, as_json)
         return
     if clearance or ignore or interference != Interference.AUTO or package_path:
         told = "interference is checked of a mechanism: give its file, --mechanism FILE"
         raise typer.BadParameter(told, param_hint="--interference")
+    if payload is not None or any(payload_centre) or wrench is not None:
+        told = "of a 3-RPS, positions alone are checked: these options need a --mechanism"
+        raise typer.BadParameter(told, param_hint="--payload, --payload-centre, --wrench")
+    tasks.refuse_degrees(degrees)
     machine = common.load_robot(robot)
     path: Trajectory
     if trajectory is None:
         path = helix.chosen_helix(machine, radius, pitch, height, branch, duration)
     else:
         path = load_trajectory(trajectory, machine)
+    if fastest:
+        path = motions.fastest_of_robot(common.text_console(as_json), machine, path)
     found = check_path(machine, path, threshold=threshold)
     _tell(found, {"robot": machine.parameters.name}, as_json)
 
@@ -143,17 +159,28 @@ def _pairs(given: Sequence[str]) -> list[list[str]]:
 
 
 def _of_task(
-    task: Task, trajectory: Path, threshold: float, asked: Mapping[str, Any], as_json: bool
+    task: Task,
+    trajectory: Path,
+    asked: Mapping[str, Any],
+    loads: Mapping[str, Any],
+    fastest: bool,
+    degrees: bool,
+    as_json: bool,
 ) -> None:
     from rps_pin.task.path_check import check_path as check_task_path
     from rps_pin.task.trajectory_file import load_task_trajectory
 
-    path = load_task_trajectory(trajectory, task)
-    found = check_task_path(task, path, threshold=threshold, **asked)
-    _tell(found, {"mechanism": task.mechanism.name}, as_json)
+    path = load_task_trajectory(trajectory, task, **loads)
+    if fastest:
+        path = motions.fastest_of_task(common.text_console(as_json), task, path, **loads)
+    found = check_task_path(task, path, **asked, **loads)
+    if degrees:
+        found = check_in_degrees(found, task)
+    units = {"length": "m", "angle": tasks.unit_of(True, degrees)}
+    _tell(found, {"mechanism": task.mechanism.name, "units": units}, as_json)
 
 
-def _tell(found: PathCheck, of: dict[str, str], as_json: bool) -> None:
+def _tell(found: PathCheck, of: dict[str, Any], as_json: bool) -> None:
     if as_json:
         common.print_json(_plain(found) | of | {"ok": found.ok})
     else:

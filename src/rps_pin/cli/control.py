@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,7 @@ from rich.markup import escape
 
 from rps_pin.cli import console as common
 from rps_pin.cli.layer_options import write_page
+from rps_pin.cli.motion_options import FastestOption, fastest_of_robot, fastest_of_task
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
 from rps_pin.errors import RPSPinError
 from rps_pin.files import write_text
@@ -37,13 +39,16 @@ def control_command(
     output: common.NamedFolderOption = None,
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
+    fastest: FastestOption = False,
 ) -> None:
     """Run a control loop against a simulated robot that differs from the controller's model.
 
     The file has the robot (a 3-RPS, or a mechanism with a task), trajectory, controller, plant
     (wrong masses, friction, encoders, delay) and faults. Output: **report.md** with gains, margins,
     errors in micrometres and microradians and statuses, **loop.csv** (every tick), figures,
-    **summary.json**, and **viewer.html**, the motion in 3D.
+    **summary.json**, and **viewer.html**, the motion in 3D. The shortest time of **--fastest** is
+    that of the controller's model, and leaves no force for control: lower limits are given in the
+    trajectory (**fastest: {force: 40}**).
 
     Exit status: 0 done, also if the controller stopped; 1 it cannot be run, or not to the end (the
     error says why); 2 wrong usage; 130 Ctrl-C. What was run before the end is written.
@@ -66,6 +71,14 @@ def control_command(
     results = [*files, *figures_in(folder, "tracking", "forces"), folder / "viewer.html"]
     check_outputs(results, overwrite, inputs=[scenario], renewed=True)
     console = common.text_console(as_json)
+    if fastest:
+        model, given = loaded.model, loaded.trajectory
+        path = (
+            fastest_of_robot(console, model, given)
+            if isinstance(model, RPSRobot)
+            else fastest_of_task(console, model, given)
+        )
+        loaded = replace(loaded, trajectory=path)
     common.tell_size("loop.csv", loaded.duration / loaded.entry.period, columns_of(*loaded.sizes))
     run, broken = _run(loaded, console)
     window = loaded.entry.settle if run.time[-1] > loaded.entry.settle else 0.0

@@ -11,15 +11,14 @@ import typer
 from rich.markup import escape
 
 from rps_pin.cli import console as common
+from rps_pin.cli import motion_options as motions
 from rps_pin.cli import task_options as tasks
 from rps_pin.cli.mechanism_options import AccuracyOption, IgnoreLimitsOption
 from rps_pin.cli.motion_report import motion_files, print_motion, write_motion
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
 from rps_pin.cli.task_dynamics import dynamics_of_task, refuse_options_of_robots
-from rps_pin.errors import InputError
 from rps_pin.files import write_text
 from rps_pin.rps.dynamics.force_causes import force_causes
-from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.dynamics.motion_csv import COLUMNS
 from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 from rps_pin.rps.dynamics.sizing import size_actuators
@@ -27,9 +26,6 @@ from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.task.sizing.sizing_sheet import ActuatorLimits
 from rps_pin.trajectories.path import end_states
-from rps_pin.validation import finite_number
-
-Six = tuple[float, float, float, float, float, float]
 
 _FIGURES = ("forces_by_cause", "force_over_speed")
 
@@ -40,27 +36,10 @@ def dynamics_command(
         typer.Argument(metavar="TRAJECTORY", help="A CSV file of poses, or a YAML file."),
     ],
     robot: common.RobotOption = "sokolov",
-    fastest: Annotated[
-        bool,
-        typer.Option(
-            "--fastest",
-            help="Follow the same curve in the shortest time within the actuator limits.",
-        ),
-    ] = False,
-    payload: Annotated[
-        float | None, typer.Option(metavar="KG", help="Mass of a payload on the platform, kg.")
-    ] = None,
-    payload_centre: Annotated[
-        common.Three,
-        typer.Option(metavar="X Y Z", help="Its centre of mass in platform axes, m."),
-    ] = (0.0, 0.0, 0.0),
-    wrench: Annotated[
-        Six | None,
-        typer.Option(
-            metavar="FX FY FZ MX MY MZ",
-            help="On the platform, N and N m, base axes, about the platform's centre.",
-        ),
-    ] = None,
+    fastest: motions.FastestOption = False,
+    payload: motions.PayloadOption = None,
+    payload_centre: motions.PayloadCentreOption = (0.0, 0.0, 0.0),
+    wrench: motions.WrenchOption = None,
     gravity: Annotated[
         common.Three | None,
         typer.Option(metavar="X Y Z", help="Gravity in base axes, m/s^2; default: the robot's."),
@@ -72,6 +51,7 @@ def dynamics_command(
     mechanism: tasks.MechanismOption = None,
     ignore_limits: IgnoreLimitsOption = False,
     accuracy: AccuracyOption = None,
+    degrees: tasks.DegreesOption = False,
     output: common.NamedFolderOption = None,
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
@@ -83,7 +63,7 @@ def dynamics_command(
     figures of path, lengths, forces, forces by cause and forces over speeds, the sizing sheet
     (**sizing.json**), and **viewer.html**, the motion in 3D. With **--mechanism** the trajectory is
     one of its task's coordinates, payload and wrench are those of its output frame, and the loads
-    of all joints are printed.
+    of all joints are printed; **--degrees** says and writes all its angles in degrees.
 
     Exit status: 0 done; 1 the robot cannot follow it (the error says why); 2 wrong usage.
 
@@ -97,13 +77,9 @@ def dynamics_command(
 
     - `rps-pin dynamics path.yaml --mechanism delta --payload 0.2`
     """
-    if payload is None and any(payload_centre):
-        raise InputError("--payload-centre is the place of a payload: give its mass with --payload")
-    for force in wrench or ():
-        finite_number(force, "--wrench", "N or N m")
+    load = motions.payload_of(payload, payload_centre, wrench)
     if mechanism is not None:
-        refuse_options_of_robots(gravity, power, payload, fastest)
-        load = None if payload is None else Payload(payload, payload_centre)
+        refuse_options_of_robots(gravity, power)
         dynamics_of_task(
             mechanism,
             trajectory,
@@ -114,15 +90,17 @@ def dynamics_command(
             as_json=as_json,
             ignore_limits=ignore_limits,
             accuracy=accuracy,
+            degrees=degrees,
             payload=load,
             wrench=wrench,
         )
         return
+    tasks.refuse_degrees(degrees)
     machine = common.load_robot(robot)
     if gravity is not None:
         machine = RPSRobot(machine.parameters.replace(gravity=gravity))
-    if payload is not None:
-        machine = machine.with_payload(Payload(payload, payload_centre))
+    if load is not None:
+        machine = machine.with_payload(load)
     name = machine.parameters.name
     path = load_trajectory(trajectory, machine)
     folder = output or Path(f"{trajectory.stem}-dynamics")
@@ -132,12 +110,7 @@ def dynamics_command(
     console = common.text_console(as_json)
     limits = ActuatorLimits.of(machine.parameters, power=math.inf if power is None else power)
     if fastest:
-        from rps_pin.rps.motion.time_optimal import time_optimal
-
-        given = path.duration
-        with console.status("computing the shortest time"):
-            path = time_optimal(machine, path, limits=limits, wrench=wrench)
-        console.print(f"shortest time {path.duration:.6g} s (as given: {given:.6g} s)")
+        path = motions.fastest_of_robot(console, machine, path, limits, wrench)
     progress = common.progress_bar(console, "inverse dynamics")
     common.tell_size("dynamics.csv", path.duration * rate, COLUMNS)
     run = run_motion(machine, path, rate, wrench=wrench, progress=progress)

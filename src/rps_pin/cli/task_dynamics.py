@@ -11,29 +11,27 @@ import typer
 
 from rps_pin.arrays import Array
 from rps_pin.cli import console as common
+from rps_pin.cli.degrees import table_in_degrees
 from rps_pin.cli.layer_options import write_page
 from rps_pin.cli.mechanism_options import load_mechanism, shapes_of
+from rps_pin.cli.motion_options import fastest_of_task
 from rps_pin.cli.outputs import check_outputs, figures_in
+from rps_pin.cli.task_options import unit_of
 from rps_pin.files import whole_file, write_text
 from rps_pin.plain_text import plain
-from rps_pin.task import run_motion, time_optimal
+from rps_pin.task import run_motion
 from rps_pin.task.sizing.motion_run import TaskMotion
 from rps_pin.task.sizing.sizing import sheet_of
 from rps_pin.task.task import Task
 from rps_pin.task.trajectory_file import load_task_trajectory
 
 
-def refuse_options_of_robots(
-    gravity: Any, power: float | None, payload: float | None, fastest: bool
-) -> None:
+def refuse_options_of_robots(gravity: Any, power: float | None) -> None:
     """Refuse options of `dynamics` that a mechanism does not have, if they are given."""
     for option, given in (("--gravity", gravity), ("--power", power)):
         if given is not None:
             told = "it is an option of a 3-RPS, not of a mechanism"
             raise typer.BadParameter(told, param_hint=option)
-    if payload is not None and fastest:
-        told = "the shortest time of a mechanism with a payload is not computed"
-        raise typer.BadParameter(told, param_hint="--fastest")
 
 
 def dynamics_of_task(
@@ -47,34 +45,34 @@ def dynamics_of_task(
     as_json: bool,
     ignore_limits: bool,
     accuracy: float | None,
+    degrees: bool,
     **loads: Any,
 ) -> None:
     """Compute, write and print the motion; see `rps_pin.cli.dynamics`."""
     model, file = load_mechanism(mechanism, ignore_limits, accuracy)
     task: Task = model.task
-    path = load_task_trajectory(trajectory, task)
+    path = load_task_trajectory(trajectory, task, **loads)
     folder = output or Path(f"{trajectory.stem}-dynamics")
     files = [folder / name for name in ("dynamics.csv", "sizing.json", "viewer.html")]
     files += figures_in(folder, "force_over_speed")
     check_outputs(files, overwrite, inputs=[trajectory, mechanism], renewed=True)
     console = common.text_console(as_json)
     if fastest:
-        given = path.duration
-        with console.status("computing the shortest time"):
-            path = time_optimal(task, path, wrench=loads.get("wrench"))
-        console.print(f"shortest time {path.duration:.6g} s (as given: {given:.6g} s)")
+        path = fastest_of_task(console, task, path, **loads)
     names = columns(task)
     common.tell_size("dynamics.csv", path.duration * rate, len(names))
     progress = common.progress_bar(console, "inverse dynamics")
     run = run_motion(task, path, rate, progress=progress, **loads)
     sheet = sheet_of(task, run)
+    if degrees:
+        sheet = sheet.in_degrees()
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
         from rps_pin.plots import save_figure
         from rps_pin.plots.dynamics import plot_sizing
         from rps_pin.viewer import Motion
 
-        write_table(files[0], names, run)
+        write_table(files[0], names, run, degrees)
         write_text(files[1], json.dumps(sheet.as_dict(), indent=2) + "\n")
         shapes, _ = shapes_of(file, model)
         title = f"{model.name} along {trajectory.name}"
@@ -83,6 +81,7 @@ def dynamics_of_task(
         save_figure(plot_sizing(sheet), folder, "force_over_speed")
     if as_json:
         answer = {"mechanism": model.name, "trajectory": trajectory, "duration": path.duration}
+        answer["units"] = {"length": "m", "angle": unit_of(True, degrees)}
         common.print_json(answer | {"sizing": sheet.as_dict(), "files": files})
         return
     console.print(plain(f"{model.name}, {trajectory}: {path.duration:.6g} s"))
@@ -100,10 +99,12 @@ def columns(task: Task) -> list[str]:
     return [*names, *task.actuator_columns]
 
 
-def write_table(path: Path, names: list[str], run: TaskMotion) -> None:
+def write_table(path: Path, names: list[str], run: TaskMotion, degrees: bool = False) -> None:
     """Write every sample of a motion as CSV."""
     motion = (run.pose, run.rate, run.acceleration)
     parts: list[Array] = [run.time[:, None], *motion, run.position, run.speed, run.force]
+    rows = np.hstack(parts)
+    if degrees:
+        names, rows = table_in_degrees(names, rows)
     with whole_file(path) as scratch:
-        rows = np.hstack(parts)
         np.savetxt(scratch, rows, fmt="%.17g", delimiter=",", header=",".join(names), comments="")

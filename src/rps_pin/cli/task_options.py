@@ -97,6 +97,12 @@ def unit_of(angular: bool, degrees: bool) -> str:
     return ("deg" if degrees else "rad") if angular else "m"
 
 
+def refuse_degrees(degrees: bool) -> None:
+    """Refuse the option without a mechanism: a 3-RPS's angles are in radians."""
+    if degrees:
+        raise typer.BadParameter("this option needs a --mechanism", param_hint="--degrees")
+
+
 def table(
     names: Sequence[str],
     values: Array,

@@ -22,6 +22,7 @@ from rps_pin.cli.mechanism_options import (
     print_notes,
     shapes_of,
 )
+from rps_pin.cli.motion_options import FastestOption, fastest_of_robot, fastest_of_task
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.printing import PlainConsole, say
 from rps_pin.closed_loop import ClosedLoopModel
@@ -61,6 +62,7 @@ def view_command(
     height: helix.HeightOption = None,
     branch: helix.BranchOption = helix.Branch.PLUS,
     duration: helix.DurationOption = helix.DEFAULT_DURATION,
+    fastest: FastestOption = False,
     layers: LayersOption = None,
     html: Annotated[Path | None, typer.Option(help="Write this page; start no server.")] = None,
     png: Annotated[
@@ -131,6 +133,11 @@ def view_command(
         refuse(context, f"{file} is a robot already", "robot", "mechanism")
         mechanism = file
     _refuse_what_does_not_fit(context, trajectory, mechanism, pose is not None, interactive)
+    still_robot = kind == "parameters" and not given(context, *_CURVE)
+    if fastest and (
+        interactive or pose is not None or still_robot or (mechanism and trajectory is None)
+    ):
+        raise typer.BadParameter("there is no trajectory", param_hint="--fastest")
     if pose is not None:
         common.doubt_pose("--pose", pose)
     if interactive:
@@ -144,15 +151,15 @@ def view_command(
     motion: Any
     if mechanism is not None:
         loaded = load_mechanism(mechanism, ignore_limits, accuracy)
-        machine, motion, drawn = _of_mechanism(loaded, package_path, trajectory)
+        machine, motion, drawn = _of_mechanism(loaded, package_path, trajectory, fastest)
     else:
         machine, drawn = common.load_robot(robot), {}
         still = pose
-        if kind == "parameters" and pose is None and not given(context, *_CURVE):
+        if still_robot and pose is None:
             z, tilt_x, tilt_y = machine.task.home.tolist()
             still = z, tilt_x, tilt_y
         curve = (radius, pitch, height, branch, duration)
-        motion = _of_robot(machine, trajectory, curve) if still is None else still
+        motion = _of_robot(machine, trajectory, curve, fastest) if still is None else still
     inputs = [one for one in (file, mechanism) if one is not None]
     outputs = [one for one in (html, png, video) if one is not None]
     check_outputs(outputs, overwrite, inputs=inputs)
@@ -254,7 +261,10 @@ def _refuse_what_does_not_fit(
 
 
 def _of_mechanism(
-    loaded: tuple[ClosedLoopModel, Path], package_path: list[Path] | None, trajectory: Path | None
+    loaded: tuple[ClosedLoopModel, Path],
+    package_path: list[Path] | None,
+    trajectory: Path | None,
+    fastest: bool,
 ) -> tuple[ClosedLoopModel, Any, dict[str, Any]]:
     """Return a mechanism, a motion of its task or None for its home, and its shapes."""
     mechanism, file = loaded
@@ -264,14 +274,22 @@ def _of_mechanism(
         return mechanism, None, {"visual": shapes}
     from rps_pin.task.trajectory_file import load_task_trajectory
 
-    return mechanism, load_task_trajectory(trajectory, mechanism.task), {"visual": shapes}
+    motion = load_task_trajectory(trajectory, mechanism.task)
+    if fastest:
+        motion = fastest_of_task(PlainConsole(stderr=True), mechanism.task, motion)
+    return mechanism, motion, {"visual": shapes}
 
 
-def _of_robot(machine: RPSRobot, trajectory: Path | None, curve: tuple[Any, ...]) -> Any:
-    """Return the trajectory of a file, or a helix."""
-    if trajectory is not None:
-        return load_trajectory(trajectory, machine)
-    return helix.chosen_helix(machine, *curve)
+def _of_robot(
+    machine: RPSRobot, trajectory: Path | None, curve: tuple[Any, ...], fastest: bool
+) -> Any:
+    """Return the trajectory of a file, or a helix; or the fastest along it."""
+    motion = (
+        helix.chosen_helix(machine, *curve)
+        if trajectory is None
+        else load_trajectory(trajectory, machine)
+    )
+    return fastest_of_robot(PlainConsole(stderr=True), machine, motion) if fastest else motion
 
 
 def _interact(

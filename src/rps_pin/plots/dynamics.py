@@ -122,7 +122,8 @@ def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
     words = both if len(turning) > 1 else of_turns if turning == {True} else of_slides
     if not named:
         words = ("speed $\\dot d_i$ (m/s), positive is out", "force $F_i$ (N), positive pushes out")
-    axes.set(xlabel=words[0], ylabel=words[1])
+    speed = words[0].replace("rad", sheet.actuators[0].angle_unit)
+    axes.set(xlabel=speed, ylabel=words[1])
     legend_above(axes)
     return figure_of(axes)
 

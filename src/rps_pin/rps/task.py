@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
+from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.rps.kinematics.legs import leg_motion, legs_of_pose
 from rps_pin.rps.kinematics.pose import checked_motion, platform_motion, platform_pose
 from rps_pin.rps.kinematics.rates import leg_jacobian_rates, leg_jacobians
@@ -42,6 +43,10 @@ class RPSTask(Task):
     def compile(self, **options: Any) -> RPSTask:
         """Return the same task of the robot in generated code; see `RPSRobot.compile`."""
         return RPSTask(self._robot.compile(**options))
+
+    def with_mechanism(self, mechanism: ClosedLoopModel) -> Any:
+        """Return the task of another mechanism, without closed forms; see `Task`."""
+        return Task(mechanism, **self._options)
 
     def at(self, q: ArrayLike, near: ArrayLike | None = None, *, errors: Errors = "raise") -> Array:
         """Return poses of configurations; see `Task.at`."""

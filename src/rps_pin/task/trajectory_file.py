@@ -4,8 +4,13 @@
     start: {z: 0.62}            # coordinates that are not named are those of home
     end: {z: 0.66, rx: 0.1}     # or numbers in the task's order
     duration: 1.0               # or max_rate, max_acceleration, max_jerk
+    fastest: {force: 40, jerk: {arm_1_joint: 300}}      # or {} for the model's own limits
 
-Numbers are in m and rad.
+With ``fastest`` the same path takes the shortest time within limits (`rps_pin.task.time_optimal`);
+a duration is not needed. Its keys are those of `MotionLimits`: ``force``, ``speed``,
+``acceleration`` and ``jerk`` of the actuators, ``coordinate_speed``, ``coordinate_acceleration``
+and ``coordinate_jerk``; each one number, numbers by name or in order, or two lists, the least and
+the largest. Numbers are in m, rad, N and N m.
 """
 
 from __future__ import annotations
@@ -15,10 +20,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.config import Entry, Finite, Positive, Text, YamlFile, read_yaml
 from rps_pin.errors import InputError, shown
+from rps_pin.task.loads import Payload
+from rps_pin.task.motion.described_limits import LimitsEntry, limits_of, numbers_by_name
 from rps_pin.task.task import Task
 from rps_pin.trajectories.csv_file import read_csv
 from rps_pin.trajectories.path import Trajectory
@@ -31,7 +39,12 @@ Pose = dict[Text, Finite] | list[Finite]
 Limit = Positive | dict[Text, Positive] | list[Positive]
 
 
-class _PointToPoint(Entry):
+class _Described(Entry):
+    kind: str
+    fastest: LimitsEntry | None = None
+
+
+class _PointToPoint(_Described):
     kind: Literal["point_to_point"]
     start: Pose | None = None
     end: Pose
@@ -42,7 +55,7 @@ class _PointToPoint(Entry):
     max_jerk: Limit | None = None
 
 
-class _Spline(Entry):
+class _Spline(_Described):
     kind: Literal["spline"]
     poses: list[Pose]
     times: list[Finite] | None = None
@@ -50,17 +63,27 @@ class _Spline(Entry):
     profile: Profile | None = None
 
 
-class _Csv(Entry):
+class _Csv(_Described):
     kind: Literal["csv"]
     file: Text
     max_step: Positive | None = None
     ends: Ends | None = None
 
 
-_KINDS: dict[str, type[Entry]] = {"point_to_point": _PointToPoint, "spline": _Spline, "csv": _Csv}
+_KINDS: dict[str, type[_Described]] = {
+    "point_to_point": _PointToPoint,
+    "spline": _Spline,
+    "csv": _Csv,
+}
 
 
-def load_task_trajectory(path: str | os.PathLike[str], task: Task) -> Trajectory:
+def load_task_trajectory(
+    path: str | os.PathLike[str],
+    task: Task,
+    *,
+    payload: Payload | None = None,
+    wrench: ArrayLike | None = None,
+) -> Trajectory:
     """Read a trajectory of a task's coordinates from a file, ``.csv``, ``.yaml`` or ``.yml``.
 
     Parameters
@@ -69,12 +92,16 @@ def load_task_trajectory(path: str | os.PathLike[str], task: Task) -> Trajectory
         The file. CSV: see `rps_pin.trajectories.read_csv`; YAML: see the module's text.
     task
         The task.
+    payload, wrench
+        That the shortest time is for, where it is asked for: see `time_optimal`.
 
     Raises
     ------
     InputError
         If the file cannot be read, its name has another ending, or it does not describe a
         trajectory of these coordinates; with file and line.
+    RPSPinError
+        If the shortest time is asked for, and there is none.
     """
     if not isinstance(path, (str, os.PathLike)):
         raise InputError(f"a trajectory file is given by its path, not by {shown(path)}")
@@ -83,10 +110,11 @@ def load_task_trajectory(path: str | os.PathLike[str], task: Task) -> Trajectory
         return read_csv(path, task)
     if suffix not in (".yaml", ".yml"):
         raise InputError(f"trajectory file {path}: its name must end in .csv, .yaml or .yml")
-    return described_task_trajectory(read_yaml(path, "trajectory file"), Path(path).parent, task)
+    file = read_yaml(path, "trajectory file")
+    return described_task_trajectory(file, Path(path).parent, task, payload=payload, wrench=wrench)
 
 
-def described_task_trajectory(file: YamlFile, folder: Path, task: Task) -> Trajectory:
+def described_task_trajectory(file: YamlFile, folder: Path, task: Task, **loads: Any) -> Trajectory:
     """Return the trajectory that a YAML file, or a part of one, describes.
 
     Parameters
@@ -97,10 +125,12 @@ def described_task_trajectory(file: YamlFile, folder: Path, task: Task) -> Traje
         The folder that file names in it are relative to.
     task
         The task.
+    loads
+        As `load_task_trajectory` takes them.
 
     Raises
     ------
-    InputError
+    RPSPinError
         As `load_task_trajectory`.
     """
     kind = file.values.get("kind")
@@ -112,13 +142,29 @@ def described_task_trajectory(file: YamlFile, folder: Path, task: Task) -> Traje
     described = file.validated(_KINDS[kind], f"a {kind} trajectory")
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return _made(file, described, folder, task)
+            trajectory = _made(file, described, folder, task)
     except ArithmeticError as error:
         raise InputError(f"{file.place(('kind',))}: numbers too large or small: {error}") from None
+    if described.fastest is None:
+        return trajectory
+    return _fastest(file, task, trajectory, described.fastest, loads)
+
+
+def _fastest(
+    file: YamlFile, task: Task, trajectory: Trajectory, given: LimitsEntry, loads: dict[str, Any]
+) -> Trajectory:
+    from rps_pin.task.motion.time_optimal import time_optimal  # noqa: PLC0415 (slow to import)
+
+    limits = limits_of(file, given, task)
+    with file.at("fastest"):
+        return time_optimal(task, trajectory, limits=limits, **loads)
 
 
 def _made(file: YamlFile, described: Any, folder: Path, task: Task) -> Trajectory:
-    given = described.model_dump(exclude={"kind"}, exclude_none=True)
+    given = described.model_dump(exclude={"kind", "fastest"}, exclude_none=True)
+    timed = {"times", "duration", "max_rate", "max_acceleration", "max_jerk"} & given.keys()
+    if described.fastest is not None and described.kind != "csv" and not timed:
+        given["duration"] = 1.0  # of which only the curve is used
     if described.kind == "csv":
         with file.at("file"):
             return read_csv(folder / given.pop("file"), task, **given)
@@ -133,31 +179,12 @@ def _made(file: YamlFile, described: Any, folder: Path, task: Task) -> Trajector
         given[end] = _pose(file, (end,), given.get(end, {}), task)
     for limit in ("max_rate", "max_acceleration", "max_jerk"):
         if isinstance(given.get(limit), (dict, list)):
-            given[limit] = _values(file, (limit,), given[limit], task, np.full(task.size, np.inf))
+            given[limit] = numbers_by_name(
+                file, (limit,), given[limit], task.coordinates, np.full(task.size, np.inf)
+            )
     with file.at("kind"):
         return point_to_point(**given)
 
 
 def _pose(file: YamlFile, place: tuple[str | int, ...], given: Pose, task: Task) -> Array:
-    return _values(file, place, given, task, task.home)
-
-
-def _values(
-    file: YamlFile, place: tuple[str | int, ...], given: Any, task: Task, otherwise: Array
-) -> Array:
-    """Return numbers in the task's order; those that are not named are others."""
-    names = ", ".join(task.coordinates)
-    if isinstance(given, list):
-        if len(given) != task.size:
-            raise InputError(
-                f"{file.place(place)}: {len(given)} numbers for the {task.size} coordinates {names}"
-            )
-        return np.array(given, dtype=np.float64)
-    values = otherwise.copy()
-    for name, value in given.items():
-        if name not in task.coordinates:
-            raise InputError(
-                f"{file.place((*place, name))}: the task has no {name!r}; it has: {names}"
-            )
-        values[task.coordinates.index(name)] = value
-    return values
+    return numbers_by_name(file, place, given, task.coordinates, task.home)

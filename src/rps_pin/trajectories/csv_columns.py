@@ -7,6 +7,7 @@ Quantities are the time, the coordinates, and their derivatives ``COORDINATE_rat
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -65,6 +66,7 @@ class Columns:
     def of_task(cls, task: HasCoordinates) -> Columns:
         """Return those of a task's coordinates."""
         others = frozenset(getattr(task, "actuator_columns", ()))
+        others |= {in_degrees(name) for name in others}
         columns = cls(tuple(task.coordinates), tuple(map(bool, task.angular)), others)
         counts = [len(_TIMES)]
         counts += [3 * len(_ANGLES if one else _LENGTHS) for one in columns.angular]
@@ -207,6 +209,11 @@ OF_RPS = Columns(
         for leg in (1, 2, 3)
     },
 )
+
+
+def in_degrees(column: str) -> str:
+    """Return the name of a column with its angles in degrees; of others, the same."""
+    return re.sub(r"_rad((_per_s2?)?)$", r"_deg\1", column)
 
 
 def is_number(cell: str) -> bool:

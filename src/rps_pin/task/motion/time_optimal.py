@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, MechanismError, shown
 from rps_pin.other_kinds import refuses_other_kinds
+from rps_pin.task.loads import Loads, Payload
 from rps_pin.task.motion.curves import curve_of, ends_at_rest, refuse_infinite_jerk
 from rps_pin.task.motion.jerk.jerk_search import JerkSearch
 from rps_pin.task.motion.limited_motion import LimitedMotion
@@ -33,6 +34,7 @@ def time_optimal(
     path: Curve | Trajectory,
     *,
     limits: MotionLimits | None = None,
+    payload: Payload | None = None,
     wrench: ArrayLike | None = None,
     near: ArrayLike | None = None,
     intervals: int = INTERVALS,
@@ -55,6 +57,9 @@ def time_optimal(
         the motion begins and ends with zero acceleration, and the time is a local optimum: no small
         change of the time law makes it shorter, by more than some tenths of a per mille to a per
         mille, which is the width of its pieces.
+    payload
+        Fixed to the output frame: see `Loads`. Of a compiled task, the mechanism with it is
+        compiled too.
     wrench
         Constant wrench that the surroundings exert on the output frame: force (N) and moment (N m)
         about its origin, in world axes, shape (6,).
@@ -79,7 +84,7 @@ def time_optimal(
         path, or its first and second derivatives are zero at some point. With a limit of jerk, also
         if the curve has no tangent at an end, or its second derivative jumps.
     MechanismError
-        If there are fewer actuators than coordinates; if a task of joints is to take a wrench.
+        If there are fewer actuators than coordinates; if a task of joints is to carry a load.
     ClosureError, SingularityError
         If the path cannot be followed, or meets a singularity; says at which u.
     InfeasibleError
@@ -99,12 +104,14 @@ def time_optimal(
     load = None if wrench is None else real_array(wrench, "wrench", (6,))
     if load is not None and load.shape != (6,):
         raise InputError(f"wrench has shape {load.shape}; it must be (6,): constant")
-    if load is not None and task.frame is None:
-        raise MechanismError("a task of joints has no output frame for a wrench")
+    loads = Loads(task, payload, load)
     rest = ends_at_rest(curve, task.scale)
     if bounds.jerks.size:
         refuse_infinite_jerk(curve, task.scale, rest)
-    dynamics = TaskDynamics(task, curve, bounds, load, near)
+    if payload is not None:
+        carrying = task.with_mechanism(loads.mechanism)
+        task = carrying.compile() if task.is_compiled else carrying
+    dynamics = TaskDynamics(task, curve, bounds, loads.wrench, near)
     free = None
     if np.isfinite(bounds.levels).any():
         other = dynamics.without_jerk_limits()

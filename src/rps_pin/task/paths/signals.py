@@ -163,10 +163,7 @@ class TaskSignals:
 
     def where(self, pose: Array) -> str:
         """Return a pose in words."""
-        named = zip(self.task.coordinates, self.task.angular, pose, strict=True)
-        return ", ".join(
-            f"{name} = {value:.6g} {'rad' if turns else 'm'}" for name, turns, value in named
-        )
+        return pose_in_words(self.task, pose)
 
     def states(self) -> tuple[Array, TaskState]:
         """Return the times that were followed, and the motion of all joints there."""
@@ -270,3 +267,11 @@ def _sides(task: Task, signals: tuple[Signal, ...]) -> tuple[Any, Array, Array]:
     which = [task.mechanism.actuated.index(signal.joint) for signal in signals]
     sign = np.array([1.0 if signal.side == "upper" else -1.0 for signal in signals])
     return np.array(which, dtype=np.intp), sign, np.array([abs(s.limit) for s in signals])
+
+
+def pose_in_words(task: Task, pose: Array, angle: str = "rad") -> str:
+    """Return coordinates of a task by name, with their units; angles in that unit."""
+    named = zip(task.coordinates, task.angular, pose, strict=True)
+    return ", ".join(
+        f"{name} = {value:.6g} {angle if turns else 'm'}" for name, turns, value in named
+    )

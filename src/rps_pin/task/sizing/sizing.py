@@ -60,7 +60,9 @@ class TaskSizing(SizingSheet):
         table = Table(title="Actuator sizing")
         turning = {actuator.angular for actuator in self.actuators}
         force, speed, position = (
-            ", ".join(dict.fromkeys(UNITS[int(turns)][k] for turns in sorted(turning)))
+            ", ".join(dict.fromkeys(UNITS[int(turns)][k] for turns in sorted(turning))).replace(
+                "rad", self.actuators[0].angle_unit
+            )
             for k in range(3)
         )
         table.add_column("", min_width=max(len(one.name) for one in self.actuators))

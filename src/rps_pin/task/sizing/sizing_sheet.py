@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import io
 import math
-from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Protocol
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 from rich.console import Console
 from rich.table import Table
@@ -101,6 +101,13 @@ class Margin(NamedTuple):
         """Whether the limit is kept."""
         return self.margin >= 0
 
+    def in_degrees(self) -> Margin:
+        """Return it with angles in degrees."""
+        if not self.unit.startswith("rad"):
+            return self
+        value, limit, margin = map(math.degrees, (self.value, self.limit, self.margin))
+        return Margin(self.quantity, value, limit, margin, self.unit.replace("rad", "deg"))
+
 
 @dataclass(frozen=True)
 class ActuatorSizing:
@@ -139,7 +146,22 @@ class ActuatorSizing:
     name: str = ""
     """Of the joint; empty for a leg of the 3-RPS."""
     angular: bool = False
-    """Whether it turns: forces are torques, N m, and lengths angles, rad."""
+    """Whether it turns: forces are torques, N m, and lengths angles, in `angle_unit`."""
+    angle_unit: str = "rad"
+    """``"rad"`` or ``"deg"``."""
+
+    def in_degrees(self) -> ActuatorSizing:
+        """Return it with angles and angular speeds in degrees."""
+        if not self.angular:
+            return replace(self, angle_unit="deg")
+        return replace(
+            self,
+            speed_peak=math.degrees(self.speed_peak),
+            length_min=math.degrees(self.length_min),
+            length_max=math.degrees(self.length_max),
+            margins=tuple(margin.in_degrees() for margin in self.margins),
+            angle_unit="deg",
+        )
 
     @property
     def stroke(self) -> float:
@@ -172,6 +194,22 @@ class SizingSheet:
     def limits_of(self, index: int) -> ActuatorLimits:
         """Return the limits of one actuator, from 0."""
         return self.limits if isinstance(self.limits, ActuatorLimits) else self.limits[index]
+
+    def in_degrees(self) -> Self:
+        """Return the sheet with angles and angular speeds of its actuators in degrees."""
+        limits = []
+        for k, one in enumerate(self.actuators):
+            own = self.limits_of(k)
+            low, high = map(math.degrees, own.length)
+            turned = replace(own, speed=math.degrees(own.speed), length=(low, high))
+            limits.append(turned if one.angular else own)
+        factors = [math.degrees(1.0) if one.angular else 1.0 for one in self.actuators]
+        return replace(
+            self,
+            actuators=tuple(one.in_degrees() for one in self.actuators),
+            limits=tuple(limits),
+            speed=self.speed * factors,
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, strings, lists and dictionaries, as JSON has them.
@@ -227,7 +265,7 @@ def _plain(actuator: ActuatorSizing) -> dict[str, Any]:
     ]
     plain = vars(actuator) | {"stroke": actuator.stroke, "margins": margins}
     if not actuator.name:  # the 3-RPS's
-        del plain["name"], plain["angular"]
+        del plain["name"], plain["angular"], plain["angle_unit"]
     return plain
 
 
