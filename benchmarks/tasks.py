@@ -60,6 +60,8 @@ def rows(name: str) -> list[Row]:
     """Return the rows of a robot."""
     task = ClosedLoopModel.load(ROOT / "urdf" / f"{name}.yaml").task
     code, rng = task.compile(batches=True), np.random.default_rng(0)
+    for built in (code._by_task, code._by_actuators):
+        built.wait()  # for the best compiler's code, which is built in the background
     peers = {kind.__name__: ByHand(task, kind) for kind in (Pinocchio, Mujoco, NumPy)}
     near = task.mechanism.home
     own = {kind: peer.tree.start(near) for kind, peer in peers.items()}
