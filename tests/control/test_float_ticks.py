@@ -21,12 +21,12 @@ def test_some_ticks_of_the_long_run() -> None:
     seen = set().union(*(report.statuses for report in reports))
     assert seen == {"OK", *(str(flag.name) for flag in Status)}
     by_name = {report.name: report for report in reports}
-    for law in LAWS:
+    for law in (*LAWS, "estimate"):
         one, other = by_name[f"generated, {law}"], by_name[f"interpreted, {law}"]
         assert one.statuses == other.statuses
         assert one.generated > 0.1 * one.ticks
         assert other.generated == 0
-        assert 0.5 < one.largest <= 1.0
+        assert law == "estimate" or 0.5 < one.largest <= 1.0
 
 
 def test_the_long_run_finds_faults(monkeypatch: pytest.MonkeyPatch) -> None:

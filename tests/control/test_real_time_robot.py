@@ -443,3 +443,11 @@ def test_memory_does_not_grow() -> None:
     finally:
         tracemalloc.stop()
     assert after - before < 1000  # bytes: less than one a tick
+
+
+def test_rates_whose_squares_are_not_finite_are_refused_by_both_engines() -> None:
+    """At zero tilt generated code has finite forces of damping there; Pinocchio has none."""
+    loop = RealTimeRobot(RPSRobot.from_preset("micro"), [0.223, 0.0, 0.0])
+    rate, still = [1e200, 0.0, 0.0], [0.0, 0.0, 0.0]
+    assert loop.inverse_dynamics([0.223, 0.0, 0.0], rate, still) == Status.BAD_INPUT
+    assert loop.inverse_dynamics([0.223, 0.0, 0.0], still, still) == Status.OK

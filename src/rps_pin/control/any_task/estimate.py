@@ -16,13 +16,13 @@ from rps_pin.control.any_task.motion import (
     TaskMotion,
     departure,
 )
+from rps_pin.control.estimator.last_good import LastGood
 from rps_pin.control.estimator.loop_arguments import Numbers, elapsed_time, floats
 from rps_pin.control.generated.code import GeneratedTick
 from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SpeedFilter
-from rps_pin.control.loop.status import STATUSES, Status
+from rps_pin.control.loop.status import Status
 from rps_pin.control.loop.vectors import arrays
-from rps_pin.copies import DeepCopied
 from rps_pin.errors import (
     ClosureError,
     InputError,
@@ -51,7 +51,7 @@ _FITTING_STEPS, _FITTED = 12, 1e-11
 _SLACK = 1e-9
 
 
-class TaskEstimate(DeepCopied):
+class TaskEstimate(LastGood):
     """State estimate from the actuators' positions, one tick at a time.
 
     As `RealTimeRobot` is for the 3-RPS: no call in the loop raises for the values of its arguments.
@@ -196,12 +196,6 @@ class TaskEstimate(DeepCopied):
         geometry = self.geometry_of(q, x)
         self._state = TaskMotion(geometry, rate, speed, self._jacobian(geometry))
         self._filter.update(geometry.length, speed)
-
-    def _begin(self) -> None:
-        """Take the memory of generated code, whose next tick starts from another."""
-        if self.generated is not None:
-            self.generated.pull()
-            self.generated.ready = False
 
     @property
     def state(self) -> TaskMotion:
@@ -385,17 +379,7 @@ class TaskEstimate(DeepCopied):
         answers.pose[:], answers.rate[:] = geometry.pose, rate
         answers.position[:], answers.speed[:] = geometry.length, speed
         answers.configuration[:] = geometry.configuration
-        self.age, self.elapsed = 0, 0.0
-        self.status = status = STATUSES[number]
-        return status
-
-    def _keep(self, number: int) -> Status:
-        """Keep the last good estimate, with a status."""
-        self.age += 1
-        if self.type_ii < self._near:
-            number |= flags.NEAR_SINGULAR
-        self.status = status = STATUSES[number]
-        return status
+        return self._renew(number)
 
 
 def _distance(measures: SingularityMeasures) -> float:

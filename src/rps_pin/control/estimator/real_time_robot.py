@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.control.estimator.constrained_forces import ConstrainedForces
+from rps_pin.control.estimator.last_good import LastGood
 from rps_pin.control.estimator.leg_geometry import (
     LARGEST_LENGTH,
     LegGeometry,
@@ -30,8 +31,8 @@ from rps_pin.control.generated.tick import DYNAMICS, ESTIMATE, form_of
 from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.filters import SpeedFilter
 from rps_pin.control.loop.limits import RobotLimits
+from rps_pin.control.loop.setpoints import LARGEST_RATE, all_below
 from rps_pin.control.loop.status import STATUSES, Status
-from rps_pin.copies import DeepCopied
 from rps_pin.one_thread import TickGuard, guarded, one_thread
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.forward_kinematics import CONDITION_LIMIT, start_of
@@ -49,7 +50,7 @@ _NO_FORCES = 1e-8
     besides=("estimate", "forces_for", "inverse_dynamics", "memory", "numbers", "take"),
     properties=("state", "status_text", "force_status_text", "type_ii"),
 )
-class RealTimeRobot(DeepCopied):
+class RealTimeRobot(LastGood):
     """State estimate from encoder lengths, and inverse dynamics, one tick at a time.
 
     All arrays are allocated by the constructor. No call in the loop raises for the values of its
@@ -247,12 +248,6 @@ class RealTimeRobot(DeepCopied):
         violated = self._limits.violated(self._state.geometry)
         self._geometry_flags = flags.BEYOND_LIMIT if violated else 0
         self._filter.update(d, speed)
-
-    def _begin(self) -> None:
-        """Take the memory of generated code, whose next tick starts from another."""
-        if self.generated is not None:
-            self.generated.pull()
-            self.generated.ready = False
 
     @property
     def state(self) -> StateEstimate:
@@ -525,9 +520,7 @@ class RealTimeRobot(DeepCopied):
         to_twist[0], to_twist[1], to_twist[2], to_twist[3], to_twist[4], to_twist[5] = twist
         to_angle[0], to_angle[1], to_angle[2] = geometry.angle
         to_speed[0], to_speed[1], to_speed[2] = speed
-        self.age, self.elapsed = 0, 0.0
-        self.status = status = STATUSES[number]
-        return status
+        return self._renew(number)
 
     def _solve(
         self, geometry: LegGeometry, rate: Triple, acceleration: Triple, number: int
@@ -538,7 +531,9 @@ class RealTimeRobot(DeepCopied):
             number |= flags.NEAR_SINGULAR
             if not abs(determinant) >= _NO_FORCES:
                 return self._keep_forces(number & ~flags.BEYOND_LIMIT | flags.NOT_CONVERGED)
-        solved = self.dynamics.solve(robot_state(geometry, rate, acceleration, self._h))
+        in_range = all_below(rate, LARGEST_RATE)
+        state = robot_state(geometry, rate, acceleration, self._h) if in_range else None
+        solved = None if state is None else self.dynamics.solve(state)
         if solved is None:  # rates so large that forces overflow
             return self._keep_forces(flags.BAD_INPUT)
         forces = (solved[9], solved[10], solved[11])
@@ -549,14 +544,6 @@ class RealTimeRobot(DeepCopied):
         self.answers.reactions[:] = solved[:9]
         self.force_age, self._force_determinant = 0, determinant
         self.force_status = status = STATUSES[number]
-        return status
-
-    def _keep(self, number: int) -> Status:
-        """Keep the last good estimate, with a status."""
-        self.age += 1
-        if self.type_ii < self._near:
-            number |= flags.NEAR_SINGULAR
-        self.status = status = STATUSES[number]
         return status
 
     def _keep_forces(self, number: int) -> Status:

@@ -29,7 +29,7 @@ from rps_pin.control.loop import status as flags
 from rps_pin.control.loop.force_limits import recovered_pace
 from rps_pin.control.loop.force_limits import within_limits as forces_within
 from rps_pin.control.loop.limits import none_beyond, within_limits
-from rps_pin.control.loop.setpoints import Setpoint, all_below
+from rps_pin.control.loop.setpoints import LARGEST_RATE, Setpoint, all_below
 from rps_pin.control.loop.vectors import TRIPLES, Vectors, backward_difference, low_pass
 from rps_pin.numerics.elementary import Number, select_all
 from rps_pin.rps.generated.follow import FOLLOW, follow_kernels, kernel, symbols
@@ -296,6 +296,7 @@ def _forces(numbers: dict[str, Any], reading: dict[str, Any]) -> Tick:
         in_range(pose, g, h)
         * legs_have_length(platform, g)
         * (abs(determinant) >= numbers["near"])
+        * all_below(rate, LARGEST_RATE)
         * (abs(sum((*forces, *reactions))) < math.inf)
     )
     kept = within_limits(geometry, numbers["bounds"]) * none_beyond(forces, numbers["force_limit"])

@@ -17,6 +17,9 @@ from rps_pin.control.loop.rejoining import Rejoining
 from rps_pin.control.model import ControlModel
 from rps_pin.numerics.elementary import Number
 
+#: Rates whose squares are not finite, or nearly, have no forces: m/s and rad/s.
+LARGEST_RATE = 1e150
+
 
 class Setpoint(NamedTuple):
     """A desired motion at one time, checked."""
