@@ -12,6 +12,7 @@ from pydantic import Field
 from rps_pin.bounds import YAML
 from rps_pin.config import (
     Entry,
+    Faults,
     Finite,
     Positive,
     Text,
@@ -222,4 +223,35 @@ def test_errors_are_told_with_their_place(tmp_path: Path) -> None:
         with pytest.raises(kind, match=r"given.yaml, line 2: so"), file.at("b", 1):
             raise kind("so")
     with pytest.raises(ZeroDivisionError), file.at("b"):
+        raise ZeroDivisionError
+
+
+def test_all_that_is_wrong_is_told_at_once_each_value_once(tmp_path: Path) -> None:
+    text = "nam: a\nparts:\n- {}\n- kind: 3\n  sze: 1\nbest: {kind: b, size: -1}\nhome:\n  b: [0]\n"
+    with pytest.raises(InputError) as caught:
+        read_config(held(tmp_path, text), "test", Whole)
+    words = str(caught.value).split("; ")
+    told = [one for one in words if not one.startswith("the keys of")]
+    assert len(told) == 6, told
+    assert told[0].startswith(f"{tmp_path / 'given.yaml'}, line 5: unknown key 'sze'")
+    for line in (
+        "line 1: unknown key 'nam' (did you mean name?)",  # and not that it lacks a name
+        "line 3: parts[0] needs kind",
+        "line 4: parts[1].kind = 3: ",
+        "line 6: best.size = -1: ",
+        "line 8: home.b = [0]: ",
+    ):
+        assert sum(one.startswith(line) for one in told) == 1, (line, told)
+
+
+def test_errors_are_kept_to_be_told_at_once(tmp_path: Path) -> None:
+    file = read_yaml(held(tmp_path, "a: 1\nb: [1, 2]\n"), "file")
+    faults = Faults(file.origin)
+    faults.tell()
+    for place, kind in ((("b", 1), MechanismError), (("a",), InputError)):
+        with faults, file.at(*place):
+            raise kind("so")
+    with pytest.raises(MechanismError, match=r"given.yaml, line 2: so; line 1: so$"):
+        faults.tell()
+    with pytest.raises(ZeroDivisionError), faults:
         raise ZeroDivisionError

@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Annotated, Any, NoReturn, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
@@ -122,24 +123,51 @@ class YamlFile:
         try:
             return schema.model_validate(dict(self.values))
         except ValidationError as error:
-            problem = first_problem(error)
+            problems = self._apart(problems_of(error))
+        errors = [InputError(self._told(one, schema, what, root)) for one in problems]
+        raise together(errors, self.origin)
+
+    def _apart(self, problems: Sequence[Any]) -> list[Any]:
+        """Return one problem for each value, and for each unknown or missing key.
+
+        A key that is missing is not told where an unknown one is taken for it. (A value that may be
+        of several kinds has a problem with each.)
+        """
+        found: dict[tuple[Any, ...], Any] = {}
+        names = {one["loc"] for one in problems if one["type"] == "missing"}
+        for one in problems:
+            place, key = one["loc"][:-1], str(one["loc"][-1]) if one["loc"] else ""
+            if one["type"] == "extra_forbidden":
+                of_place = [name[-1] for name in names if name[:-1] == place]
+                names -= {(*place, near) for near in get_close_matches(key, of_place, n=1)}
+        for one in problems:
+            if one["type"] != "missing":
+                found.setdefault(one["loc"][: self._found(one["loc"])[0]], one)
+            elif one["loc"] in names:
+                found[one["loc"]] = one
+        return list(found.values())
+
+    def _told(
+        self, problem: Any, schema: type[BaseModel], what: str, root: Sequence[str | int]
+    ) -> str:
+        """Return a problem in words, with its line."""
         depth, _ = self._found(problem["loc"])
         path, value = problem["loc"][:depth], problem["input"]
         key = problem["loc"][-1] if problem["loc"] else ""
         if problem["type"] == "missing":
             where = self.place(path or root)
-            raise InputError(f"{where}: {path_text(path) or what} needs {key}")
+            return f"{where}: {path_text(path) or what} needs {key}"
         where = self.place(path)
         if problem["type"] == "extra_forbidden":
             keys = list(_schema_at(schema, path[:-1]).model_fields)
-            raise InputError(
+            return (
                 f"{where}: unknown key {key!r}{did_you_mean(str(key), keys)}; the keys of "
                 f"{path_text(path[:-1]) or what} are: {', '.join(keys)}"
             )
         said = "" if isinstance(value, dict) else f" = {shown(value)}"
         rule = problem["msg"].removeprefix("Value error, ")
         rule = rule[0].lower() + rule[1:]
-        raise InputError(f"{where}: {path_text(path) or what}{said}: {rule}")
+        return f"{where}: {path_text(path) or what}{said}: {rule}"
 
     def _found(self, path: Sequence[str | int]) -> tuple[int, int]:
         """Return how many parts of a path the file holds, and the line (from 0) of the last."""
@@ -175,9 +203,42 @@ def read_config(
     return file, file.validated(schema, f"a {what}")
 
 
-def first_problem(error: ValidationError) -> Any:
-    """Return the problem to tell first: an unknown key, which may be a misspelt missing one."""
-    return min(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
+def problems_of(error: ValidationError) -> list[Any]:
+    """Return all problems, unknown keys first, which may be misspelt missing ones."""
+    problems = error.errors(include_url=False)
+    return sorted(problems, key=lambda one: one["type"] != "extra_forbidden")
+
+
+def together(errors: Sequence[InputError], origin: str) -> InputError:
+    """Return all errors of a file as one: the first, and the others without the file's name."""
+    first, *others = errors
+    if not others:
+        return first
+    words = [str(error).removeprefix(f"{origin}, ").removeprefix(f"{origin}: ") for error in others]
+    kind = MechanismError if isinstance(first, MechanismError) else InputError
+    return kind("; ".join([str(first), *words]))
+
+
+class Faults:
+    """A block that keeps an `InputError`, so that all of a file are told at once by `tell`."""
+
+    def __init__(self, origin: str) -> None:
+        self._origin = origin
+        self._errors: list[InputError] = []
+
+    def __enter__(self) -> Faults:
+        return self
+
+    def __exit__(self, kind: object, error: object, trace: object) -> bool:
+        if not isinstance(error, InputError):
+            return False
+        self._errors.append(error)
+        return True
+
+    def tell(self) -> None:
+        """Raise the errors that were kept, as one, if there are any."""
+        if self._errors:
+            raise together(self._errors, self._origin)
 
 
 def _schema_at(schema: type[BaseModel], path: Sequence[str | int]) -> type[BaseModel]:

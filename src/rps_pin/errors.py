@@ -78,15 +78,39 @@ class ParameterError(InputError):
         What the field has to satisfy.
     place : str
         The file and line, if it comes from a file.
+    others : tuple of ParameterError
+        Further parameters that are not possible.
     """
 
-    def __init__(self, field: str, value: object, rule: str, place: str = "") -> None:
+    def __init__(
+        self,
+        field: str,
+        value: object,
+        rule: str,
+        place: str = "",
+        others: Sequence[ParameterError] = (),
+    ) -> None:
         self.field = field
         self.value = value
         self.rule = rule
         self.place = place
+        self.others = tuple(others)
         where = f"{place}: " if place else ""
-        super().__init__(f"{where}{field} = {shown(value)}: {rule}")
+        super().__init__("; ".join([f"{where}{field} = {shown(value)}: {rule}", *_told(others)]))
+
+
+def _told(errors: Sequence[ParameterError]) -> list[str]:
+    """Return the errors after the first in words: with the line alone, and one for all missing."""
+    missing = [error.field for error in errors if error.value is None]
+    words = [
+        f"{error.place.rpartition(', ')[2]}{': ' if error.place else ''}"
+        f"{error.field} = {shown(error.value)}: {error.rule}"
+        for error in errors
+        if error.value is not None
+    ]
+    if missing:
+        words.append(f"{', '.join(missing)}: required, and not given")
+    return words
 
 
 class MechanismError(InputError):

@@ -123,6 +123,21 @@ def robot_of_parameters(
     return RPSRobot(robot.parameters.without_limits()) if ignore_limits else robot
 
 
+def require_masses(mechanism: ClosedLoopModel) -> None:
+    """Refuse forces of a mechanism without any mass.
+
+    Raises
+    ------
+    InputError
+        If no link has one.
+    """
+    if not any(inertia.mass for inertia in mechanism.model.inertias):
+        raise InputError(
+            f"no link of {mechanism.name or 'the mechanism'} has a mass: forces need the "
+            "<inertial> elements of its file"
+        )
+
+
 def shapes_of(
     file: Path, mechanism: ClosedLoopModel, package_path: Sequence[Path] | None = None
 ) -> tuple[pin.GeometryModel | None, list[str]]:

@@ -13,7 +13,7 @@ from rps_pin.arrays import Array
 from rps_pin.cli import console as common
 from rps_pin.cli.degrees import table_in_degrees
 from rps_pin.cli.layer_options import write_page
-from rps_pin.cli.mechanism_options import load_mechanism, shapes_of
+from rps_pin.cli.mechanism_options import load_mechanism, require_masses, shapes_of
 from rps_pin.cli.motion_options import fastest_of_task
 from rps_pin.cli.outputs import check_outputs, figures_in
 from rps_pin.cli.task_options import unit_of
@@ -51,6 +51,7 @@ def dynamics_of_task(
     """Compute, write and print the motion; see `rps_pin.cli.dynamics`."""
     model, file = load_mechanism(mechanism, ignore_limits, accuracy)
     task: Task = model.task
+    require_masses(model)
     path = load_task_trajectory(trajectory, task, **loads)
     folder = output or Path(f"{trajectory.stem}-dynamics")
     files = [folder / name for name in ("dynamics.csv", "sizing.json", "viewer.html")]

@@ -6,6 +6,8 @@ import io
 import math
 import os
 import re
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -18,7 +20,7 @@ from ruamel.yaml.comments import CommentedMap
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED
-from rps_pin.config import Finite, NonNegative, Positive, first_problem, read_yaml
+from rps_pin.config import Finite, NonNegative, Positive, problems_of, read_yaml
 from rps_pin.errors import InputError, ParameterError, did_you_mean
 from rps_pin.files import write_text
 from rps_pin.other_kinds import refuses_other_kinds
@@ -57,6 +59,14 @@ def robot_name(name: str) -> str:
     return name
 
 
+def _read_only_zeros(*shape: int) -> Array:
+    return read_only(np.zeros(shape))
+
+
+#: What forces need: all of these, or none, for kinematics alone; the others that call for them.
+BODIES = ("platform_mass", "platform_inertia", "leg_mass", "leg_com", "leg_inertia")
+_WITH_BODIES = (*BODIES, "leg_inertia_about", "rod_mass", "rod_inertia")
+_LEFT_OUT = Field(validate_default=False)
 _ToList = pydantic.PlainSerializer(lambda array: array.tolist(), return_type=list)
 Vector3 = Annotated[np.ndarray, _array(3), _ToList]
 Matrix3 = Annotated[np.ndarray, _array(3, 3), _ToList]
@@ -79,6 +89,9 @@ class RPSParameters(pydantic.BaseModel):
     Immutable; compare with ``==``, make a changed copy with :meth:`replace`. There is a field for
     each symbol of the paper, and for the rods, limits, direction of gravity and friction, which the
     paper does not have and which default to "none".
+
+    Masses and inertias, the fields of `BODIES`, are needed for forces: leave all of them out for
+    kinematics, singularities and workspaces alone (`has_bodies` is False then).
 
     Friction resists a joint's speed v with d v + f tanh(v / v_s): viscous, and dry friction made
     smooth near zero speed (v_s is ``friction_speed``): a joint creeps instead of sticking.
@@ -111,16 +124,16 @@ class RPSParameters(pydantic.BaseModel):
     """g: revolute joints' distance from base centre, m"""
     platform_radius: Positive
     """h: spherical joints' distance from the platform centre, m"""
-    platform_mass: Positive
+    platform_mass: Annotated[Positive, _LEFT_OUT] = 0.0
     """m: mass of the platform, kg"""
-    platform_inertia: Matrix3
+    platform_inertia: Annotated[Matrix3, _LEFT_OUT] = _read_only_zeros(3, 3)
     """I: of the platform about its centre, in its own axes, kg m^2"""
 
-    leg_mass: NonNegative
+    leg_mass: Annotated[NonNegative, _LEFT_OUT] = 0.0
     """m_leg: mass of a leg's cylinder (the part that only turns), kg"""
-    leg_com: NonNegative
+    leg_com: Annotated[NonNegative, _LEFT_OUT] = 0.0
     """r: cylinder's centre of mass from its revolute joint, along the leg, m"""
-    leg_inertia: NonNegative
+    leg_inertia: Annotated[NonNegative, _LEFT_OUT] = 0.0
     """I_leg: cylinder's moment of inertia, in the plane the leg moves in, kg m^2"""
     leg_inertia_about: Literal["joint", "com"] = "joint"
     """point leg_inertia is about: the revolute 'joint' or the 'com'"""
@@ -160,10 +173,15 @@ class RPSParameters(pydantic.BaseModel):
     """speed at which dry friction reaches 76 % of its value, m/s and rad/s"""
 
     def __init__(self, /, **values: Any) -> None:
+        faults: list[ParameterError] = []
         try:
             super().__init__(**values)
         except pydantic.ValidationError as error:
-            raise _parameter_error(error) from None
+            faults = _parameter_errors(error)
+        missing = set(BODIES) - set(values) if set(_WITH_BODIES) & set(values) else set()
+        faults += [ParameterError(name, None, _REQUIRED) for name in BODIES if name in missing]
+        if faults:
+            raise _together(faults, values)
 
     @pydantic.field_validator("*", mode="before")
     @classmethod
@@ -221,6 +239,28 @@ class RPSParameters(pydantic.BaseModel):
         return self
 
     @property
+    def has_bodies(self) -> bool:
+        """Whether masses and inertias are given, so that there are forces."""
+        return self.platform_mass > 0.0
+
+    def require_bodies(self) -> None:
+        """Refuse to go on without masses and inertias.
+
+        Raises
+        ------
+        ParameterError
+            If they were left out.
+        """
+        if not self.has_bodies:
+            words = "forces need it, and it was left out"
+            raise _together([ParameterError(name, None, words) for name in BODIES], {})
+
+    def _given(self) -> dict[str, Any]:
+        """Return the fields without bodies that were left out."""
+        left_out = () if self.has_bodies else _WITH_BODIES
+        return {name: value for name, value in self if name not in left_out}
+
+    @property
     def leg_inertia_about_com(self) -> float:
         """Moment of inertia of a leg's cylinder about its own centre of mass, kg m^2."""
         if self.leg_inertia_about == "com":
@@ -229,7 +269,7 @@ class RPSParameters(pydantic.BaseModel):
 
     def replace(self, **changes: Any) -> RPSParameters:
         """Return a copy with some fields changed, validated anew."""
-        return RPSParameters(**(dict(self) | changes))
+        return RPSParameters(**(self._given() | changes))
 
     def without_limits(self) -> RPSParameters:
         """Return a copy without limits of lengths, angles and spherical joints."""
@@ -251,7 +291,7 @@ class RPSParameters(pydantic.BaseModel):
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(RPSParameters, **dict(self)), ()  # the constructor makes arrays read-only
+        return partial(RPSParameters, **self._given()), ()  # the constructor makes arrays read-only
 
     def __setattr__(self, name: str, value: object) -> None:
         raise ParameterError(name, value, "parameters are frozen; replace() makes a changed copy")
@@ -293,8 +333,18 @@ class RPSParameters(pydantic.BaseModel):
         try:
             return cls(**file.values)
         except ParameterError as error:
-            place = file.place([error.field] if error.field in file.values else [])
-            raise ParameterError(error.field, error.value, error.rule, place) from None
+            first, *others = [
+                ParameterError(
+                    one.field,
+                    one.value,
+                    one.rule,
+                    file.place([one.field] if one.field in file.values else []),
+                )
+                for one in (error, *error.others)
+            ]
+            raise ParameterError(
+                first.field, first.value, first.rule, first.place, others
+            ) from None
 
     @refuses_other_kinds
     def to_yaml(self, path: str | os.PathLike[str]) -> None:
@@ -303,9 +353,9 @@ class RPSParameters(pydantic.BaseModel):
 
     def yaml_text(self) -> str:
         """Return what `to_yaml` writes."""
-        document = CommentedMap(self.model_dump())
-        for field, info in type(self).model_fields.items():
-            meaning = " ".join(str(info.description).split())
+        document = CommentedMap(self.model_dump(include=set(self._given())))
+        for field in document:
+            meaning = " ".join(str(type(self).model_fields[field].description).split())
             document.yaml_set_comment_before_after_key(field, before=meaning)
         yaml = YAML()
         yaml.width = 200
@@ -315,21 +365,41 @@ class RPSParameters(pydantic.BaseModel):
         return text.getvalue()
 
 
-def _parameter_error(error: pydantic.ValidationError) -> ParameterError:
-    """Return pydantic's first problem as a `ParameterError`."""
-    first = first_problem(error)
-    cause = first.get("ctx", {}).get("error")
+_REQUIRED = "is required and was not given"
+
+
+def _parameter_errors(error: pydantic.ValidationError) -> list[ParameterError]:
+    """Return pydantic's problems, one of each field."""
+    found: dict[str, ParameterError] = {}
+    for problem in problems_of(error):
+        one = _parameter_error(problem)
+        found.setdefault(one.field, one)
+    return list(found.values())
+
+
+def _parameter_error(problem: Any) -> ParameterError:
+    """Return one of pydantic's problems as a `ParameterError`."""
+    cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, ParameterError):
         return cause
-    field, *inner = [str(part) for part in first["loc"]] or ["parameters"]
-    kind, value = first["type"], first["input"]
+    field, *inner = [str(part) for part in problem["loc"]] or ["parameters"]
+    kind, value = problem["type"], problem["input"]
     if kind == "extra_forbidden":
         fields = list(RPSParameters.model_fields)
         rule = f"unknown field{did_you_mean(field, fields)}; the fields are {', '.join(fields)}"
     elif kind == "missing" and not inner:
-        return ParameterError(field, None, "is required and was not given")
+        return ParameterError(field, None, _REQUIRED)
     elif inner:
         rule = "must be two numbers, (lower, upper)"
     else:
-        rule = first["msg"].removeprefix("Value error, ")
+        rule = problem["msg"].removeprefix("Value error, ")
     return ParameterError(field, value, rule)
+
+
+def _together(faults: Sequence[ParameterError], values: Mapping[str, Any]) -> ParameterError:
+    """Return all faults as one; a missing field that a misspelt one stands for is not told."""
+    fields = list(RPSParameters.model_fields)
+    unknown = set(values) - set(fields)
+    meant = {near for name in unknown for near in get_close_matches(name, fields, n=1)}
+    first, *others = [one for one in faults if one.value is not None or one.field not in meant]
+    return ParameterError(first.field, first.value, first.rule, others=others)

@@ -67,8 +67,6 @@ class RPSRobot:
         The tree with its three spherical closures ``leg_1``, ``leg_2``, ``leg_3``; nv = 12, nine
         rows, mobility 3, the prismatic joints actuated. Its characteristic length is h, and in its
         home the platform is level. Friction and payload are in it.
-    force_terms : ForceTerms
-        What the closed form of the actuator forces is made of.
 
     Raises
     ------
@@ -85,7 +83,6 @@ class RPSRobot:
         self.parameters = parameters
         self.payload = payload
         self.urdf = build_urdf(parameters)
-        self.force_terms = ForceTerms.of(parameters, payload)
         model = model_from_urdf(self.urdf)
         model.gravity.linear = np.array(parameters.gravity)
         if payload is not None:
@@ -110,7 +107,7 @@ class RPSRobot:
         )
         self._calls: RobotCalls | None = None
         self._threads = 1
-        self._dynamics: Any = self.mechanism
+        self._dynamics: Any = self.mechanism if parameters.has_bodies else _NoForces(parameters)
 
     def _level(self, model: pin.Model) -> Array:
         """Return the configuration of the platform level, in the middle of the legs' limits."""
@@ -190,6 +187,7 @@ class RPSRobot:
             If there is no compiler, or it fails, or the code does not agree with Python's functions
             to 1e-10.
         """
+        self.parameters.require_bodies()
         self._threads = whole_number(threads, "threads")
         engine.built(compiler)
         self._calls = None
@@ -201,7 +199,7 @@ class RPSRobot:
     def _generated(self) -> RobotCalls | None:
         """Return this robot's generated functions, if there are any."""
         code = engine.current()
-        if code is None:
+        if code is None or not self.parameters.has_bodies:
             return None
         if self._calls is None or self._calls.code is not code:
             limit = self.mechanism.max_condition
@@ -409,6 +407,12 @@ class RPSRobot:
         """Its pose as a `rps_pin.task.Task`, coordinates z, rx and ry, with closed forms."""
         return RPSTask(self)
 
+    @cached_property
+    def force_terms(self) -> ForceTerms:
+        """What the closed form of the actuator forces is made of."""
+        self.parameters.require_bodies()
+        return ForceTerms.of(self.parameters, self.payload)
+
     # Dynamics -------------------------------------------------------------------------------------
 
     def inverse_dynamics(
@@ -445,6 +449,7 @@ class RPSRobot:
         if wrench is None:
             found: InverseDynamics = self._dynamics.inverse_dynamics(q, v, a)
             return found
+        self.parameters.require_bodies()
         return self.mechanism.inverse_dynamics(q, v, a, wrenches={"platform": wrench})
 
     def actuator_forces(
@@ -498,6 +503,18 @@ class RPSRobot:
     def visual_model(self) -> pin.GeometryModel:
         """Return the shapes of the robot's links, for `rps_pin.viewer`."""
         return pin.buildGeomFromUrdfString(self.mechanism.model, self.urdf, pin.GeometryType.VISUAL)
+
+
+class _NoForces:
+    """The dynamics of a robot without bodies: refused."""
+
+    def __init__(self, parameters: RPSParameters) -> None:
+        self._parameters = parameters
+
+    def inverse_dynamics(self, *state: Array) -> InverseDynamics:
+        """Refuse: see `RPSParameters.require_bodies`."""
+        self._parameters.require_bodies()
+        raise AssertionError
 
 
 def _is_pose(q: object) -> bool:

@@ -14,6 +14,8 @@ from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from tests.closed_loop.mechanisms import FOUR_BAR, joint, link, robot
 from tests.each import each
 
+URDF = Path(__file__).parents[3] / "urdf"
+
 FOUR_BAR_FILE = """\
 name: bars
 urdf: four_bar.urdf
@@ -405,3 +407,32 @@ def test_many_nested_values_do_not_fill_a_message(tmp_path: Path) -> None:
 def test_files_that_are_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"cannot read the mechanism file .*none\.yaml"):
         parts_from_yaml(tmp_path / "none.yaml")
+
+
+def test_all_names_that_there_are_not_are_told_at_once(tmp_path: Path) -> None:
+    source = (URDF / "four_bar.yaml").read_text()
+    for before, after in (
+        ("frame_b: rocker_tip", "frame_b: rocker_top"),
+        ("actuated: [crank_joint]", "actuated: [crank, rocker]"),
+        ("home: {crank_joint", "home: {cronk_joint"),
+        ("urdf: ", f"urdf: {URDF}/"),
+        ("task: {joints: [rocker_joint]}", "task: {frame: nowhere, coordinates: [x]}"),
+    ):
+        assert before in source
+        source = source.replace(before, after)
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"{source}damping: {{knee: 1.0}}\n")
+    with pytest.raises(MechanismError) as told:
+        parts_from_yaml(file)
+    words = str(told.value).split("; line ")
+    assert words[0].startswith(f"{file}, line ")
+    for fault in (
+        "damping: no joint 'knee'",
+        "actuated: no joint 'crank'",
+        "actuated: no joint 'rocker'",
+        "closures: no frame 'rocker_top'",
+        "home: no joint 'cronk_joint'",
+        "task: no frame 'nowhere'",
+    ):
+        assert sum(fault in one for one in words) == 1, fault
+    assert len(words) == 6

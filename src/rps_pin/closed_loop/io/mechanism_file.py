@@ -52,7 +52,7 @@ from rps_pin.closed_loop.io.mechanism_schema import (
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import EFFECTS, MechanismParts, without_position_limits
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
-from rps_pin.config import YamlFile, read_yaml
+from rps_pin.config import Faults, YamlFile, read_yaml
 from rps_pin.errors import InputError, MechanismError, shown
 from rps_pin.files import is_folder
 
@@ -99,12 +99,10 @@ def parts_from_yaml(
         with file.at("merge", i):
             merges.append(JointMerge(**entry.model_dump()))
     parts = _merged(file, description, tree, merges) if merges else tree
-    parts = _with_effects(file, description, parts)
     actuated = parts.actuated if description.actuated is None else tuple(description.actuated)
-    for index, name in enumerate(actuated):
-        if named_velocities(parts.model, name) is None:
-            _check_joint(file, ("actuated", index), name, parts.model)
-    given = _closures(file, description, parts.model)
+    _check_names(file, description, tree, parts.model, actuated)
+    parts = _with_effects(file, description, parts)
+    given = _closures(file, description, parts.model, Faults(file.origin))
     own = [one for one in parts.closures if one not in given]
     home = _home(file, description, tree, parts, merges)
     added, home = _standing(file, parts.model, own, given, home)
@@ -121,6 +119,33 @@ def parts_from_yaml(
         task=_task(file, description, parts.model),
         collision=_collision(file, description, parts),
     )
+
+
+def _check_names(
+    file: YamlFile,
+    description: Description,
+    tree: MechanismParts,
+    model: pin.Model,
+    actuated: Sequence[str],
+) -> None:
+    """Refuse all names that there are not, and closures and tasks that are none, at once."""
+    faults = Faults(file.origin)
+    for effect in (*EFFECTS, "armature"):
+        for name in getattr(description, effect):
+            with faults:
+                _check_joint(file, (effect, name), name, model)
+    for index, name in enumerate(actuated):
+        with faults:
+            if named_velocities(model, name) is None:
+                _check_joint(file, ("actuated", index), name, model)
+    _closures(file, description, model, faults)
+    for name in description.home:
+        with faults:
+            if name not in list(tree.model.names)[1:]:
+                _check_joint(file, ("home", name), name, model)
+    with faults:
+        _task(file, description, model)
+    faults.tell()
 
 
 # The tree -----------------------------------------------------------------------------------------
@@ -213,9 +238,6 @@ def _with_effects(
     file: YamlFile, description: Description, parts: MechanismParts
 ) -> MechanismParts:
     """Replace effects of the tree's file by the description's, on a copy of its model."""
-    for effect in (*EFFECTS, "armature"):
-        for name in getattr(description, effect):
-            _check_joint(file, (effect, name), name, parts.model)
     model = pin.Model(parts.model)
     if description.gravity is not None:
         model.gravity.linear = np.array(description.gravity)
@@ -241,9 +263,6 @@ def _home(
     if tree.home is None and not description.home:
         return None
     before = pin.neutral(tree.model) if tree.home is None else tree.home.copy()
-    for name in description.home:
-        if name not in list(tree.model.names)[1:]:
-            _check_joint(file, ("home", name), name, parts.model)
     _set_joints(file, description.home, tree, before)
     q = merged_configuration(tree.model, merges, before) if merges else before
     new = {k: v for k, v in description.home.items() if not tree.model.existJointName(k)}
@@ -347,18 +366,19 @@ class _AtHome(NamedTuple):
 
 
 def _closures(
-    file: YamlFile, description: Description, model: pin.Model
+    file: YamlFile, description: Description, model: pin.Model, faults: Faults
 ) -> list[Closure | _AtHome]:
+    """Return the closures and couplings that are possible; tell the others."""
     found: list[Closure | _AtHome] = []
     for i, entry in enumerate(description.closures):
         for end in ("frame_a", "frame_b"):
-            with file.at("closures", i, end):
+            with faults, file.at("closures", i, end):
                 frame_id(model, getattr(entry, end), "closures")
         fields = _fields(entry)
-        with file.at("closures", i):
+        with faults, file.at("closures", i):
             found.append(_AtHome(i, fields) if entry.at_home else LoopClosure(**fields))
     for i, coupled in enumerate(description.couplings):
-        with file.at("couplings", i):
+        with faults, file.at("couplings", i):
             found.append(_coupling(coupled, model))
     return found
 

@@ -15,14 +15,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
 from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.config import YamlFile, read_yaml
+from rps_pin.config import Faults, YamlFile, read_yaml
 from rps_pin.control.drive_control import DriveControl
 from rps_pin.control.estimator.effective_inertia import effective_inertia
 from rps_pin.control.loop.computed_torque import ComputedTorque
@@ -47,6 +47,7 @@ from rps_pin.errors import CompileError, InputError
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.loads import Payload
 from rps_pin.rps.motion.trajectory_file import described_trajectory, load_trajectory
+from rps_pin.rps.motion.trajectory_schema import validated
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.robot_file import load_robot
 from rps_pin.task import Task
@@ -206,9 +207,16 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
     folder = Path(path).parent
     if "mechanism" in file.values:
         return _of_mechanism(file, folder)
-    entry = file.validated(ScenarioEntry, "a scenario")
+    faults = Faults(file.origin)
+    with faults:
+        entry = file.validated(ScenarioEntry, "a scenario")
+    if isinstance(file.values.get("trajectory"), Mapping):
+        with faults:
+            validated(file.part("trajectory"))
+    faults.tell()
     with file.at("robot"):
         nominal = load_robot(entry.robot, folder)
+        nominal.parameters.require_bodies()
     _check_drives(file, entry)
     model = _changed(file, nominal, entry.controller.model, ("controller", "model"))
     machine = _changed(file, nominal, entry.plant, ("plant",))

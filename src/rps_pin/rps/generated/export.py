@@ -101,6 +101,7 @@ def robot_package(
     InputError
         If a name does not fit.
     """
+    robot.parameters.require_bodies()
     own = [one for one in dict.fromkeys(functions or SENTENCES) if one in SENTENCES]
     others = [one for one in functions if one not in SENTENCES]
     #: What is asked of the mechanism, which has all by default, only to have its vectors.
