@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import shutil
+from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
-from rps_pin import ClosedLoopModel
+from rps_pin import ClosedLoopModel, RPSRobot
 from rps_pin.task import Payload, load_task_trajectory, size_trajectory
 from tests.cli.commands import rps_pin
 from tests.worst import worst
+
+URDF = Path(__file__).parents[2] / "urdf"
 
 
 def answer(*words: str) -> dict:
@@ -61,6 +67,8 @@ def test_tables_name_units_and_limits() -> None:
         (("fk", "-m", "delta", "--at", "elbow=1"), 1, "no 'elbow'; there are: arm_1_joint"),
         (("fk", "-m", "delta", "--at", "arm_1_joint=2"), 1, "'arm_1_joint' at 2 (-1.2 to 1.5)"),
         (("ik", "-m", "gripper"), 1, "gripper has no task"),
+        (("ik", "-m", "delta", "-r", "micro"), 2, "it does not go with a mechanism"),
+        (("fk", "-m", "delta", "-r", "micro"), 2, "it does not go with a mechanism"),
         (("ik", "-m", "nothing"), 1, "is not a file or a mechanism of the package"),
         (("ik",), 2, "give a pose, or a --mechanism"),
         (("fk",), 2, "give leg lengths, or a --mechanism"),
@@ -148,3 +156,84 @@ def test_forces_of_a_path_are_written_and_can_be_read_as_a_path(tmp_path) -> Non
     peaks = [one.force_peak for one in sized.actuators]
     for leg, peak in enumerate(peaks, start=1):
         assert worst(table[f"arm_{leg}_joint_force_Nm"]) == pytest.approx(peak, rel=1e-12)
+
+
+def test_forces_of_one_pose_are_those_of_inverse_dynamics() -> None:
+    found = answer("ik", "-m", "stewart", "--at", "z=0.65", "--at", "rx=0.1", "--forces")
+    mechanism = ClosedLoopModel.load(URDF / "stewart.yaml")
+    legs = np.array(list(found["forces"].values()))
+    # Virtual work: the legs' forces do the work against all weights.
+    task, q = mechanism.task, np.array(found["configuration"])
+    slope, data = np.empty(6), mechanism.model.createData()
+    for i in range(6):
+        heights = []
+        for step in (-1e-5, 1e-5):
+            x = task.at(q) + step * np.eye(6)[i]
+            moved = task.configuration(x, q)
+            heights.append(pin.computePotentialEnergy(mechanism.model, data, moved))
+        slope[i] = (heights[1] - heights[0]) / 2e-5
+    np.testing.assert_allclose(task.jacobian(q).T @ legs, slope, rtol=1e-6, atol=1e-6)
+    told = rps_pin("ik", "-m", "stewart", "--forces").stdout
+    assert "force" in told and "singular (" not in told
+    told = rps_pin("ik", "-m", "delta", "--forces").stdout
+    assert "N m" in told
+
+
+def test_a_mechanism_without_masses_has_no_forces(tmp_path: Path) -> None:
+    text = (URDF / "five_bar.urdf").read_text()
+    bare = re.sub(r"<inertial>.*?</inertial>", "", text, flags=re.DOTALL)
+    (tmp_path / "five_bar.urdf").write_text(bare)
+    shutil.copy(URDF / "five_bar.yaml", tmp_path / "bare.yaml")
+    assert rps_pin("ik", "-m", "bare.yaml", folder=tmp_path).returncode == 0
+    (tmp_path / "path.yaml").write_text("kind: point_to_point\nend: {x: 0.25}\nduration: 0.5\n")
+    bare_one = ("-m", "bare.yaml")
+    for words in (("ik", *bare_one, "--forces"), ("dynamics", "path.yaml", *bare_one)):
+        ended = rps_pin(*words, folder=tmp_path)
+        assert ended.returncode == 1
+        assert "no link of five-bar has a mass: forces need the <inertial>" in ended.stderr
+
+
+def test_a_singular_pose_is_told() -> None:
+    # A Stewart platform that is turned by 90 degrees (Fichter).
+    told = rps_pin("ik", "-m", "stewart", "--at", "rz=90", "--at", "z=0.62", "--degrees")
+    assert "singular (type_ii" in told.stdout, told
+
+
+def test_forces_singularity_and_degrees_of_a_3rps() -> None:
+    pose = ("ik", "-r", "micro", "--pose", "0.22")
+    robot = RPSRobot.from_preset("micro")
+    x, still = np.array([0.22, math.radians(5), math.radians(-3)]), np.zeros(3)
+    found = answer(*pose, "5", "-3", "--degrees", "--forces")
+    forces = robot.inverse_dynamics(*robot.state(x, still, still)).tau
+    np.testing.assert_allclose(found["force"], forces, rtol=1e-12)
+    np.testing.assert_allclose(found["pose"], [0.22, 5, -3], rtol=1e-14)
+    radians = answer(*pose, *map(str, x[1:].tolist()))
+    assert "force" not in radians and radians["units"]["angle"] == "rad"
+    np.testing.assert_allclose(np.radians(found["angle"]), radians["angle"], rtol=1e-14)
+    assert "singular (" not in rps_pin(*pose, "0", "0").stdout
+    flat = rps_pin("ik", "--pose", "0", "0", "0")
+    assert "singular (type_ii 0; " in flat.stdout
+    refused = rps_pin("ik", "--pose", "0", "0", "0", "--forces")
+    assert refused.returncode == 1 and "is singular" in refused.stderr
+
+
+@pytest.mark.parametrize("lengths", [(0.22, 0.23, 0.22), (0.24, 0.205, 0.21)])
+def test_fk_marks_the_modes_within_limits(lengths: tuple[float, ...]) -> None:
+    words = ("fk", "-r", "micro", "--lengths", *map(str, lengths))
+    modes = answer(*words)["modes"]
+    robot = RPSRobot.from_preset("micro")
+    for mode in modes:
+        if mode["pose"] is not None:
+            reached = robot.inverse_kinematics(mode["pose"], errors="mask").reachable
+            assert mode["within_limits"] == reached
+    marked = sum(mode["within_limits"] for mode in modes)
+    assert 0 < marked < len(modes)
+    assert f"{marked} within the robot's limits" in rps_pin(*words).stdout.replace("\n", " ")
+    in_degrees = answer(*words, "--degrees")
+    assert in_degrees["units"]["angle"] == "deg"
+    for mode, other in zip(modes, in_degrees["modes"], strict=True):
+        np.testing.assert_allclose(np.degrees(mode["angle"]), other["angle"], atol=1e-9)
+    near = ("--near", "0.22", "0", "0", "--degrees")
+    pose = answer(*words, *near)["pose"]
+    radians = [pose[0], *np.radians(pose[1:])]
+    np.testing.assert_allclose(robot.inverse_kinematics(radians).length, lengths, rtol=1e-9)

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rps_pin import InputError, ParameterError, RPSParameters
-from rps_pin.rps.parameters import INERTIA_ROUNDING
+from rps_pin.rps.parameters import BODIES, INERTIA_ROUNDING
 from tests import strategies
 from tests.each import each
 
@@ -80,7 +80,7 @@ def test_these_tests_know_every_field() -> None:
     words = {"name", "leg_inertia_about"}
     assert {*FLOATS, *ARRAYS, *PAIRS, *words} == LEGAL.keys()
     required = {name for name, info in RPSParameters.model_fields.items() if info.is_required()}
-    assert required == set(REQUIRED)
+    assert required | {*BODIES} == set(REQUIRED)  # those of bodies all together, or none
     changed = RPSParameters(**{name: LEGAL[name] for name in REQUIRED})
     for field in LEGAL.keys() - set(REQUIRED):
         assert repr(getattr(changed, field)) != repr(getattr(legal(), field)), field

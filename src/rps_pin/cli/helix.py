@@ -53,7 +53,9 @@ def helix_command(
     console = common.text_console(as_json)
     check_outputs(motion_files(output, "helix"), overwrite, renewed=True)
     common.tell_size("helix.csv", path.duration * rate, COLUMNS)
-    run = run_motion(machine, path, rate, progress=common.progress_bar(console, "inverse dynamics"))
+    with helix.telling_largest(machine, path):
+        progress = common.progress_bar(console, "inverse dynamics")
+        run = run_motion(machine, path, rate, progress=progress)
     summary = summarise(run, machine)
     output.mkdir(parents=True, exist_ok=True)
     name = machine.parameters.name

@@ -16,9 +16,10 @@ from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.errors import InputError
 from rps_pin.rps.robot_file import kind_of_file
+from rps_pin.task.paths.findings import GRAZE
 
 if TYPE_CHECKING:
-    from rps_pin.task import Task
+    from rps_pin.task import SingularityMeasures, Task
 
 #: Values below this are printed as zero.
 _ZERO = 1e-12
@@ -36,7 +37,7 @@ MechanismOption = Annotated[
 ]
 DegreesOption = Annotated[
     bool,
-    typer.Option("--degrees", help="Angles of a mechanism are given and printed in degrees."),
+    typer.Option("--degrees", help="Angles are given and printed in degrees."),
 ]
 
 
@@ -109,16 +110,22 @@ def table(
     angular: Sequence[bool],
     degrees: bool,
     limits: tuple[Array, Array] | None = None,
+    forces: Array | None = None,
 ) -> Any:
-    """Return a table of values by name."""
+    """Return a table of values by name, of actuators with their limits and forces."""
     rows = []
     for i, (name, value, turns) in enumerate(zip(names, values, angular, strict=True)):
         cells = [name, f"{in_unit(value, turns, degrees):.6g}"]
         if limits is not None:
             ends = (in_unit(end[i], turns, degrees) for end in limits)
             cells.append(" to ".join(f"{end:.4g}" for end in ends))
-        rows.append((*cells, unit_of(turns, degrees)))
+        cells.append(unit_of(turns, degrees))
+        if forces is not None:
+            cells += [f"{forces[i]:.6g}", "N m" if turns else "N"]
+        rows.append(tuple(cells))
     headers = ("", "value", *(("limits",) if limits is not None else ()), "unit")
+    if forces is not None:
+        headers = (*headers, "force", "unit")
     return common.table_of(rows, *headers, right=slice(1, 2))
 
 
@@ -132,8 +139,33 @@ def limits_of(task: Task) -> tuple[Array, Array]:
 
 def measures(task: Task, q: Array) -> dict[str, float | None]:
     """Return the singularity measures of a configuration; None where one does not exist."""
-    found = task.singularities(q)._asdict()
-    return {name: float(value) if np.isfinite(value) else None for name, value in found.items()}
+    return plain_measures(task.singularities(q))
+
+
+def plain_measures(found: SingularityMeasures) -> dict[str, float | None]:
+    """Return singularity measures by name; None where one does not exist."""
+    measured = found._asdict().items()
+    return {name: float(value) if np.isfinite(value) else None for name, value in measured}
+
+
+#: What is so at a singularity of a kind.
+_SINGULAR = {
+    "type_i": "the platform does not move in some direction, however the actuators move",
+    "type_ii": "the actuators do not hold the platform",
+    "constraint": "the legs do not guide the platform",
+}
+
+
+def singular(found: dict[str, float | None]) -> list[str]:
+    """Return a sentence for each singularity that a pose is at, or within `GRAZE` of."""
+    told = []
+    for name, words in _SINGULAR.items():
+        value = found.get(name)
+        if value is not None and abs(value) < GRAZE:
+            told.append(
+                f"singular ({name} {value:.2g}; 0 is singular, below {GRAZE:g} near): {words}"
+            )
+    return told
 
 
 def in_words(found: dict[str, float | None]) -> str:
@@ -146,7 +178,15 @@ def in_words(found: dict[str, float | None]) -> str:
 
 
 def print_answer(
-    task: Task, x: Array, a: Array, q: Array, *, first: str, degrees: bool, as_json: bool
+    task: Task,
+    x: Array,
+    a: Array,
+    q: Array,
+    *,
+    first: str,
+    degrees: bool,
+    as_json: bool,
+    forces: Array | None = None,
 ) -> None:
     """Print a pose: the task's coordinates and the actuators' positions, asked for or found."""
     names, angular = of_actuators(task)
@@ -163,15 +203,19 @@ def print_answer(
                 for name, is_angle, value in zip(of_side, turns, values, strict=True)
             }
         answer["units"] = {"length": "m", "angle": unit_of(True, degrees)}
+        if forces is not None:
+            answer["forces"] = dict(zip(names, forces.tolist(), strict=True))
         common.print_json(answer | {"singularities": found, "configuration": q.tolist()})
         return
-    console = common.text_console()
+    console = common.text_console(soft_wrap=True)
     tables = {
         "task": table(task.coordinates, x, task.angular, degrees),
-        "actuators": table(names, a, angular, degrees, limits_of(task)),
+        "actuators": table(names, a, angular, degrees, limits_of(task), forces),
     }
     other = "actuators" if first == "task" else "task"
     for name in (first, other):
         console.print(f"{name}:")
         console.print(tables[name])
     console.print(in_words(found))
+    for words in singular(found):
+        console.print(words)

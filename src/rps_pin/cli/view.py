@@ -166,11 +166,15 @@ def view_command(
     tree = machine.mechanism if isinstance(machine, RPSRobot) else machine
     chosen = chosen_layers(layers, tree) | drawn
     picture = {"size": chosen_size(size), "background": background, "layers": chosen["layers"]}
-    _write_files((html, png, video), machine, motion, time, chosen, picture | drawn)
+    with helix.telling_largest(machine, motion):
+        _write_files((html, png, video), machine, motion, time, chosen, picture | drawn)
     if html or png or video:
         return
     try:
-        with show(machine, motion, port=port, **chosen) as view:
+        with (
+            helix.telling_largest(machine, motion),
+            show(machine, motion, port=port, **chosen) as view,
+        ):
             say(f"Open {view.url} in a browser on this machine. Ctrl-C ends.")
             view.play()
     except KeyboardInterrupt:

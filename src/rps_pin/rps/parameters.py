@@ -222,6 +222,8 @@ class RPSParameters(pydantic.BaseModel):
 
     @pydantic.model_validator(mode="after")
     def _bodies_exist(self) -> Self:
+        if not self.model_fields_set.issuperset(BODIES):  # left out, or told as missing
+            return self
         for part in ("leg", "rod"):
             inertia = getattr(self, f"{part}_inertia")
             if getattr(self, f"{part}_mass") == 0 and inertia > 0:
