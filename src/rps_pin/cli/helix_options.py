@@ -41,7 +41,7 @@ RadiusOption = Annotated[
     float | None,
     typer.Option(
         help="Radius r_h of the helix, m. Default: the paper's 0.00075, in proportion for robots "
-        "of other sizes, or the largest within the robot's limits.",
+        "of other sizes; without --height at most what the robot's limits allow.",
         show_default=False,
     ),
 ]
@@ -80,7 +80,7 @@ def chosen_helix(
 ) -> HelixPath:
     """Return the helix that the options describe; sizes that are not given fit the robot."""
     if radius is None:
-        radius, pitch = _chosen_sizes(robot, pitch, height, branch)
+        radius, pitch = _chosen_sizes(robot, pitch, height is None, branch)
     if pitch is None:
         pitch = PAPER_PITCH
     if height is None:
@@ -90,9 +90,9 @@ def chosen_helix(
 
 
 def _chosen_sizes(
-    robot: RPSRobot, pitch: float | None, height: float | None, branch: Branch
+    robot: RPSRobot, pitch: float | None, fitted: bool, branch: Branch
 ) -> tuple[float, float]:
-    """Return radius and pitch: the paper's in proportion, or the largest within limits."""
+    """Return radius and pitch: the paper's in proportion, or, if `fitted`, what limits allow."""
     h = robot.parameters.platform_radius
     alike = _ALIKE[0] <= h <= _ALIKE[1]
     wanted = PAPER_RADIUS * (1.0 if alike else h / _PAPER_PLATFORM_RADIUS)
@@ -100,7 +100,7 @@ def _chosen_sizes(
     def climb(radius: float) -> float:
         return PAPER_PITCH / PAPER_RADIUS * radius if pitch is None else pitch
 
-    radius = largest_radius(robot, climb, height, branch, wanted)
+    radius = largest_radius(robot, climb, None, branch, wanted) if fitted else wanted
     if 0.0 < radius < PAPER_RADIUS:
         radius = _rounded_down(radius)
     if 0.0 < radius < wanted * (1 - 1e-2):
