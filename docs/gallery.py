@@ -165,7 +165,7 @@ def _plot_tracking() -> Figure:
 @shown("Targets, actual values and errors of a controlled five-bar")
 def _plot_tracking_of_a_mechanism() -> Figure:
     task = ClosedLoopModel.load("urdf/five_bar.yaml").task
-    motion = point_to_point(task.home, task.home + 0.02, duration=0.4)
+    motion = point_to_point(task.home, [0.22, 0.52], duration=0.4)
     controller = ComputedTorque(task, task.home, Gains.placed(15.0, integral=0.2))
     plant = Plant(task, task.home, delay=1)
     return plots.plot_tracking(run_loop(controller, plant, motion))

@@ -53,7 +53,7 @@ def plot_assembly_modes(
     span = np.max([np.ptp(one, axis=0) for one in ends], axis=0)
     columns = min(_COLUMNS, count)
     rows = -(-count // columns)
-    figure = figure or Figure(figsize=(PAGE * columns / _COLUMNS, 0.3 + 2.0 * rows))
+    figure = figure or Figure(figsize=(PAGE * max(3, columns) / _COLUMNS, 0.3 + 2.0 * rows))
     figure.subplots_adjust(left=0.02, right=1.02, bottom=0.06, top=0.93, wspace=0, hspace=0.15)
     for k in range(count):
         axes = axes_in_space(figure, place=(rows, columns, k + 1))

@@ -7,12 +7,13 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.plots.curves import legend_above
-from rps_pin.plots.style import COLOUR_MAP, COLUMN, figure_of, new_axes, styled
+from rps_pin.plots.style import COLOUR_MAP, figure_of, new_axes, styled
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.singularity.measures import singularity_measures
 from rps_pin.validation import choice, finite_number, real_array
@@ -57,7 +58,7 @@ def plot_tilt_conditioning(
     across = _increasing(np.linspace(-1.5, 1.5, 161) if tilts is None else tilts, "tilts")
     x, y = np.meshgrid(across, across)
     pose = np.stack([np.full_like(x, finite_number(height, "height", "m")), x, y], axis=-1)
-    axes = new_axes(axes, (COLUMN, 2.9))
+    axes = new_axes(axes, 2.9)
     _map(axes, parameters, pose, (np.degrees(x), np.degrees(y)), measure)
     axes.set(xlabel=f"tilt about x (degrees), at $p_z$ = {1e3 * height:.6g} mm", aspect="equal")
     axes.set_ylabel("tilt about y (degrees)")
@@ -99,7 +100,7 @@ def plot_height_conditioning(
     angle = finite_number(direction, "direction", "rad")
     tilt, z = np.meshgrid(across, up)
     pose = np.stack([z, tilt * np.cos(angle), tilt * np.sin(angle)], axis=-1)
-    axes = new_axes(axes, (COLUMN, 2.7))
+    axes = new_axes(axes, 2.7)
     _map(axes, parameters, pose, (np.degrees(tilt), 1e3 * z), measure)
     about = f" about the axis {np.degrees(angle):.4g}° from x" if angle else " about x"
     axes.set(xlabel=f"tilt{about} (degrees)", ylabel="height $p_z$ (mm)")
@@ -121,7 +122,9 @@ def _map(
         axes.plot([], [], color="black", label="singular")
         legend_above(axes)
     axes.grid(visible=False)
-    figure_of(axes).colorbar(filled, ax=axes, label=_LABELS[measure], aspect=30)
+    figure_of(axes).colorbar(
+        filled, ax=axes, label=_LABELS[measure], aspect=30, ticks=MaxNLocator(6)
+    )
 
 
 def _increasing(values: ArrayLike, name: str) -> Array:

@@ -105,6 +105,7 @@ def _of_legs(run: LoopRun, here: Any) -> list[Draw]:
     def of_legs(axes: Axes) -> None:
         plot_curves(axes, time, 1e6 * errors.length[here], _LEGS)
         axes.set_ylabel("length error (µm)")
+        legend_above(axes)
 
     def of_centre(axes: Axes) -> None:
         plot_curves(axes, time, 1e6 * errors.centre[here], ("$p_x$", "$p_y$", "$p_z$"))
@@ -143,6 +144,7 @@ def _of_task(run: LoopRun, here: Any) -> list[Draw]:
                    small: str = small) -> None:  # fmt: skip
             plot_curves(axes, time, e, names)
             axes.set_ylabel(small)
+            legend_above(axes)
 
         draws += [values, errors]
     return draws

@@ -11,7 +11,7 @@ from matplotlib.textpath import TextPath
 
 from rps_pin.arrays import Array
 from rps_pin.plain_text import for_figure
-from rps_pin.plots.style import COLOURS, LEG_STYLES, POINTS, STYLE, figure_of
+from rps_pin.plots.style import COLOURS, LEG_STYLES, POINTS, STYLE, PrintFigure, figure_of
 
 #: Line styles of further curves, where the colours come round again.
 _STYLES = (*LEG_STYLES, ":")
@@ -89,9 +89,13 @@ def legend_above(axes: Axes) -> None:
     handles, labels = axes.get_legend_handles_labels()
     if not handles:
         return
-    width = 72 * axes.get_position().width * figure_of(axes).get_figwidth()
+    figure = figure_of(axes)
+    width = 72 * axes.get_position().width * figure.get_figwidth()
     look: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
-    axes.legend(handles, labels, ncols=legend_columns(labels, width), **look)
+    columns = legend_columns(labels, width)
+    axes.legend(handles, labels, ncols=columns, **look)
+    if isinstance(figure, PrintFigure):
+        figure.grow(-(-len(labels) // columns) - 1)
 
 
 def legend_columns(labels: Sequence[str], width: float) -> int:

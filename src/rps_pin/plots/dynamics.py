@@ -23,9 +23,9 @@ from rps_pin.plots.curves import (
     plot_curves,
     with_jumps,
 )
-from rps_pin.plots.style import COLUMN, figure_of, new_axes, styled, three_axes
+from rps_pin.plots.style import figure_of, new_axes, styled, three_axes
 from rps_pin.rps.dynamics.force_causes import ForceCauses
-from rps_pin.task.sizing.sizing_sheet import SizingSheet
+from rps_pin.task.sizing.sizing_sheet import ActuatorLimits, SizingSheet
 from rps_pin.validation import real_array
 
 #: Okabe and Ito's colours for the causes, told apart by colour-blind readers; and hatches, so that
@@ -41,6 +41,8 @@ _CAUSES = {
 _LABELS = {"coriolis": "Coriolis"}
 #: Share of the largest part that can be seen.
 _VISIBLE = 5e-3
+#: Limits are drawn if the motion comes up to this share of them; else they are named.
+_NEAR = 0.15
 
 
 @styled
@@ -103,7 +105,7 @@ def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
     A motion that keeps the limits stays within the box; the dotted curves are the limit of power.
     A limit that there is not is not drawn. Crosses mark the peak forces.
     """
-    axes = new_axes(axes, (COLUMN, 3.0))
+    axes = new_axes(axes, 3.0)
     axes.axhline(0.0, color="black", linewidth=0.6)
     axes.axvline(0.0, color="black", linewidth=0.6)
     named = [one.name for one in sheet.actuators if one.name]
@@ -113,10 +115,11 @@ def plot_sizing(sheet: SizingSheet, axes: Axes | None = None) -> Figure:
         x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
         most = int(np.abs(y).argmax())
         axes.plot(x[most], y[most], "x", color=line.get_color())
+    turning = {one.angular for one in sheet.actuators}
+    units = ("rad/s", "N m") if turning == {True} else ("m/s", "N")
     limits = [sheet.limits_of(k) for k in range(len(sheet.actuators))]
     if all((one.force, one.speed) == (limits[0].force, limits[0].speed) for one in limits):
-        _limit_box(axes, sheet)
-    turning = {one.angular for one in sheet.actuators}
+        _limit_box(axes, sheet, units)
     of_slides, of_turns = ("speed (m/s)", "force (N)"), ("speed (rad/s)", "torque (N m)")
     both = ("speed (m/s or rad/s)", "force (N or N m)")
     words = both if len(turning) > 1 else of_turns if turning == {True} else of_slides
@@ -139,10 +142,18 @@ def _stacks(axes: Axes, time: np.ndarray, parts: dict[str, np.ndarray]) -> None:
         above, below = upper, lower
 
 
-def _limit_box(axes: Axes, sheet: SizingSheet) -> None:
-    """Draw what limits there are: a box, or two lines where one side is open."""
+def _limit_box(axes: Axes, sheet: SizingSheet, units: tuple[str, str]) -> None:
+    """Draw what limits there are: a box, or two lines where one side is open or far away."""
     limits = sheet.limits_of(0)
-    force, speed, power = limits.force, limits.speed, limits.power
+    drawn, far = [], []
+    for limit, values, unit in zip(
+        (limits.speed, limits.force), (sheet.speed, sheet.force), units, strict=True
+    ):
+        near = float(np.abs(values).max()) > _NEAR * limit
+        drawn.append(limit if near else math.inf)
+        if np.isfinite(limit) and not near:
+            far.append(f"±{limit:.4g} {unit}")
+    speed, force = drawn
     look: dict[str, Any] = {"color": "black", "linewidth": 1.0}
     if np.isfinite(force) and np.isfinite(speed):
         corner = (-speed, -force)
@@ -153,10 +164,19 @@ def _limit_box(axes: Axes, sheet: SizingSheet) -> None:
             if np.isfinite(limit):
                 line(limit, label="limits", **look)
                 line(-limit, **look)
-    if np.isfinite(power):
-        largest = speed if np.isfinite(speed) else 1.2 * float(np.abs(sheet.speed).max())
-        highest = force if np.isfinite(force) else 1.2 * float(np.abs(sheet.force).max())
-        if largest * highest > power:  # else the curves lie outside
-            v = np.linspace(power / highest, largest, 100)
-            x, y = np.outer(v, [1, 1, -1, -1]), np.outer(power / v, [1, -1, 1, -1])
-            axes.plot(x, y, ":", color="black", label=["power limit", "", "", ""])
+    if far:
+        axes.plot([], [], " ", label=f"limits: {', '.join(far)}")
+    _power_limit(axes, sheet, limits)
+
+
+def _power_limit(axes: Axes, sheet: SizingSheet, limits: ActuatorLimits) -> None:
+    """Draw the limit of power as far as those of force and speed, or somewhat beyond the motion."""
+    speed, force, power = limits.speed, limits.force, limits.power
+    if not np.isfinite(power):
+        return
+    largest = min(speed, 1.2 / _NEAR * float(np.abs(sheet.speed).max()))
+    highest = min(force, 1.2 / _NEAR * float(np.abs(sheet.force).max()))
+    if largest * highest > power:  # else the curves lie outside
+        v = np.linspace(power / highest, largest, 100)
+        x, y = np.outer(v, [1, 1, -1, -1]), np.outer(power / v, [1, -1, 1, -1])
+        axes.plot(x, y, ":", color="black", label=["power limit", "", "", ""])

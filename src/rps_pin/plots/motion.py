@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -16,7 +17,7 @@ from rps_pin.plots.space import POSITION, axes_in_space, finish_space, frame_spa
 from rps_pin.rps.dynamics.motion_run import MotionRun
 
 _LEGS = ("leg 1", "leg 2", "leg 3")
-_SIZE = (style.COLUMN, 2.2)
+_HEIGHT = 2.2
 
 
 @style.styled
@@ -35,14 +36,16 @@ def plot_path(run: MotionRun, figure: Figure | None = None) -> Figure:
     axes.scatter(x[:1], y[:1], z[:1], color="black", label="start", **ends)
     axes.scatter(x[-1:], y[-1:], z[-1:], color=style.VERMILION, marker="s", label="end", **ends)
     up = f"$p_z$ - {base:.6g} mm (mm)"
-    scales = frame_space(axes, points.min(axis=0), points.max(axis=0), (*POSITION[:2], up))
+    ends_of_box = points.min(axis=0), points.max(axis=0)
+    least = 1e-5 * float(np.abs(run.position).max()) * 1e3  # so that rest is a point
+    scales = frame_space(axes, *ends_of_box, (*POSITION[:2], up), least=least)
     return finish_space(axes, figure, scales)
 
 
 @style.styled
 def plot_lengths(run: MotionRun, axes: Axes | None = None) -> Figure:
     """Draw the leg lengths over time in millimetres, as the paper's Fig. 8 does; and limits."""
-    axes = style.new_axes(axes, _SIZE)
+    axes = style.new_axes(axes, _HEIGHT)
     plot_curves(axes, run.time, 1e3 * run.length, _LEGS)
     low, high = (0.0, math.inf) if run.parameters is None else run.parameters.leg_length_limits
     draw_limits(axes, 1e3 * run.length, 1e3 * low if low > 0 else -math.inf, 1e3 * high, "mm")
@@ -55,7 +58,7 @@ def plot_forces(run: MotionRun, axes: Axes | None = None) -> Figure:
 
     Forces jump where accelerations do: between two samples, which an upright line joins.
     """
-    axes = style.new_axes(axes, _SIZE)
+    axes = style.new_axes(axes, _HEIGHT)
     time, force = with_jumps(run.time, run.force)
     plot_curves(axes, time, force, _LEGS)
     limit = math.inf if run.parameters is None else run.parameters.actuator_force_limit
@@ -66,7 +69,7 @@ def plot_forces(run: MotionRun, axes: Axes | None = None) -> Figure:
 @style.styled
 def plot_length_phase(run: MotionRun, axes: Axes | None = None) -> Figure:
     """Draw each leg's speed over its length: mm/s over mm; and limits. Crosses mark the start."""
-    axes = style.new_axes(axes, (style.COLUMN, 2.6))
+    axes = style.new_axes(axes, 2.6)
     length, speed = 1e3 * run.length, 1e3 * run.speed
     axes.axhline(0.0, color="black", linewidth=0.6)
     plot_curves(axes, length, speed, _LEGS)

@@ -17,10 +17,13 @@ from rps_pin.plots.curves import legend_columns
 from rps_pin.plots.style import COLUMN, POINTS, figure_of
 
 POSITION = ("$p_x$ (mm)", "$p_y$ (mm)", "$p_z$ (mm)")
-#: Sides of a box with equal scales differ by this factor at most; else the short ones are widened.
-_SLENDER = 5.0
+#: Sides of a box differ by this factor at most. Up to `_EQUAL`, short ones get room; beyond, they
+#: are magnified, but not if nothing happens along them, to `_NOTHING` of the longest.
+_SLENDER, _EQUAL, _NOTHING = 3.0, 10.0, 1e-3
+#: Sides of the base shorter than this share have a tick in their middle only.
+_NARROW = 0.5
 #: Room of labels left of, right of and below the box, and largest height of the box, inches.
-_LEFT, _RIGHT, _BELOW, _HIGHEST = 0.4, 0.62, 0.5, 2.5
+_LEFT, _RIGHT, _BELOW, _HIGHEST = 0.4, 0.7, 0.5, 2.5
 #: Height of a line of text, inches.
 _LINE = 1.6 * POINTS / 72
 
@@ -36,16 +39,23 @@ def axes_in_space(
 
 
 def frame_space(
-    axes: Axes3D, low: Array, high: Array, labels: Sequence[str] = POSITION, ticks: int = 4
+    axes: Axes3D,
+    low: Array,
+    high: Array,
+    labels: Sequence[str] = POSITION,
+    ticks: int = 4,
+    least: float = 0.0,
 ) -> str:
     """Set limits, labels and sides of a box from `low` to `high`, shape (3,).
+
+    Its longest side is `least` or more.
 
     Returns
     -------
     str
         Which scales differ, by how much; empty if all are equal.
     """
-    span, factor, wide = _sides(high - low)
+    span, factor, wide = _sides(high - low, least)
     middle = (low + high) / 2
     ends = np.stack([middle - span / 2, middle + span / 2], axis=1).tolist()
     axes.set(xlim=ends[0], ylim=ends[1], zlim=ends[2])
@@ -56,9 +66,13 @@ def frame_space(
     ):
         axis.set_label_text(label)
         steps = [1, 2, 2.5, 5, 10]
-        axis.set_major_locator(MaxNLocator(max(1, round(ticks * side)), steps=steps))
-        axis.set_tick_params(pad=2 if axis is axes.zaxis else -1)
-        axis.labelpad = 1 if axis is axes.zaxis else -1
+        upright = axis is axes.zaxis
+        if upright or side > _NARROW:
+            axis.set_major_locator(MaxNLocator(max(1, round(ticks * side)), steps=steps))
+        else:  # at the ends, x and y would meet
+            axis.set_major_locator(MaxNLocator(2, steps=steps, prune="both"))
+        axis.set_tick_params(pad=2 if upright else -1)
+        axis.labelpad = 4 if upright else -1
         axis.pane.set_facecolor("white")
         axis.pane.set_edgecolor("0.8")
         info: Any = axis._axinfo  # there is no public way
@@ -113,22 +127,25 @@ def finish_space(axes: Axes3D, given: Figure | None, note: str = "", right: floa
         fill_figure(axes, note, right)
     else:
         axes.set_title(note)
+        if given.get_layout_engine() is None:  # room for labels, which are no part of axes in space
+            box = axes.get_position()
+            axes.set_position(box.shrunk(0.75, 0.75).anchored("C", box))
         if axes.get_legend_handles_labels()[0]:
             axes.legend(loc="upper left")
     return figure
 
 
-def _sides(span: Array) -> tuple[Array, float, Bools]:
+def _sides(span: Array, least: float) -> tuple[Array, float, Bools]:
     """Return spans, a factor, and to which it applies: 1 if equal scales make a fair box."""
-    longest = float(span.max())
-    span = np.maximum(span, 1e-9 * longest)
-    if span.min() >= longest / (2 * _SLENDER):
-        return np.maximum(span, longest / _SLENDER), 1.0, np.zeros(3, bool)
-    wide: Bools = span < longest / _SLENDER
-    factor = 0.9 * longest / float(span[wide].max())
+    longest = max(float(span.max()), least)
+    short: Bools = (span < longest / _EQUAL) & (span > _NOTHING * longest)
+    if not short.any():
+        return np.maximum(span, longest / _SLENDER), 1.0, short
+    factor = 0.9 * longest / float(span[short].max())
     ten = 10.0 ** np.floor(np.log10(factor))
     factor = float(np.floor(factor / ten) * ten)
-    return np.maximum(span, np.where(wide, longest / factor / _SLENDER, 0.0)), factor, wide
+    room = longest / _SLENDER / np.where(short, factor, 1.0)
+    return np.maximum(span, room), factor, short
 
 
 def _corners(axes: Axes3D) -> Array:

@@ -92,9 +92,21 @@ def figure_of(axes: Axes) -> Figure:
     return figure
 
 
-def new_axes(axes: Axes | None, size: tuple[float, float]) -> Axes:
-    """Return the axes given, or those of a new figure of a size in inches."""
-    return axes or Figure(figsize=size, layout="constrained").add_subplot()
+class PrintFigure(Figure):
+    """A new figure in a column, whose height grows by the legends' rows."""
+
+    def __init__(self, height: float) -> None:
+        """Make one of a height in inches."""
+        super().__init__(figsize=(COLUMN, height), layout="constrained")
+
+    def grow(self, rows: int) -> None:
+        """Add room for rows of a legend."""
+        self.set_figheight(self.get_figheight() + rows * 1.35 * POINTS / 72)
+
+
+def new_axes(axes: Axes | None, height: float) -> Axes:
+    """Return the axes given, or those of a new figure in a column, of a height in inches."""
+    return axes or PrintFigure(height).add_subplot()
 
 
 def three_axes(axes: Sequence[Axes] | None, height: float) -> Sequence[Axes]:
@@ -108,7 +120,7 @@ def three_axes(axes: Sequence[Axes] | None, height: float) -> Sequence[Axes]:
 
 def panels(figure: Figure | None, count: int, height: float) -> list[Axes]:
     """Return axes below each other over one abscissa, of a height in inches on a new figure."""
-    figure = figure or Figure(figsize=(COLUMN, height), layout="constrained")
+    figure = figure or PrintFigure(height)
     found = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
     figure.align_ylabels(found)
     return found

@@ -14,7 +14,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from rps_pin.arrays import Array
 from rps_pin.plots.space import POSITION, axes_in_space, finish_space, frame_space
-from rps_pin.plots.style import BLUE, COLOUR_MAP, GREY, VERMILION, styled
+from rps_pin.plots.style import BLUE, COLOUR_MAP, GREY, VERMILION, figure_of, styled
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.geometry import boundary, boundary_conditioning
 from rps_pin.rps.workspace.result import Workspace
@@ -76,13 +76,13 @@ def plot_space(workspace: Workspace, figure: Figure | None = None) -> Figure:
     lit = np.clip(colours * _light(shape)[:, None], 0.0, 1.0)
     axes.add_collection3d(Poly3DCollection(shape, facecolors=lit, edgecolors=lit, linewidths=0.1))
     words = frame_space(axes, points.min(axis=0), points.max(axis=0))
-    found = finish_space(axes, figure, words, right=0.75)
-    bar = ScalarMappable(scales, COLOUR_MAP)
+    found = figure_of(axes)
     beside: Any = {"ax": axes}
     if figure is None:
         beside = {"cax": found.add_axes((0.82, 0.2, 0.03, 0.6), label="<colorbar>")}
-    found.colorbar(bar, label="conditioning (1)", **beside).ax.grid(visible=False)
-    return found
+    bar = found.colorbar(ScalarMappable(scales, COLOUR_MAP), label="conditioning (1)", **beside)
+    bar.ax.grid(visible=False)
+    return finish_space(axes, figure, words, right=0.75)
 
 
 def _draw_cylinder(axes: Axes3D, radius: float, low: float, high: float) -> None:

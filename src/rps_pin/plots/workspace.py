@@ -19,7 +19,7 @@ from rps_pin.errors import InputError
 from rps_pin.plots import style
 from rps_pin.plots.curves import legend_above
 from rps_pin.plots.space import POSITION
-from rps_pin.plots.style import COLUMN, GREY, PAGE, figure_of, new_axes, styled
+from rps_pin.plots.style import GREY, PAGE, figure_of, new_axes, styled
 from rps_pin.rps.workspace.geometry import boundary
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
@@ -100,7 +100,7 @@ def plot_reasons(workspace: Workspace, height: float, axes: Axes | None = None) 
     # 0 for inside: the first family that a reason is of, or of none
     family = ((plane.reason[0, ..., None] & np.array(bits)) != 0).argmax(axis=-1)
     _, x, y = (np.rad2deg(axis) for axis in plane.grid.axes)
-    axes = new_axes(axes, (COLUMN, 3.2))
+    axes = new_axes(axes, 3.2)
     image = to_rgba_array(colours)[family]
     half_x, half_y = (x[1] - x[0]) / 2, (y[1] - y[0]) / 2
     axes.imshow(
@@ -145,7 +145,7 @@ def plot_comparison(rows: Sequence[_Reach], axes: Axes | None = None) -> Figure:
     if len(rows) == 0:
         raise InputError("there is nothing to compare: rows is empty")
     radius = [1e3 * row.base_radius for row in rows]
-    axes = new_axes(axes, (COLUMN, 2.3))
+    axes = new_axes(axes, 2.3)
     for axis, look, colour in (("x", "-o", style.BLUE), ("y", "--s", style.VERMILION)):
         values = [1e3 * max(map(abs, getattr(row, axis))) for row in rows]
         axes.plot(radius, values, look, color=colour, label=f"largest $|p_{axis}|$")
