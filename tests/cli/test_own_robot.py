@@ -19,6 +19,7 @@ from rps_pin.control.simulation.scenario import load_scenario
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.task import check_path
 from rps_pin.task.trajectory_file import load_task_trajectory
+from rps_pin.viewer import Motion
 from rps_pin.viewer.show import LocalView
 from tests.cli.commands import rps_pin
 from tests.each import each
@@ -166,3 +167,59 @@ def test_samples_are_never_replaced_unless_asked(samples: Path, tmp_path: Path) 
     assert (tmp_path / "mine.yaml").read_text() == "PRECIOUS"
     assert rps_pin("examples", "-o", ".", "--overwrite", folder=tmp_path).returncode == 0
     assert (tmp_path / "mine.yaml").read_text() == (samples / "mine.yaml").read_text()
+
+
+SHOWN = {
+    "parameters": "mine.yaml",
+    "a preset": "micro",
+    "a mechanism's name": "five_bar",
+    "a description": "bar.yaml",
+    "a URDF": "five_bar.urdf",
+    "a MuJoCo file": "robot.xml",
+}
+
+
+@pytest.mark.parametrize("file", SHOWN.values(), ids=SHOWN)
+def test_view_shows_the_home_of_anything(file: str, place: Path) -> None:
+    shutil.copy(URDF / "five_bar.yaml", place / "bar.yaml")
+    shutil.copy(URDF / "five_bar.urdf", place)
+    seen: list[Motion] = []
+
+    def play(view: LocalView) -> None:
+        seen.append(view.motion)
+        raise KeyboardInterrupt
+
+    with mock.patch.object(LocalView, "play", play):
+        ended = rps_pin("view", file, folder=place)
+    assert ended.returncode == 0, ended.stderr
+    (motion,) = seen
+    assert motion.duration == 0.0
+    q = motion.configurations[0]
+    wanted = {
+        "mine.yaml": RPSRobot.from_preset("micro").mechanism.home,
+        "micro": RPSRobot.from_preset("micro").mechanism.home,
+        "five_bar": ClosedLoopModel.load(URDF / "five_bar.yaml").home,
+        "bar.yaml": ClosedLoopModel.load(URDF / "five_bar.yaml").home,
+    }
+    if file in wanted:
+        mechanism = (
+            RPSRobot.from_preset("micro").mechanism
+            if q.size == 13
+            else ClosedLoopModel.load(URDF / "five_bar.yaml")
+        )
+        np.testing.assert_allclose(q, mechanism.close(wanted[file]), atol=1e-9)
+
+
+def test_view_says_what_it_cannot_show(tmp_path: Path) -> None:
+    (tmp_path / "x.yaml").write_text("a: 1\nbb: 2\n")
+    (tmp_path / "loop.yaml").write_text("robot: micro\ncontroller: {bandwidth: 1}\n")
+    for file, words in (
+        ("x.yaml", "a trajectory has the key kind, a mechanism urdf or mjcf, a 3-RPS base_radius"),
+        ("x.yaml", "this file has: a, bb"),
+        ("loop.yaml", "is a control scenario: rps-pin control loop.yaml"),
+        ("nobody", "is not a file or a robot of the package; those are: micro, sokolov, ankle"),
+        ("none.yaml", "cannot read the file none.yaml: No such file"),
+    ):
+        ended = rps_pin("view", file, folder=tmp_path)
+        assert ended.returncode == 1
+        assert words in ended.stderr

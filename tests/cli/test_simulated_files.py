@@ -131,3 +131,24 @@ def test_adaptive_steps_shorten_where_a_trial_step_leaves_all_bounds(tmp_path: P
     found, _ = simulated(tmp_path, "--duration", "0.002")
     assert worst(np.abs(found["q_crank"] - exact["q_crank"])) < 1e-8
     assert summary["energy_balance"] < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("more", "row"),
+    [
+        ("", "energy balance (nothing does work)"),
+        ("damping: {left_joint: 0.1}", "work of damping "),
+        ("actuated: [left_joint]", "work of actuators "),
+        (
+            "actuated: [left_joint]\ndamping: {right_joint: 0.1}\nfriction: {left_joint: 0.1}",
+            "work of actuators, damping and friction ",
+        ),
+    ],
+)
+def test_the_table_names_what_does_work(more: str, row: str, tmp_path: Path) -> None:
+    urdf = Path(__file__).parents[2] / "urdf" / "five_bar.urdf"
+    (tmp_path / "a.yaml").write_text(f"urdf: {urdf}\n{more}\n")
+    ended = rps_pin("simulate", "a.yaml", "--duration", "0.003", folder=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    assert f"│ {row}" in ended.stdout
+    assert ended.stdout.count("work of") == (row != "energy balance (nothing does work)")

@@ -66,6 +66,8 @@ def doctor_command(
 
     Exit status: 0 all required packages work; 1 something is missing or broken. Of any command, 70
     is a fault of rps-pin itself: please report it with this list.
+
+    Example: `rps-pin doctor --json`
     """
     raise typer.Exit(doctor(as_json))
 

@@ -17,6 +17,7 @@ from rps_pin.cli import mechanism_options as options
 from rps_pin.cli import motion_options as motions
 from rps_pin.cli import task_options as tasks
 from rps_pin.cli.degrees import check_in_degrees
+from rps_pin.cli.given_options import refuse
 from rps_pin.errors import InputError
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.singularity.path_check import check_path
@@ -57,7 +58,12 @@ InterferenceOption = Annotated[
 ]
 
 
+#: Options of the helix.
+_CURVE = ("radius", "pitch", "height", "branch", "duration")
+
+
 def check_command(
+    context: typer.Context,
     trajectory: Annotated[
         Path | None,
         typer.Argument(
@@ -110,6 +116,7 @@ def check_command(
     - `rps-pin check stewart.csv -m stewart --clearance 0.005`
     """
     if mechanism is not None:
+        refuse(context, "it does not go with a mechanism", "robot", *_CURVE)
         if trajectory is None:
             told = "a mechanism has no helix: give a trajectory file"
             raise typer.BadParameter(told, param_hint="TRAJECTORY")
@@ -122,6 +129,8 @@ def check_command(
         loads = {"payload": load, "wrench": wrench}
         _of_task(task, trajectory, asked, loads, fastest, degrees, as_json)
         return
+    if trajectory is not None:
+        refuse(context, "it does not go with a trajectory", *_CURVE)
     if clearance or ignore or interference != Interference.AUTO or package_path:
         told = "interference is checked of a mechanism: give its file, --mechanism FILE"
         raise typer.BadParameter(told, param_hint="--interference")

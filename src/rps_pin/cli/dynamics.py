@@ -13,6 +13,7 @@ from rich.markup import escape
 from rps_pin.cli import console as common
 from rps_pin.cli import motion_options as motions
 from rps_pin.cli import task_options as tasks
+from rps_pin.cli.given_options import refuse
 from rps_pin.cli.mechanism_options import AccuracyOption, IgnoreLimitsOption
 from rps_pin.cli.motion_report import motion_files, print_motion, write_motion
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
@@ -31,6 +32,7 @@ _FIGURES = ("forces_by_cause", "force_over_speed")
 
 
 def dynamics_command(
+    context: typer.Context,
     trajectory: Annotated[
         Path,
         typer.Argument(metavar="TRAJECTORY", help="A CSV file of poses, or a YAML file."),
@@ -79,6 +81,7 @@ def dynamics_command(
     """
     load = motions.payload_of(payload, payload_centre, wrench)
     if mechanism is not None:
+        refuse(context, "it does not go with a mechanism", "robot")
         refuse_options_of_robots(gravity, power)
         dynamics_of_task(
             mechanism,
@@ -95,6 +98,7 @@ def dynamics_command(
             wrench=wrench,
         )
         return
+    refuse(context, "it is an option of a mechanism", "ignore_limits", "accuracy")
     tasks.refuse_degrees(degrees)
     machine = common.load_robot(robot)
     if gravity is not None:

@@ -30,8 +30,6 @@ _ROWS = {
     "largest loop gap": "{largest_gap:.2g} m",
     "largest kinetic energy": "{kinetic_peak:.6g} J",
     "change of the energy": "{energy_change:.6g} J",
-    "work of actuators, friction and wrenches": "{work:.6g} J",
-    "energy balance (change less work)": "{energy_balance:.2g} of the energy",
 }
 
 
@@ -148,7 +146,7 @@ def simulate_command(
     if as_json:
         common.print_json({"mechanism": mechanism.name} | summary | {"files": files})
         return
-    rows = {name: text.format(**summary) for name, text in _ROWS.items()}
+    rows = _rows(mechanism, summary)
     if unheld:
         rows["not held by the actuators"] = "; ".join(map(str, unheld))
     console.print(common.table_of(rows.items(), title=title, title_justify="left"))
@@ -159,6 +157,23 @@ def simulate_command(
     for note in notes:
         console.print(f"note: {note}")
     common.print_files(console, files)
+
+
+def _rows(mechanism: ClosedLoopModel, summary: dict[str, Any]) -> dict[str, str]:
+    """Return the rows of the table; the work is of what there is in the mechanism."""
+    rows = {name: text.format(**summary) for name, text in _ROWS.items()}
+    effects = mechanism.effects
+    there = {
+        "actuators": len(mechanism.actuated) > 0,
+        "damping": effects is not None and effects.damping.any(),
+        "friction": effects is not None and effects.friction.any(),
+    }
+    names = [name for name, is_there in there.items() if is_there]
+    error = f"{summary['energy_balance']:.2g} of the energy"
+    if not names:
+        return rows | {"energy balance (nothing does work)": error}
+    work = f"work of {' and '.join([', '.join(names[:-1]), names[-1]] if names[1:] else names)}"
+    return rows | {work: f"{summary['work']:.6g} J", "energy balance (change less work)": error}
 
 
 def _error_of_energy(motion: Simulation) -> float:
