@@ -23,9 +23,7 @@ from tests.processes import RPS_PIN, start
 from tests.worst import worst
 
 FIGURES = [
-    f"figure_{name}.{suffix}"
-    for name in ("7_path", "8_lengths", "9_forces")
-    for suffix in ("png", "svg")
+    f"{name}.{suffix}" for name in ("path", "lengths", "forces") for suffix in ("png", "svg")
 ]
 
 
