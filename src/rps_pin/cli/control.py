@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 20
 #: Figures in the report.
 _CAPTIONS = {
-    "tracking.png": "Errors against the target over time",
-    "forces.png": "Forces, distance to type II and statuses over time",
+    "tracking.png": "Targets, actual values and errors over time",
+    "forces.png": "Forces, and what else changed, over time",
 }
 
 
