@@ -197,8 +197,8 @@ def test_yaml_numbers_that_overflow_are_not_infinite(number: str, tmp_path: Path
 def test_names_longer_than_a_system_takes(name: str, tmp_path: Path) -> None:
     scenario = tmp_path / "scenario.yaml"
     rest = (
-        "trajectory: {kind: circle, height: 0.22, tilt: 0}\ncontroller: {law: computed_torque, "
-        "bandwidth: 1}\n"
+        "trajectory: {kind: circle, height: 0.22, tilt: 0, duration: 1}\n"
+        "controller: {law: computed_torque, bandwidth: 1}\n"
     )
     for key in ("robot", "mechanism"):
         scenario.write_text(f"{key}: {name}\n{rest}", "utf-8")
