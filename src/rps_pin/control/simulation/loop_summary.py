@@ -151,6 +151,7 @@ class LoopSummary:
         return _table(self, "smallest distance to type II")
 
 
+@refuses_other_kinds
 @dataclass(frozen=True)
 class TaskSummary:
     """Figures of a run of a task over a window of time, SI units.
