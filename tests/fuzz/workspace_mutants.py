@@ -48,8 +48,8 @@ def mutant(rng: Random) -> tuple[bytes, str]:
 
 
 def _name(file: h5py.File, rng: Random) -> str:
-    names = [name for name in file if file.get(name, getlink=True).__class__ is h5py.HardLink]
-    return rng.choice(sorted(names))
+    hard = [name for name in file if file.get(name, getlink=True).__class__ is h5py.HardLink]
+    return rng.choice(sorted(name for name in hard if isinstance(file[name], h5py.Dataset)))
 
 
 def _attribute(file: h5py.File, rng: Random) -> str:
