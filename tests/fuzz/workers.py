@@ -53,6 +53,7 @@ class _Worker:
         self._process: Any = _SPAWN.Process(target=_work, args=(theirs,), daemon=False)
         self._process.start()
         theirs.close()
+        self._end.recv()  # it has imported what it needs, which no case is charged with
 
     def outcome(self, item: Item) -> Outcome:
         """Return what becomes of an item."""
@@ -120,6 +121,7 @@ def _work(end: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     warnings.simplefilter("ignore")
     parent = os.getppid()
+    end.send(None)
     while True:
         while not end.poll(1.0):
             if os.getppid() != parent:
