@@ -100,11 +100,20 @@ class RPSTask(Task):
         within = self._robot.inverse_kinematics(whole, errors=errors).reachable
         return np.where(reached & within[..., None], pose, np.nan)
 
-    def jacobian(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
+    def jacobian(
+        self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise"
+    ) -> Array:
         """Return K = d(lengths)/d(pose), shape (..., 3, 3)."""
         return leg_jacobians(self._robot.parameters, self.at(q)).length_jacobian
 
-    def bias(self, q: ArrayLike, rate: ArrayLike, *, errors: Errors = "raise") -> Array:
+    def bias(
+        self,
+        q: ArrayLike,
+        rate: ArrayLike,
+        *,
+        x: ArrayLike | None = None,
+        errors: Errors = "raise",
+    ) -> Array:
         """Return K' pose', shape (..., 3)."""
         pose, rate_ = self.at(q), self._rows(rate, self.size, "rate")
         change = leg_jacobian_rates(self._robot.parameters, pose, rate_).length_jacobian
@@ -126,7 +135,13 @@ class RPSTask(Task):
         return TaskState(*self._robot.state(x, rate, acceleration, errors=errors))
 
     def motion(
-        self, q: ArrayLike, rate: ArrayLike, acceleration: ArrayLike, *, errors: Errors = "raise"
+        self,
+        q: ArrayLike,
+        rate: ArrayLike,
+        acceleration: ArrayLike,
+        *,
+        x: ArrayLike | None = None,
+        errors: Errors = "raise",
     ) -> TaskState:
         """Return q, v and a at configurations, within limits or not; see `Task.motion`."""
         x, dx, ddx = checked_motion(self.at(q), rate, acceleration)
@@ -144,7 +159,14 @@ class RPSTask(Task):
         """Return the robot's limits: lengths, angles and cones of the legs."""
         return RobotLimits(self._robot.parameters)
 
-    def rate(self, q: ArrayLike, v: ArrayLike, *, errors: Errors = "raise") -> Array:
+    def rate(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        x: ArrayLike | None = None,
+        errors: Errors = "raise",
+    ) -> Array:
         """Return the poses' rates, from the free platform's velocity; see `Task.rate`."""
         q_, v_ = self._rows(q, self._nq, "q"), self._rows(v, self._nv, "v")
         batch = np.broadcast_shapes(q_.shape[:-1], v_.shape[:-1])

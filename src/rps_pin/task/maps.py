@@ -336,29 +336,42 @@ class TaskMaps:
 
     # Velocities and accelerations -----------------------------------------------------------------
 
-    def jacobian(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
+    def jacobian(
+        self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise"
+    ) -> Array:
         """Return K = d(actuators)/d(task) at closed configurations, shape (..., na, m).
 
         As velocities of a `ClosedLoopModel`, it does not look whether the loops are closed; calls
         that return forces or inertia do, and refuse open ones.
+
+        Parameters
+        ----------
+        q
+            Closed configurations, shape (..., nq).
+        x
+            Coordinates there, shape (..., m), that decide between the two rotation vectors of a
+            rotation, as `near` of `at`. Left out: the shorter one.
 
         Raises
         ------
         SingularityError
             If the task's coordinates do not determine the motion here (type I).
         """
-        return self._basis(q, errors)[..., self._actuated, :]
+        return self._basis(q, x, errors)[..., self._actuated, :]
 
-    def hessian(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
+    def hessian(
+        self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise"
+    ) -> Array:
         """Return H = d2(actuators)/d(task)2, shape (..., na, m, m), symmetric.
 
-        Exact: the accelerations at constant rates are x' H x', a quadratic form.
+        Exact: the accelerations at constant rates are x' H x', a quadratic form. Arguments are
+        those of `jacobian`.
         """
         q_, count = self._rows(q, self._nq, "q"), self.size
         batch, axes = q_.shape[:-1], np.eye(self.size)
 
         def form(rate: Array) -> Array:
-            return self.bias(q_, np.broadcast_to(rate, (*batch, count)), errors=errors)
+            return self.bias(q_, np.broadcast_to(rate, (*batch, count)), x=x, errors=errors)
 
         squares = [form(axis) for axis in axes]
         found = np.empty((*batch, self._actuated.size, count, count))
@@ -369,7 +382,14 @@ class TaskMaps:
                 found[..., i, k] = found[..., k, i] = mixed
         return found
 
-    def bias(self, q: ArrayLike, rate: ArrayLike, *, errors: Errors = "raise") -> Array:
+    def bias(
+        self,
+        q: ArrayLike,
+        rate: ArrayLike,
+        *,
+        x: ArrayLike | None = None,
+        errors: Errors = "raise",
+    ) -> Array:
         """Return K' x' = x' H x', the actuators' accelerations at constant rates, (..., na).
 
         Parameters
@@ -378,8 +398,10 @@ class TaskMaps:
             Closed configurations, shape (..., nq).
         rate
             x', shape (..., m).
+        x
+            As for `jacobian`.
         """
-        _, _, a = self._motion(q, rate, np.zeros(self.size), errors)
+        _, _, a = self._motion(q, rate, np.zeros(self.size), x, errors)
         return np.asarray(a[..., self._actuated])
 
     def state(
@@ -407,7 +429,7 @@ class TaskMaps:
             As `to_actuators`.
         """
         q = self.configuration(x, near, within_limits=within_limits, errors=errors)
-        return self.motion(q, rate, acceleration, errors=errors)
+        return self.motion(q, rate, acceleration, x=x, errors=errors)
 
     def motion(
         self,
@@ -415,15 +437,29 @@ class TaskMaps:
         rate: ArrayLike,
         acceleration: ArrayLike,
         *,
+        x: ArrayLike | None = None,
         errors: Errors = "raise",
     ) -> TaskState:
-        """Return the motion of all joints at closed configurations (..., nq); see `state`."""
-        q_, v, a = self._motion(q, rate, acceleration, errors)
+        """Return the motion of all joints at closed configurations (..., nq); see `state`.
+
+        `x` is that of `jacobian`.
+        """
+        q_, v, a = self._motion(q, rate, acceleration, x, errors)
         return TaskState(q_, v[..., : self._nv], a[..., : self._nv])
 
-    def rate(self, q: ArrayLike, v: ArrayLike, *, errors: Errors = "raise") -> Array:
-        """Return x' of velocities (..., nv) that keep the loops closed, shape (..., m)."""
-        forward = self._frame_rows(q, errors)
+    def rate(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        x: ArrayLike | None = None,
+        errors: Errors = "raise",
+    ) -> Array:
+        """Return x' of velocities (..., nv) that keep the loops closed, shape (..., m).
+
+        `x` is that of `jacobian`.
+        """
+        forward = self._frame_rows(q, x, errors)
         return np.asarray(np.einsum("...ij,...j->...i", forward, self._rows(v, self._nv, "v")))
 
     # From the actuators ---------------------------------------------------------------------------
@@ -498,10 +534,10 @@ class TaskMaps:
         J = system.scaled(self._by_actuators.jacobian(q))
         _, values, right = np.linalg.svd(J)
         N = np.swapaxes(right[..., self._rank :, :], -1, -2)
-        A = self._frame_rows(q, "raise") * system.column_scale / self._units[:, None]
+        A = self._frame_rows(q, None, "raise") * system.column_scale / self._units[:, None]
         return A @ N, N[..., self._actuated, :], values
 
-    def _frame_rows(self, q: ArrayLike, errors: Errors) -> Array:
+    def _frame_rows(self, q: ArrayLike, x: ArrayLike | None, errors: Errors) -> Array:
         """Return A, shape (..., m, nv): x' = A v."""
         q_ = self._rows(q, self._nq, "q")
         found = np.zeros((*q_.shape[:-1], self.size, self._nv))
@@ -510,21 +546,26 @@ class TaskMaps:
             columns = [model.joints[model.getJointId(name)].idx_v for name in names]
             found[..., range(self.size), columns] = 1.0
             return found
-        J = self._by_task.jacobian(self._whole(q_, errors), **options_of(errors))
+        J = self._by_task.jacobian(self._whole(q_, x, errors), **options_of(errors))
         return np.asarray(-J[..., self._x.rows, : self._nv])
 
-    def _basis(self, q: ArrayLike, errors: Errors) -> Array:
+    def _basis(self, q: ArrayLike, x: ArrayLike | None, errors: Errors) -> Array:
         """Return T of the extended mechanism: v = T x', shape (..., nv + m, m)."""
         q_ = self._rows(q, self._nq, "q")
-        whole = self._whole(q_, errors)
+        whole = self._whole(q_, x, errors)
         return np.asarray(self._by_task.motion_basis(whole, **options_of(errors)))
 
     def _motion(
-        self, q: ArrayLike, rate: ArrayLike, acceleration: ArrayLike, errors: Errors
+        self,
+        q: ArrayLike,
+        rate: ArrayLike,
+        acceleration: ArrayLike,
+        x: ArrayLike | None,
+        errors: Errors,
     ) -> tuple[Array, Array, Array]:
         """Return q and, of the extended mechanism, v and a."""
         q_ = self._rows(q, self._nq, "q")
-        whole, options = self._whole(q_, errors), options_of(errors)
+        whole, options = self._whole(q_, x, errors), options_of(errors)
         rate_ = self._rows(rate, self.size, "rate")
         acceleration_ = self._rows(acceleration, self.size, "acceleration")
         v = self._by_task.velocity(whole, rate_, **options)
@@ -541,9 +582,9 @@ class TaskMaps:
             return q_
         return PinocchioEngine(self.mechanism).closed(q_, errors)
 
-    def _whole(self, q: Array, errors: Errors) -> Array:
-        """Return configurations of the extended mechanism."""
-        return self.joined(q, self.at(q, errors=errors)) if self._x.added else q
+    def _whole(self, q: Array, x: ArrayLike | None, errors: Errors) -> Array:
+        """Return configurations of the extended mechanism, with rotation vectors near x."""
+        return self.joined(q, self.at(q, x, errors=errors)) if self._x.added else q
 
     def joined(self, q: Array, x: Array) -> Array:
         """Return configurations of the extended mechanism, with the frame's coordinates in them."""

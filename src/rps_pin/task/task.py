@@ -74,7 +74,12 @@ class Task(TaskMaps):
     # Forces ---------------------------------------------------------------------------------------
 
     def forces_to_actuators(
-        self, q: ArrayLike, forces: ArrayLike, *, errors: Errors = "raise"
+        self,
+        q: ArrayLike,
+        forces: ArrayLike,
+        *,
+        x: ArrayLike | None = None,
+        errors: Errors = "raise",
     ) -> Array:
         """Return the actuators' forces that make forces of the task, shape (..., na), N or N m.
 
@@ -87,6 +92,8 @@ class Task(TaskMaps):
         forces
             f, shape (..., m): the power is f . x'. Those of a rotation vector are moments about the
             axes only where it is zero; for moments use `wrench_to_actuators`.
+        x
+            As for `jacobian`.
 
         Raises
         ------
@@ -95,12 +102,21 @@ class Task(TaskMaps):
         SingularityError
             If the actuators do not determine the task here (type II).
         """
-        K = self._gain(q, errors)
+        K = self._gain(q, x, errors)
         f = self._rows(forces, self.size, "forces")
         return self._carried(K, f, errors)
 
-    def forces_to_task(self, q: ArrayLike, tau: ArrayLike, *, errors: Errors = "raise") -> Array:
+    def forces_to_task(
+        self,
+        q: ArrayLike,
+        tau: ArrayLike,
+        *,
+        x: ArrayLike | None = None,
+        errors: Errors = "raise",
+    ) -> Array:
         """Return the task's forces f = K' tau of actuators' forces (..., na), shape (..., m).
+
+        `x` is that of `jacobian`.
 
         Raises
         ------
@@ -108,7 +124,7 @@ class Task(TaskMaps):
             If the loops are open.
         """
         tau_ = self._rows(tau, self._actuated.size, "tau")
-        return np.asarray(np.einsum("...ij,...i->...j", self._gain(q, errors), tau_))
+        return np.asarray(np.einsum("...ij,...i->...j", self._gain(q, x, errors), tau_))
 
     def actuator_forces(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, *, errors: Errors = "raise"
@@ -134,10 +150,13 @@ class Task(TaskMaps):
         )
         return np.asarray(self._by_actuators.inverse_dynamics(*state, **options_of(errors)).tau)
 
-    def twist_map(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
+    def twist_map(
+        self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise"
+    ) -> Array:
         """Return E, shape (..., 6, m): the output frame's twist is E x'.
 
-        (linear, angular) of the frame's origin in world axes, m/s and rad/s.
+        (linear, angular) of the frame's origin in world axes, m/s and rad/s. Arguments are those of
+        `jacobian`.
 
         Raises
         ------
@@ -149,7 +168,7 @@ class Task(TaskMaps):
                 "a task of joints has no output frame; name one: Task(mechanism, frame=...)"
             )
         q_ = self._rows(q, self._nq, "q")
-        basis = self._basis(q_, errors)[..., : self._nv, :]
+        basis = self._basis(q_, x, errors)[..., : self._nv, :]
         batch = np.broadcast_shapes(q_.shape[:-1], basis.shape[:-2])
         found = np.empty((*batch, 6, self.size))
         for index in np.ndindex(batch):
@@ -186,6 +205,7 @@ class Task(TaskMaps):
         gains: ArrayLike,
         *,
         forces: ArrayLike | None = None,
+        x: ArrayLike | None = None,
         errors: Errors = "raise",
     ) -> Array:
         """Return stiffness or damping of the actuators that gives the task's, (..., na, na).
@@ -202,6 +222,8 @@ class Task(TaskMaps):
         forces
             The actuators' forces tau there, shape (..., na); zero if left out. For damping leave
             them out.
+        x
+            As for `jacobian`.
 
         Raises
         ------
@@ -212,10 +234,10 @@ class Task(TaskMaps):
         MechanismError
             If there are more actuators than coordinates: their gains are not determined.
         """
-        K = self._square(q, errors)
+        K = self._square(q, x, errors)
         wanted = self._matrix(gains, self.size, "gains")
         if forces is not None:
-            wanted = wanted - self._geometric(q, forces, errors)
+            wanted = wanted - self._geometric(q, forces, x, errors)
         half = np.swapaxes(self._solved(np.swapaxes(K, -1, -2), wanted, errors), -1, -2)
         return np.swapaxes(self._solved(np.swapaxes(K, -1, -2), half, errors), -1, -2)
 
@@ -225,20 +247,26 @@ class Task(TaskMaps):
         gains: ArrayLike,
         *,
         forces: ArrayLike | None = None,
+        x: ArrayLike | None = None,
         errors: Errors = "raise",
     ) -> Array:
         """Return stiffness or damping of the task that the actuators' gives, (..., m, m).
 
         K' G_a K + sum_i tau_i H_i; see `gains_to_actuators`. ``gains`` are (..., na, na) or (na,).
         """
-        K = self._gain(q, errors)
+        K = self._gain(q, x, errors)
         found = np.swapaxes(K, -1, -2) @ self._matrix(gains, self._actuated.size, "gains") @ K
-        return found if forces is None else found + self._geometric(q, forces, errors)
+        return found if forces is None else found + self._geometric(q, forces, x, errors)
 
-    def mass_matrix(self, q: ArrayLike, *, errors: Errors = "raise") -> Array:
-        """Return the task's mass matrix, shape (..., m, m): the kinetic energy is x' M x' / 2."""
+    def mass_matrix(
+        self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise"
+    ) -> Array:
+        """Return the task's mass matrix, shape (..., m, m): the kinetic energy is x' M x' / 2.
+
+        Arguments are those of `jacobian`.
+        """
         q_ = self._rows(q, self._nq, "q")
-        whole = self._whole(q_, errors)
+        whole = self._whole(q_, x, errors)
         return np.asarray(self._by_task.mass_matrix(whole, **options_of(errors)))
 
     # Polytopes ------------------------------------------------------------------------------------
@@ -276,7 +304,7 @@ class Task(TaskMaps):
         if used is not None:
             taken = self._rows(used, self._actuated.size, "used")
             lower, upper = lower - taken, upper - taken
-        K = self._gain(self._one(q), "raise")
+        K = self._gain(self._one(q), None, "raise")
         return polytope.of_forces(K, lower, upper, 1 / self._units)
 
     def speed_polytope(
@@ -334,13 +362,13 @@ class Task(TaskMaps):
 
     # Parts ----------------------------------------------------------------------------------------
 
-    def _gain(self, q: ArrayLike, errors: Errors) -> Array:
+    def _gain(self, q: ArrayLike, x: ArrayLike | None, errors: Errors) -> Array:
         """Return K for forces, which open loops have none of."""
         q_ = self._closed(q, errors)
         gone = np.isnan(q_[..., :1])
         if not gone.any():
-            return self.jacobian(q_, errors=errors)
-        K = self.jacobian(np.where(gone, self.mechanism.home, q_), errors=errors)
+            return self.jacobian(q_, x=x, errors=errors)
+        K = self.jacobian(np.where(gone, self.mechanism.home, q_), x=x, errors=errors)
         return np.where(gone[..., None], np.nan, K)
 
     def _frame_jacobian(self, q: Array) -> Array:
@@ -374,18 +402,20 @@ class Task(TaskMaps):
             )
         return found
 
-    def _geometric(self, q: ArrayLike, forces: ArrayLike, errors: Errors) -> Array:
+    def _geometric(
+        self, q: ArrayLike, forces: ArrayLike, x: ArrayLike | None, errors: Errors
+    ) -> Array:
         """Return sum_i tau_i H_i, shape (..., m, m)."""
         tau = self._rows(forces, self._actuated.size, "forces")
-        return np.asarray(np.einsum("...ijk,...i->...jk", self.hessian(q, errors=errors), tau))
+        return np.asarray(np.einsum("...ijk,...i->...jk", self.hessian(q, x=x, errors=errors), tau))
 
-    def _square(self, q: ArrayLike, errors: Errors) -> Array:
+    def _square(self, q: ArrayLike, x: ArrayLike | None, errors: Errors) -> Array:
         if self._actuated.size != self.size:
             raise MechanismError(
                 f"{self._actuated.size} actuators have no determined gains of {self.size} "
                 "coordinates"
             )
-        return self._gain(q, errors)
+        return self._gain(q, x, errors)
 
     def _carried(self, K: Array, f: Array, errors: Errors) -> Array:
         """Return tau with K' tau = f, of least norm in one unit."""

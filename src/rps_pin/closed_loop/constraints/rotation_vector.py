@@ -65,11 +65,13 @@ def rotation_vector(rotation: Array, near: Array | None = None) -> Array:
 
     Components of `near` that are NaN do not count.
     """
-    r: Array = pin.log3(rotation)
-    if near is None:
-        return r
-    angle = math.sqrt(r @ r)
-    if angle < 1e-8:  # the other one has no direction
+    # By the quaternion (x, y, z, w): log3's own formulas lose digits near half a turn.
+    quaternion = pin.Quaternion(rotation).coeffs()
+    sine, cosine = quaternion[:3], quaternion[3]
+    length = math.sqrt(sine @ sine)
+    angle = 2 * math.atan2(length, abs(cosine))
+    r: Array = sine * math.copysign(angle / length if length > 0 else 2.0, cosine)
+    if near is None or angle < 1e-8:  # the other one has no direction
         return r
     other: Array = r * (1 - 2 * math.pi / angle)
     counts = np.isfinite(near)

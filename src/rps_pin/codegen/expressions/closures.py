@@ -343,8 +343,12 @@ def _coordinates(tree: Tree, chains: Chains, ends: _Ends, closure: FrameCoordina
 
 def _nearer_vector(rotation: Expression, near: Expression, chosen: Expression) -> Expression:
     """Return the rotation vector whose chosen components are nearer: r, or r less a whole turn."""
-    r = -_turn_between(ca.SX.eye(3), rotation)[0]
-    angle = ca.sqrt(ca.fmax(ca.sumsqr(r), _TINY**2))
+    x, y, z, w = ca.vertsplit(_quaternion(rotation))
+    sine = ca.vertcat(x, y, z) * ca.copysign(1, w)
+    length = ca.sqrt(ca.sumsqr(sine))
+    shorter = length < _TINY  # beside w, which is 1 at least where it is the largest
+    angle = 2 * ca.atan2(length, ca.fabs(w))
+    r = ca.if_else(shorter, 2 / ca.fmax(ca.fabs(w), 1), angle / ca.fmax(length, _TINY)) * sine
     other = r * (1 - 2 * np.pi / angle)
     nearer = ca.sumsqr(chosen @ other - near) < ca.sumsqr(chosen @ r - near)
     return ca.if_else(nearer, other, r)
@@ -424,6 +428,23 @@ def _rotation_vector(sine: Expression, cosine: Expression, otherwise: Expression
     sine = sine + _TINY * backward * otherwise
     length = ca.sqrt(ca.sumsqr(sine) + _TINY**2 * (1 - backward))
     return ca.atan2(length, cosine) / length * sine
+
+
+def _quaternion(rotation: Expression) -> Expression:
+    """Return a multiple of (x, y, z, w), from the largest of them: so no digits are lost."""
+    (a, d, g), (b, e, h), (c, f, i) = (ca.vertsplit(one) for one in ca.horzsplit(rotation))
+    columns = [
+        ca.vertcat(1 + a - e - i, b + d, c + g, h - f),
+        ca.vertcat(b + d, 1 - a + e - i, f + h, c - g),
+        ca.vertcat(c + g, f + h, 1 - a - e + i, d - b),
+        ca.vertcat(h - f, c - g, d - b, 1 + a + e + i),
+    ]
+    found, square = columns[3], columns[3][3]
+    for k in range(3):
+        larger = columns[k][k] > square
+        found = ca.if_else(larger, columns[k], found)
+        square = ca.fmax(square, columns[k][k])
+    return found
 
 
 _KINDS: dict[str, Callable[[Chains, _Ends, LoopClosure], _Rows]] = {

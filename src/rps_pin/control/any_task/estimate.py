@@ -267,7 +267,7 @@ class TaskEstimate(LastGood):
             return self._fitted(d, speeds, last)
         q = task.configuration_of(d, last.configuration, within_limits=False)
         geometry = self.geometry_of(q, last.pose)
-        rate = task.rate(q, task.velocity_of(q, speeds))
+        rate = task.rate(q, task.velocity_of(q, speeds), x=geometry.pose)
         if not np.isfinite(rate).all():
             return None
         return TaskMotion(geometry, rate, speeds, self._jacobian(geometry))
@@ -279,7 +279,7 @@ class TaskEstimate(LastGood):
         """
         task, x, q = self.task, last.pose, last.configuration
         for _ in range(_FITTING_STEPS):
-            step = self.least_rate(task.jacobian(q), d - q[task.of_actuators])
+            step = self.least_rate(task.jacobian(q, x=x), d - q[task.of_actuators])
             x = x + step
             q = task.configuration(x, q, within_limits=False)
             if (np.abs(step) * task.scale).max() < _FITTED * task.characteristic_length:
@@ -313,7 +313,7 @@ class TaskEstimate(LastGood):
         )
 
     def _jacobian(self, geometry: TaskGeometry) -> TaskJacobian:
-        K = self.task.jacobian(geometry.configuration)
+        K = self.task.jacobian(geometry.configuration, x=geometry.pose)
         return TaskJacobian(K, geometry.side * geometry.distance)
 
     def beyond(self, q: Array) -> bool:

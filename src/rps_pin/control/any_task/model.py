@@ -106,7 +106,7 @@ class TaskModel:
         if geometry is None:
             return None
         try:
-            K = self.task.jacobian(geometry.configuration)
+            K = self.task.jacobian(geometry.configuration, x=geometry.pose)
         except REFUSED:
             return None
         jacobian = TaskJacobian(K, self.determinant(geometry))
@@ -151,7 +151,8 @@ class TaskModel:
         """Return the actuators' speeds and accelerations, NaN if they are not determined."""
         indices = self.task.mechanism.actuated_indices
         try:
-            state = self.task.motion(geometry.configuration, rate, acceleration)
+            q, x = geometry.configuration, geometry.pose
+            state = self.task.motion(q, rate, acceleration, x=x)
         except REFUSED:
             unknown = np.full(self.actuators, np.nan)
             return unknown, unknown
@@ -160,14 +161,15 @@ class TaskModel:
     def forces(self, geometry: TaskGeometry, rate: Array, acceleration: Array) -> Array | None:
         """Return the actuator forces of a motion, None if they are not determined."""
         try:
-            state = self.task.motion(geometry.configuration, rate, acceleration)
+            q, x = geometry.configuration, geometry.pose
+            state = self.task.motion(q, rate, acceleration, x=x)
             return self.task.actuator_forces(*state)
         except REFUSED:
             return None
 
     def mass(self, geometry: TaskGeometry) -> Array:
         """Return the task's mass matrix."""
-        return self.task.mass_matrix(geometry.configuration)
+        return self.task.mass_matrix(geometry.configuration, x=geometry.pose)
 
     def pose_rate(self, jacobian: TaskJacobian, speed: Array) -> Array:
         """Return x' of K x' = the actuators' speeds, NaN if it is not determined."""

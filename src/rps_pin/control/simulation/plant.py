@@ -173,7 +173,7 @@ class Plant(DeepCopied):
     @property
     def rate(self) -> Array:
         """Time derivative of the pose, shape (m,)."""
-        return self._task.rate(self._stepper.q, self._stepper.v)
+        return self._task.rate(self._stepper.q, self._stepper.v, x=self._pose)
 
     @property
     def gap(self) -> float:

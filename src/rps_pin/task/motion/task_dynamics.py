@@ -164,7 +164,7 @@ class TaskDynamics(CurveDynamics):
         x = self.curve.at(u)
         nearest = np.rint(u / self.curve.length * (_ANCHORS - 1)).astype(np.intp)
         q = self.task.configuration(x.pose, self._anchors[nearest])
-        _, velocity, acceleration = self.task.motion(q, x.first, x.second)
+        _, velocity, acceleration = self.task.motion(q, x.first, x.second, x=x.pose)
         wrench = np.zeros((u.size, self._actuated.size))
         if self.wrench is not None:
             wrench = -self.task.wrench_to_actuators(q, self.wrench)

@@ -223,7 +223,7 @@ class TaskSignals:
         else:
             before = np.searchsorted(self._times, times, side="right") - 1
             q = self.task.configuration(pose, self._q[before], within_limits=False)
-        return pose, rate, self.task.motion(q, rate, acceleration)
+        return pose, rate, self.task.motion(q, rate, acceleration, x=pose)
 
     def _motion(self, times: Array) -> tuple[Array, Array, Array]:
         found, size = self._trajectory.sample(times), self.task.size

@@ -70,6 +70,7 @@ def force_causes(
     rate: ArrayLike,
     acceleration: ArrayLike,
     *,
+    x: ArrayLike | None = None,
     payload: Payload | None = None,
     wrench: ArrayLike | None = None,
 ) -> TaskForceCauses:
@@ -106,7 +107,7 @@ def force_causes(
         )
     loads.refuse_other_count(len(q_))
     zero = np.zeros_like(dx)
-    states = [task.motion(q_, *one) for one in ((dx, ddx), (zero, ddx), (zero, zero))]
+    states = [task.motion(q_, *one, x=x) for one in ((dx, ddx), (zero, ddx), (zero, zero))]
     with_joints = task.mechanism
     bodies = _without_joint_forces(with_joints)
     found = np.empty((len(fields(TaskForceCauses)), len(q_), task.mechanism.actuated_indices.size))

@@ -104,7 +104,7 @@ def run_motion(
     check = require_clear(task, trajectory, near)
     motion = trajectory.sample(time)
     q = task.follow(motion.pose, near, within_limits=False)
-    state = task.motion(q, motion.rate, motion.acceleration)
+    state = task.motion(q, motion.rate, motion.acceleration, x=motion.pose)
     return solved(task, time, (motion.pose, motion.rate, motion.acceleration), state, loads, check,
                   progress)  # fmt: skip
 

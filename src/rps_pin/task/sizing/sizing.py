@@ -170,7 +170,7 @@ def size_motion(
     given = {"pose": pose, "rate": rate, "acceleration": acceleration}
     x, dx, ddx = (samples(one, name, len(times), task.size) for name, one in given.items())
     loads.refuse_other_count(len(times))
-    state = task.motion(task.follow(x, near), dx, ddx)
+    state = task.motion(task.follow(x, near), dx, ddx, x=x)
     motion = solved(task, times, (x, dx, ddx), state, loads, None)
     return sheet_of(task, motion, limits, threshold)
 
