@@ -85,7 +85,7 @@ def ankle() -> str:
     """
     foot = (shape("box", (0.2, 0.08, 0.02), "dark", (0.03, 0.0, -0.05)),)
     parts = [
-        link("shin", shape("cylinder", (0.025, 0.3), "steel", (0.0, 0.0, 0.17))),
+        link("shin", shape("cylinder", (0.012, 0.3), "steel", (0.0, 0.0, 0.17))),
         link(
             "cross",
             shape("sphere", (0.015,), "brass"),
