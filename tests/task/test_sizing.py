@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import cache
 from typing import Any
 
@@ -87,7 +88,13 @@ def test_up_and_down_on_three_upright_legs() -> None:
         assert margins["force"].kept and not margins["speed"].kept
     assert not sheet.kept
     assert "BROKEN: speed" in sheet.text(140)
-    assert "stroke (m)" in sheet.text(140)
+    assert re.search(r" stroke .*\n.* \(m\) ", sheet.text(140))
+    # In the width of a terminal no digit and no column is cut off.
+    for row in sheet.text(80).splitlines():
+        assert len(row) <= 80, row
+    for actuator in sheet.actuators:
+        assert f"{actuator.force_rms:.4g}" in sheet.text(80)
+        assert f"{actuator.stroke:.4g}" in sheet.text(80)
     data = json.loads(json.dumps(sheet.as_dict(), allow_nan=False))
     assert data["actuators"][1]["name"] == "leg_2_prismatic"
     assert data["actuators"][0]["margins"][3]["limit"] is None

@@ -117,6 +117,8 @@ def table_of(
 ) -> Table:
     """Return a table of rows, some columns aligned to the right; without headers, none is shown."""
     table = Table(*headers, show_header=bool(headers), **options)
+    for column in table.columns:  # rather than numbers without their last digits
+        column.overflow = "fold"
     for column in table.columns[right]:
         column.justify = "right"
     for row in rows:

@@ -86,8 +86,8 @@ def dynamics_of_task(
         common.print_json(answer | {"sizing": sheet.as_dict(), "files": files})
         return
     console.print(plain(f"{model.name}, {trajectory}: {path.duration:.6g} s"))
-    console.print(sheet.table())
-    console.print(sheet.joint_table())
+    for table in sheet.tables():
+        console.print(table)
     common.print_files(console, files)
 
 

@@ -57,38 +57,57 @@ class TaskSizing(SizingSheet):
 
     def table(self) -> Table:
         """Return the sheet as a table for a terminal, a row for each actuator."""
-        table = Table(title="Actuator sizing")
-        turning = {actuator.angular for actuator in self.actuators}
-        force, speed, position = (
-            ", ".join(dict.fromkeys(UNITS[int(turns)][k] for turns in sorted(turning))).replace(
-                "rad", self.actuators[0].angle_unit
-            )
-            for k in range(3)
-        )
-        table.add_column("", min_width=max(len(one.name) for one in self.actuators))
-        for heading in (
-            *(f"peak force ({force})", f"RMS force ({force})", f"peak speed ({speed})"),
-            *("peak power (W)", "driven (J)", "regen. (J)", f"stroke ({position})", "limits"),
-        ):
-            table.add_column(heading, justify="right")
+        force, speed, _ = self._units()
+        headings = f"peak force ({force})", f"RMS force ({force})", f"peak speed ({speed})"
+        table = _table("Actuator sizing", *headings, "peak power (W)", "limits")
         for one in self.actuators:
-            numbers = (
-                *(one.force_peak, one.force_rms, one.speed_peak, one.power_peak),
-                *(one.energy_driven, one.energy_regenerated, one.stroke),
-            )
+            numbers = one.force_peak, one.force_rms, one.speed_peak, one.power_peak
             broken = [margin.quantity for margin in one.margins if not margin.kept]
             limits = Text(f"BROKEN: {', '.join(broken)}", style="bold red") if broken else "kept"
             table.add_row(one.name, *(f"{value:.4g}" for value in numbers), limits)
         return table
 
+    def tables(self) -> tuple[Table, ...]:
+        """Return the tables for a terminal: actuators, their energies, joints."""
+        return self.table(), self.energy_table(), self.joint_table()
+
+    def energy_table(self) -> Table:
+        """Return energies and strokes as a table for a terminal, a row for each actuator."""
+        headings = "driven (J)", "regenerated (J)", f"stroke ({self._units()[2]})"
+        table = _table("Energy and stroke", *headings)
+        for one in self.actuators:
+            numbers = one.energy_driven, one.energy_regenerated, one.stroke
+            table.add_row(one.name, *(f"{value:.4g}" for value in numbers))
+        return table
+
     def joint_table(self) -> Table:
         """Return the loads of the joints as a table for a terminal."""
-        table = Table(title="Joint loads")
-        for heading in ("", "peak force (N)", "at (s)", "peak moment (N m)", "at (s)"):
-            table.add_column(heading, justify="right" if heading else "left")
+        headings = "peak force (N)", "at (s)", "peak moment (N m)", "at (s)"
+        table = _table("Joint loads", *headings)
         for one in self.joints:
             table.add_row(one.name, *(f"{value:.4g}" for value in one[2:]))
         return table
+
+    def _units(self) -> tuple[str, ...]:
+        """Return the units of the actuators' forces, speeds and positions."""
+        turning = sorted({actuator.angular for actuator in self.actuators})
+        unit = self.actuators[0].angle_unit
+        return tuple(
+            ", ".join(UNITS[int(turns)][k] for turns in turning).replace("rad", unit)
+            for k in range(3)
+        )
+
+
+def _table(title: str, *headings: str) -> Table:
+    """Return an empty table with a first column of names, units below the other headings.
+
+    Where a terminal is too small for it, it folds cells rather than cut numbers off.
+    """
+    table = Table(title=title)
+    table.add_column("", overflow="fold")
+    for heading in headings:
+        table.add_column(heading.replace(" (", "\n("), justify="right", overflow="fold")
+    return table
 
 
 @refuses_other_kinds

@@ -229,7 +229,7 @@ class SizingSheet:
         table = Table(title="Actuator sizing")
         table.add_column("")
         for actuator in self.actuators:
-            table.add_column(f"actuator {actuator.actuator}", justify="right")
+            table.add_column(f"actuator {actuator.actuator}", justify="right", overflow="fold")
         for label, name in _ROWS.items():
             table.add_row(label, *(f"{getattr(each, name):.4g}" for each in self.actuators))
         label = f"time above {self.threshold:.0%} of peak force"
@@ -246,12 +246,17 @@ class SizingSheet:
                 table.add_row(label, *cells)
         return table
 
+    def tables(self) -> tuple[Table, ...]:
+        """Return the tables for a terminal."""
+        return (self.table(),)
+
     def text(self, width: int = 100) -> str:
-        """Return the table as plain text."""
+        """Return the tables as plain text."""
         written = io.StringIO()
         # In a notebook, a console would show what it prints there, and write nothing.
         console = Console(file=written, width=width, color_system=None, force_jupyter=False)
-        console.print(self.table())
+        for table in self.tables():
+            console.print(table)
         return written.getvalue()
 
     def __str__(self) -> str:
