@@ -77,8 +77,8 @@ def _spoilt(cells: list[list[str]], rng: Random) -> str:
     if kind == 0:
         if cells[0][column] not in [*_HEADER, *_RATES]:
             return ""
-        cells[0][column] = hostile.misspelt(cells[0][column], rng)
-        return "a misspelt column"
+        cells[0][column] = name = hostile.misspelt(cells[0][column], rng)
+        return "" if name == "z_mm" else "a misspelt column"  # a metre that became a millimetre
     if kind == 1:
         cells[row][column] = rng.choice([one for one in hostile.NO_NUMBERS if "," not in one])
         return "a number that is none"

@@ -32,6 +32,7 @@ from rps_pin.errors import (
     shown,
 )
 from rps_pin.one_thread import TickGuard, guarded
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task import SingularityMeasures, Task
 from rps_pin.validation import numbers, positive_number, real_vector
 
@@ -98,6 +99,7 @@ class TaskEstimate(LastGood):
         If the coordinates are out of reach, or the mechanism is singular there.
     """
 
+    @refuses_other_kinds
     def __init__(
         self,
         task: Task,
@@ -138,6 +140,7 @@ class TaskEstimate(LastGood):
         self.generated: GeneratedTick | None = None
         self.reset(near)
 
+    @refuses_other_kinds
     def reset(self, near: ArrayLike) -> None:
         """Start again from a pose, at rest. Raises as the constructor does."""
         x = real_vector(near, self.task.size, "near")

@@ -17,6 +17,7 @@ from functools import partial
 from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError, shown
+from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.dynamics.loads import checked_wrench
 from rps_pin.rps.motion.curve_dynamics import CurveDynamics
 from rps_pin.rps.motion.curve_refusal import ends_at_rest, infeasible, require_clear_curve
@@ -32,6 +33,7 @@ from rps_pin.validation import whole_number
 __all__ = ["INTERVALS", "KEPT", "time_optimal"]
 
 
+@refuses_other_kinds
 def time_optimal(
     robot: RPSRobot,
     path: Curve | Trajectory,
