@@ -20,7 +20,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from benchmarks.latency import STATES, motion
-from benchmarks.tasks import ByHand
+from benchmarks.task_peers import ByHand, Pinocchio
 from benchmarks.timing import medians
 from rps_pin import ClosedLoopModel, RPSRobot, Task
 from rps_pin.control import ComputedTorque, Gains, Status
@@ -37,17 +37,21 @@ class HandTick(ByHand):
     """Computed torque of the actuators."""
 
     def __init__(self, task: Task) -> None:
-        super().__init__(task)
-        self.q = task.mechanism.home
-        rest = np.setdiff1d(np.arange(self.model.nv), self.actuated)
-        self.passive = rest
+        super().__init__(task, Pinocchio)
+        self.task, self.q, self.model = task, task.mechanism.home, task.mechanism.model
+        self.data, frame = self.model.createData(), self.model.getFrameId
+        self.passive = np.setdiff1d(np.arange(self.model.nv), self.driven)
+        self.ends = [
+            (frame(one.frame_a), frame(one.frame_b), one.distance)
+            for one in task.mechanism.closures
+        ]
 
     def __call__(self, position: Array, speed: Array, goal: tuple[Array, Array, Array]) -> Array:
-        model, data, active, passive = self.model, self.data, self.actuated, self.passive
+        model, data, active, passive = self.model, self.data, self.driven, self.passive
         q, step = self.q.copy(), np.zeros(model.nv)
         q[self.of_actuators] = position
         while True:
-            gaps, rows = self.rows(q)
+            gaps, rows = self.closures(q)
             gap, J = np.concatenate(gaps), np.vstack(rows)
             if np.abs(gap).max() < 1e-12:
                 break
@@ -67,13 +71,30 @@ class HandTick(ByHand):
         multipliers = np.linalg.lstsq(J[:, passive].T, force[passive], rcond=None)[0]
         return force[active] - J[:, active].T @ multipliers
 
+    def closures(self, q: Array) -> tuple[list[Array], list[Array]]:
+        """Gaps and rows of the closures at q, by Pinocchio's frames."""
+        model, data, axes = self.model, self.data, pin.LOCAL_WORLD_ALIGNED
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        gaps, rows = [], []
+        for a, b, distance in self.ends:
+            e = data.oMf[a].translation - data.oMf[b].translation
+            J = pin.getFrameJacobian(model, data, a, axes)[:3]
+            J = J - pin.getFrameJacobian(model, data, b, axes)[:3]
+            if distance is not None:
+                length = np.sqrt(e @ e)
+                e, J = np.array([length - distance]), ((e / length) @ J)[None]
+            gaps.append(e)
+            rows.append(J)
+        return gaps, rows
+
     def drift(self, q: Array, v: Array) -> Array:
         """The closures' acceleration where no joint accelerates."""
         model, data, axes = self.model, self.data, pin.LOCAL_WORLD_ALIGNED
         pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
         pin.updateFramePlacements(model, data)
         found: list[Any] = []
-        for a, b, distance in self.pairs:
+        for a, b, distance in self.ends:
             of = pin.getFrameClassicalAcceleration
             drift = of(model, data, a, axes).linear - of(model, data, b, axes).linear
             if distance is not None:
