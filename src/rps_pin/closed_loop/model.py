@@ -436,7 +436,7 @@ class ClosedLoopModel:
         """Return distances of the pairs of links that are checked, for many configurations.
 
         Checked are links of different bodies that neither a joint nor a closure connects; see
-        `rps_pin.closed_loop.interference.pairs`.
+        ``rps_pin.closed_loop.interference.pairs``.
 
         Parameters
         ----------
