@@ -239,11 +239,9 @@ class ByHand:
             p, _, J = self.tree.frame(a)
             other, _, J_other = self.tree.frame(b)
             e, J = p - other, J[:3] - J_other[:3]
-            if distance is not None:
-                length = np.sqrt(e @ e)
-                e, J = np.array([length - distance]), ((e / length) @ J)[None]
-            gaps.append(e)
-            rows.append(J)
+            gap, row = gap_and_rows(e, J, distance)
+            gaps.append(gap)
+            rows.append(row)
         return gaps, rows
 
     def coordinates(self, q: Array) -> tuple[Array, Array]:
@@ -288,6 +286,14 @@ class ByHand:
         right = np.zeros((len(matrix), self.size))
         right[-self.size :] = np.eye(self.size)
         return solved(matrix, right)[self.driven]
+
+
+def gap_and_rows(e: Array, J: Array, distance: float | None) -> tuple[Array, Array]:
+    """Return gap and rows of a point, of offset e and rows J (3, nv), or of a rod so long."""
+    if distance is None:
+        return e, J
+    length = np.sqrt(e @ e)
+    return np.array([length - distance]), ((e / length) @ J)[None]
 
 
 def solved(matrix: Array, right: Array) -> Array:

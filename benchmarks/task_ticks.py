@@ -20,7 +20,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from benchmarks.latency import STATES, motion
-from benchmarks.task_peers import ByHand, Pinocchio
+from benchmarks.task_peers import ByHand, Pinocchio, gap_and_rows
 from benchmarks.timing import medians
 from rps_pin import ClosedLoopModel, RPSRobot, Task
 from rps_pin.control import ComputedTorque, Gains, Status
@@ -81,11 +81,9 @@ class HandTick(ByHand):
             e = data.oMf[a].translation - data.oMf[b].translation
             J = pin.getFrameJacobian(model, data, a, axes)[:3]
             J = J - pin.getFrameJacobian(model, data, b, axes)[:3]
-            if distance is not None:
-                length = np.sqrt(e @ e)
-                e, J = np.array([length - distance]), ((e / length) @ J)[None]
-            gaps.append(e)
-            rows.append(J)
+            gap, row = gap_and_rows(e, J, distance)
+            gaps.append(gap)
+            rows.append(row)
         return gaps, rows
 
     def drift(self, q: Array, v: Array) -> Array:

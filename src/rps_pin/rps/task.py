@@ -144,15 +144,16 @@ class RPSTask(Task):
         errors: Errors = "raise",
     ) -> TaskState:
         """Return q, v and a at configurations, within limits or not; see `Task.motion`."""
-        x, dx, ddx = checked_motion(self.at(q), rate, acceleration)
+        pose, dx, ddx = checked_motion(self.at(q), rate, acceleration)
         p = self._robot.parameters
-        of_pose = legs_of_pose(x, p.base_radius, p.platform_radius)
+        of_pose = legs_of_pose(pose, p.base_radius, p.platform_radius)
         gone = of_pose.geometry.vanishing.any(axis=-1, keepdims=True)
         if errors == "mask" and gone.any():
-            x = np.where(gone, self.home, x)
-            of_pose = legs_of_pose(x, p.base_radius, p.platform_radius)
-        legs = leg_motion(x, dx, ddx, p.platform_radius, p.base_radius, of_pose)
-        found = self._robot.state_of(x, platform_motion(x, dx, ddx, p.platform_radius), legs)
+            pose = np.where(gone, self.home, pose)
+            of_pose = legs_of_pose(pose, p.base_radius, p.platform_radius)
+        legs = leg_motion(pose, dx, ddx, p.platform_radius, p.base_radius, of_pose)
+        moved = platform_motion(pose, dx, ddx, p.platform_radius)
+        found = self._robot.state_of(pose, moved, legs)
         return TaskState(*(np.where(gone, np.nan, part) for part in found))
 
     def position_limits(self) -> RobotLimits:

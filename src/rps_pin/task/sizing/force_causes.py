@@ -84,6 +84,9 @@ def force_causes(
         Closed configurations, shape (n, nq): `Task.follow` of the coordinates.
     rate, acceleration
         x' and x'', shape (n, m) each.
+    x
+        The coordinates, shape (n, m), that decide between two rotation vectors: see
+        `Task.jacobian`.
     payload, wrench
         Fixed to, and exerted on, the output frame: see `Loads`.
 
