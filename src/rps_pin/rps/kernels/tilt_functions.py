@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from rps_pin.numerics.elementary import Number, cos, is_real_array, less, select, sin, sqrt
+from rps_pin.numerics.intervals import Enclosure, Interval, is_enclosing
 
 #: A, B, C, D, dA/ds, dB/ds, dD/ds, d2A/ds2, d2B/ds2.
 TiltFunctions = tuple[Number, Number, Number, Number, Number, Number, Number, Number, Number]
@@ -23,6 +24,10 @@ _Stumpff = tuple[Number, Number, Number, Number, Number, Number, Number]
 
 #: Below this s the series are summed, exact to rounding; above, the recursion from c_0 and c_1 is.
 _SERIES_BELOW = 4.0
+#: Least upper bound, rounded up, of the error of the summed series: 40 roundings, each of at most
+#: 2^-53 of sum_k s^k / (2 k)! = cosh(2), and what is left out, below 1e-19 (Horner's rule; Higham,
+#: Accuracy and Stability of Numerical Algorithms, section 5.1).
+_ROUNDING = 2e-14
 #: Terms of c_5 and c_6, from the last to the second.
 _TERMS = tuple(
     ((-1.0) ** k / math.factorial(2 * k + 5), (-1.0) ** k / math.factorial(2 * k + 6))
@@ -32,12 +37,44 @@ _TERMS = tuple(
 
 def tilt_functions(s: Number) -> TiltFunctions:
     """Return A, B, C, D, dA/ds, dB/ds, dD/ds, d2A/ds2, d2B/ds2 of a squared tilt, rad^2."""
-    c0, c1, c2, c3, c4, c5, c6 = stumpff(s)
+    if is_enclosing(s):
+        return _enclosed(s)
+    return _of_stumpff(stumpff(s))
+
+
+def _of_stumpff(c: _Stumpff) -> TiltFunctions:
+    c0, c1, c2, c3, c4, c5, c6 = c
     b_s, d_s = c4 - 0.5 * c3, 1.5 * c5 - 0.5 * c4
     return (
         *(c1, c2, c0, c3, 0.5 * (c3 - c2), b_s, d_s, 0.5 * (d_s - b_s)),
         2.0 * c6 - 1.25 * c5 + 0.25 * c4,
     )
+
+
+def _enclosed(s: Interval | Enclosure) -> TiltFunctions:
+    """Return enclosures over boxes; without bounds where s passes `_SERIES_BELOW`.
+
+    Each function is monotone for s < pi^2: c_n^(k)(s) is an integral of c_0^(k)(t^2 s) with
+    positive weights, and the derivatives of c_0 keep their signs there. So the ends of s bound it.
+    """
+    values = s.values if isinstance(s, Enclosure) else s
+    near = values.upper < _SERIES_BELOW
+    ends = []
+    for end in (values.lower, values.upper):
+        of_floats = _from_series(np.clip(end, 0.0, _SERIES_BELOW))
+        ends.append(_of_stumpff(tuple(Interval(c).widened(_ROUNDING) for c in of_floats)))  # type: ignore[arg-type]
+    found = []
+    for one, other in zip(*ends, strict=True):
+        whole = one.hull(other)
+        found.append(
+            Interval(np.where(near, whole.lower, -np.inf), np.where(near, whole.upper, np.inf))
+        )
+    if not isinstance(s, Enclosure):
+        return tuple(found)  # type: ignore[return-value]
+    a, _, _, _, a_s, b_s, d_s, a_ss, b_ss = found
+    none = Interval(np.full(near.shape, -np.inf), np.full(near.shape, np.inf))
+    slopes = (a_s, b_s, -0.5 * a, d_s, a_ss, b_ss, none, none, none)
+    return tuple(s.through(one, slope) for one, slope in zip(found, slopes, strict=True))  # type: ignore[return-value]
 
 
 def _from_series(s: Number) -> _Stumpff:

@@ -2,10 +2,11 @@
 
 `workspace` computes it on a `leg_grid` or a `pose_grid`; the result says of each point whether it
 is inside, or why not (`Reason`), and carries fields over the grid. `workspace_to_file` does the
-same for grids too large for memory.
+same for grids too large for memory. `certify` proves of boxes of poses that they are inside.
 """
 
 from rps_pin.moved import moved_names
+from rps_pin.rps.workspace.certified import CertifiedBoxes, certify
 from rps_pin.rps.workspace.compute import workspace
 from rps_pin.rps.workspace.evaluate import Fields
 from rps_pin.rps.workspace.geometry import (
@@ -27,6 +28,7 @@ __getattr__ = moved_names(
 )
 
 __all__ = [
+    "CertifiedBoxes",
     "Fields",
     "Grid",
     "Reason",
@@ -35,6 +37,7 @@ __all__ = [
     "Workspace",
     "WorkspaceCounts",
     "boundary",
+    "certify",
     "free_tilt",
     "largest_tilt_range",
     "leg_grid",
