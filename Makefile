@@ -65,7 +65,7 @@ setup-dev: ## only make .venv, with what the tests need too
 	@sh tools/setup dev
 
 clean: ## remove what the targets wrote, except .venv
-	rm -rf demo build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
+	rm -rf demo build dist docs/api/objects .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
 	find src tests benchmarks tools -type d -name __pycache__ -exec rm -rf {} +
 
 distclean: clean ## the same, and .venv

@@ -17,13 +17,17 @@ copyright = "the rps_pin developers; BSD-2-Clause"
 extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "docstrings",  # docs/docstrings.py
+    "navigation",  # docs/navigation.py
+    "scenes",  # docs/scenes.py
 ]
 exclude_patterns = ["README.md"]
+templates_path = ["_templates"]
 
 html_theme = "furo"
 html_title = "rps_pin"
@@ -42,7 +46,7 @@ myst_heading_anchors = 3
 
 default_role = "py:obj"  # `name` in a docstring is a link if it resolves
 add_module_names = False
-toc_object_entries = False
+toc_object_entries_show_parents = "hide"
 autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_typehints_format = "short"
 autodoc_class_signature = "mixed"

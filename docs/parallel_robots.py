@@ -1,6 +1,6 @@
-"""Write the tables and pictures of docs/parallel_robots.md.
+"""Write the tables of docs/parallel_robots.md.
 
-Run it from the checkout, in an environment with the development dependencies and a Chromium:
+Run it from the checkout, in an environment with the development dependencies:
 
     .venv/bin/python docs/parallel_robots.py
 """
@@ -12,21 +12,18 @@ from pathlib import Path
 from marked import replaced
 
 from rps_pin import ClosedLoopModel, Task
-from rps_pin.closed_loop.visuals import visual_model
 from rps_pin.control import ComputedTorque, Gains, Plant, TaskSummary, run_loop
 from rps_pin.control.simulation.task_scenario import changed
 from rps_pin.task import check_path, size_trajectory
 from rps_pin.trajectories import point_to_point
-from rps_pin.viewer import save_png
 
 DOCS = Path(__file__).parent
-IMAGES = DOCS / "images" / "parallel"
 PAGE = DOCS / "parallel_robots.md"
 URDF = DOCS.parent / "urdf"
 DURATION = 0.25  # s, of the motions from home to the poses
 FREQUENCY, HEAVIER = 15.0, 1.2  # of the controllers, Hz; masses of the plants, over the model's
 
-#: Where each is shown: coordinates of its task.
+#: Where the motions lead: coordinates of each robot's task.
 POSES = {
     "stewart": [0.05, 0.0, 0.65, 0.1, 0.15, 0.1],
     "rotary_stewart": [0.01, 0.0, 0.225, 0.05, 0.1, 0.05],
@@ -52,7 +49,7 @@ SINGULAR = {
 
 
 def main() -> None:
-    """Write all tables and pictures."""
+    """Write all tables."""
     mechanisms = {name: ClosedLoopModel.load(URDF / f"{name}.yaml") for name in POSES}
     functions = ("kinematics", "closing", "dynamics")
     tasks = {name: one.task.compile(functions=functions) for name, one in mechanisms.items()}
@@ -64,17 +61,6 @@ def main() -> None:
     ):
         text = replaced(text, part, "\n".join([*head, *(row(*one) for one in tasks.items())]))
     PAGE.write_text(text, "utf-8")
-    IMAGES.mkdir(parents=True, exist_ok=True)
-    for name, mechanism in mechanisms.items():
-        save_png(
-            IMAGES / f"{name}.png",
-            mechanism,
-            mechanism.task.configuration(POSES[name]),
-            visual=visual_model(URDF / f"{name}.yaml", mechanism.model),
-            size=(480, 360),
-            background="white",
-            captions=False,
-        )
 
 
 def moved(task: Task, changes: dict[str, float]) -> list[float]:
