@@ -65,6 +65,8 @@ PARTS = (
     Part("filelock", "filelock", "code that is kept", "compile"),
     Part("platformdirs", "platformdirs", "code that is kept", "compile"),
     Part("cupy-cuda12x", "cupy", "code for NVIDIA's cards", "cuda"),
+    Part("jupyterlab", "jupyterlab", "notebooks", "jupyter"),
+    Part("ipykernel", "ipykernel", "notebooks", "jupyter"),
     Part("viser", "viser", "the live panel", "panel"),
     Part("playwright", "playwright", "pictures and films", "pictures"),
     Part("pillow", "PIL", "pictures and films", "pictures"),

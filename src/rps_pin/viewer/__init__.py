@@ -1,8 +1,8 @@
 """Viewer: robots and their motions in 3D, as pages, pictures, films, or live on this machine only.
 
-`show`, `save_html`, `save_png` and `save_video` take a robot or mechanism, its motion, and layers;
-`Scene`, `play` and `write_html` take Pinocchio models. Meshcat draws all of these. The panel of
-`rps_pin.panel` draws the same scenes with viser.
+`show`, `save_html`, `save_png`, `save_video` and `NotebookView` take a robot or mechanism, its
+motion, and layers; `Scene`, `play` and `write_html` take Pinocchio models. Meshcat draws all of
+these. The panel of `rps_pin.panel` draws the same scenes with viser.
 """
 
 from rps_pin.viewer.files.html import write_html
@@ -17,6 +17,7 @@ from rps_pin.viewer.layers.singularity import Singularity
 from rps_pin.viewer.layers.trail import Trail
 from rps_pin.viewer.layers.workspace import WorkspaceSurface
 from rps_pin.viewer.motion import FRAME_RATE, Motion
+from rps_pin.viewer.notebook_view import NotebookView
 from rps_pin.viewer.playback import play
 from rps_pin.viewer.save import save_html, save_png, save_video
 from rps_pin.viewer.scene.scene import Scene
@@ -41,6 +42,7 @@ __all__ = [
     "LocalView",
     "LocalViewer",
     "Motion",
+    "NotebookView",
     "RawCommand",
     "Reactions",
     "Recorder",

@@ -61,7 +61,9 @@ def save_html(
         If something cannot be shown, or the file cannot be written there.
     """
     target = checked_target(path)
-    text, _ = _page(what, motion, title, frame_rate, visual=visual, layers=layers, hidden=hidden)
+    text, _ = recorded_view(
+        what, motion, title, frame_rate, visual=visual, layers=layers, hidden=hidden
+    )
     write_text(target, text)
 
 
@@ -111,7 +113,7 @@ def save_png(
     if target.suffix.lower() != ".png":
         raise InputError(f"{target.name}: a picture is written as .png")
     style = picture_style(size, scale, background, captions)
-    text, view = _page(what, motion, title, visual=visual, layers=layers)
+    text, view = recorded_view(what, motion, title, visual=visual, layers=layers)
     if not 0.0 <= time <= view.motion.duration:
         raise InputError(f"time = {time} s; the motion lasts from 0 to {view.motion.duration:g} s")
     [picture] = in_own_thread(lambda stop: list(take_pictures(text, [time], stop, style)))
@@ -162,7 +164,7 @@ def save_video(
     style = picture_style(size, scale, background, captions)
     if background == "transparent":
         raise InputError("a film has no transparent background: give a colour, or none")
-    text, view = _page(what, motion, title, visual=visual, layers=layers)
+    text, view = recorded_view(what, motion, title, visual=visual, layers=layers)
     duration = view.motion.duration
     if duration <= 0.0:
         raise InputError("a single pose makes no film: give a motion, or write a picture")
@@ -177,7 +179,7 @@ def save_video(
         in_own_thread(lambda stop: film(scratch, stop))
 
 
-def _page(
+def recorded_view(
     what: RPSRobot | ClosedLoopModel,
     motion: Any,
     title: str | None,
