@@ -197,9 +197,8 @@ def test_computed_torque_holds_and_follows(name) -> None:
 @ALL
 def test_it_is_shown_with_a_trail_of_its_frame(name) -> None:
     one, path, recorder = task(name), line(name), Recorder()
-    mechanism = one.mechanism
-    what = RPSRobot.from_preset(name) if name in ROBOTS else mechanism
-    view = View(recorder, what, path, layers=fitting_layers(mechanism))
+    what = RPSRobot.from_preset(name) if name in ROBOTS else one.mechanism
+    view = View(recorder, what, path, layers=fitting_layers(what, path))
     view.show_moment(path.duration)
     places = [m["matrix"] for m in recorder.messages if m["type"] == "set_transform"]
     assert np.isfinite(np.array(places, dtype=float)).all()

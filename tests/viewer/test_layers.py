@@ -70,7 +70,13 @@ def placed(recorder: Recorder) -> dict[str, np.ndarray]:
 
 
 def legend(recorder: Recorder) -> list[dict]:
-    return [m for m in recorder.messages if m.get("property") == "userData"][-1]["value"]["layers"]
+    return user_data(recorder, "/world")["layers"]
+
+
+def user_data(recorder: Recorder, path: str) -> dict:
+    """Return what was sent last to the page's own scripts under a path."""
+    sent = [m for m in recorder.messages if m.get("property") == "userData" and m["path"] == path]
+    return sent[-1]["value"]
 
 
 def page_scales(text: str) -> dict[str, np.ndarray]:
@@ -465,16 +471,16 @@ def test_a_skeleton_has_legs_as_long_as_their_joints_say():
 
 
 def test_layers_are_switched_by_name(robot):
-    view, recorder = shown(robot, POSE, layers=["frames"], hidden=["limits"])
+    view, recorder = shown(robot, POSE, layers=["frames"], hidden=["closures"])
     assert [(one["name"], one["visible"]) for one in legend(recorder)] == [
         ("frames", True),
-        ("limits", False),
+        ("closures", False),
     ]
-    view.set_visible("limits", True)
+    view.set_visible("closures", True)
     last = [m for m in recorder.messages if m.get("property") == "visible"][-1]
-    assert (last["path"], last["value"]) == ("/world/layers/limits", True)
+    assert (last["path"], last["value"]) == ("/world/layers/closures", True)
     assert legend(recorder)[1]["visible"] is True
-    with pytest.raises(InputError, match="no layer 'trail' in this view; there are: frames, limi"):
+    with pytest.raises(InputError, match="no layer 'trail' in this view; there are: frames, clos"):
         view.set_visible("trail", True)
 
 
@@ -519,7 +525,8 @@ def test_what_cannot_be_shown_is_refused(robot, what, motion, complaint):
 
 def test_all_layers_have_the_names_they_go_by(robot):
     micro = RPSRobot.from_preset("micro")
-    view, _ = shown(micro, [0.225, 0.1, 0.0], layers=list(LAYERS))
+    path = point_to_point([0.225, 0.1, 0.0], [0.23, 0.1, 0.0], duration=1.0)
+    view, _ = shown(micro, path, layers=list(LAYERS))
     assert list(view.drawings) == list(LAYERS)
 
 

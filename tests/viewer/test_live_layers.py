@@ -18,23 +18,24 @@ def robot() -> RPSRobot:
 
 
 def test_a_live_page_follows_python(robot, watched):
-    point = "viewer.scene_tree.find(['world', 'layers', 'trail', 'point']).object.position.z"
+    node = "viewer.scene_tree.find(['world', 'layers', 'frames', 'platform_free'])"
+    point = f"{node}.object.position.z"
     tick = "document.querySelector('#layers input[name=%s]')"
     watched.page.set_viewport_size({"width": 300, "height": 200})
-    with show(robot, [0.4, 0.1, 0.0], layers=["trail"], hidden=["frames"]) as view:
+    with show(robot, [0.4, 0.1, 0.0], layers=["frames"], hidden=["closures"]) as view:
         assert view.url.startswith("http://127.0.0.1:")
         watched.page.goto(view.url)
-        watched.wait(f"typeof viewer !== 'undefined' && {tick % 'frames'} !== null")
-        assert watched.page.evaluate(f"({tick % 'frames'}).checked") is False
+        watched.wait(f"typeof viewer !== 'undefined' && {tick % 'closures'} !== null")
+        assert watched.page.evaluate(f"({tick % 'closures'}).checked") is False
         view.display([0.38, 0.1, 0.0])
         watched.wait(f"Math.abs({point} - 0.38) < 1e-6")
-        view.set_visible("frames", True)
-        watched.wait(f"({tick % 'frames'}).checked")
-        frames = "viewer.scene_tree.find(['world', 'layers', 'frames']).object.visible"
-        assert watched.page.evaluate(frames) is True
+        view.set_visible("closures", True)
+        watched.wait(f"({tick % 'closures'}).checked")
+        closures = "viewer.scene_tree.find(['world', 'layers', 'closures']).object.visible"
+        assert watched.page.evaluate(closures) is True
         watched.page.reload()  # a tab that opens late sees the same
-        watched.wait(f"typeof viewer !== 'undefined' && {tick % 'frames'} !== null")
-        watched.wait(f"({tick % 'frames'}).checked && Math.abs({point} - 0.38) < 1e-6")
+        watched.wait(f"typeof viewer !== 'undefined' && {tick % 'closures'} !== null")
+        watched.wait(f"({tick % 'closures'}).checked && Math.abs({point} - 0.38) < 1e-6")
         assert watched.complaints == []
 
 

@@ -88,6 +88,7 @@ def test_a_page_with_layers_holds_them_moves_them_and_ticks_them_off(
     seen = "return viewer.scene_tree.find(['world', 'layers', '%s']).object.visible"
     assert find(watched, seen % "trail") is True
     assert find(watched, seen % "forces") is False
+    watched.page.locator("#legend summary").click()  # folded in a small window
     forces = watched.page.locator("#layers input[name=forces]")
     forces.check()
     assert find(watched, seen % "forces") is True

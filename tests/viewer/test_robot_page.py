@@ -22,7 +22,7 @@ def run(robot: RPSRobot) -> MotionRun:
 
 def test_the_helix_page_loads_shows_the_robot_and_moves(robot, run, watched, tmp_path: Path):
     page = tmp_path / "viewer.html"
-    save_html(page, robot, run, layers=fitting_layers(robot.mechanism), title="a helix")
+    save_html(page, robot, run, layers=fitting_layers(robot, run), title="a helix")
     watched.page.context.set_offline(True)
     watched.page.set_viewport_size({"width": 400, "height": 300})
     watched.page.goto(page.as_uri())

@@ -14,7 +14,7 @@ import trimesh
 import viser
 
 from rps_pin import ClosedLoopModel, RPSPinError, RPSRobot
-from rps_pin.viewer import Recorder, Scene, View
+from rps_pin.viewer import Recorder, Scene, View, fitting_layers
 from rps_pin.viewer.writers.viser_writer import ViserWriter
 
 URDF = Path(__file__).parents[2] / "urdf"
@@ -78,7 +78,7 @@ def test_every_part_is_where_meshcat_has_it(server: viser.ViserServer, name: str
         layers = ["frames", "forces", "reactions", "limits", "singularity", "closures", "ghosts"]
     else:
         what, start = ClosedLoopModel.load(URDF / f"{name}.yaml"), None
-        q, layers = what.home, ["frames", "forces", "reactions", "closures", "limits"]
+        q, layers = what.home, fitting_layers(what)
     recorder = Recorder()
     for window in (recorder, ViserWriter(server)):
         View(window, what, start, layers=layers).display(q)
@@ -133,10 +133,10 @@ def test_a_cone_points_up_and_a_capsule_has_its_ends(server: viser.ViserServer) 
 
 def test_layers_are_switched_by_name(server: viser.ViserServer) -> None:
     four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
-    view = View(ViserWriter(server), four_bar, layers=["frames"], hidden=["limits"])
-    assert not server.scene.get_handle_by_name("/world/layers/limits").visible
-    view.set_visible("limits", True)
-    assert server.scene.get_handle_by_name("/world/layers/limits").visible
+    view = View(ViserWriter(server), four_bar, layers=["frames"], hidden=["closures"])
+    assert not server.scene.get_handle_by_name("/world/layers/closures").visible
+    view.set_visible("closures", True)
+    assert server.scene.get_handle_by_name("/world/layers/closures").visible
     assert server.scene.get_handle_by_name("/world/layers/frames").visible
 
 

@@ -25,20 +25,22 @@ SizeOption = Annotated[
 ]
 
 
-def chosen_layers(text: str | None, mechanism: ClosedLoopModel) -> dict[str, Any]:
+def chosen_layers(
+    text: str | None, what: RPSRobot | ClosedLoopModel, motion: Any = None
+) -> dict[str, Any]:
     """Return the layers that are shown at first, and the hidden ones, which the page can show.
 
     Parameters
     ----------
     text
-        The option's value; None for the trail and the forces.
-    mechanism
-        The page has the layers that fit it.
+        The option's value; None for the trail and the forces, where they have something to show.
+    what, motion
+        The robot and its motion; the page has the layers that have something to show.
     """
     from rps_pin.viewer import fitting_layers
     from rps_pin.viewer.layers import layers_of
 
-    fitting = fitting_layers(mechanism)
+    fitting = fitting_layers(what, motion)
     if text is None:
         shown: list[str] = [name for name in fitting if name in ("trail", "forces")]
     else:
@@ -57,10 +59,10 @@ def write_page(
 ) -> Path:
     """Write ``viewer.html``, a motion in 3D with its layers, into a folder; return the file."""
     from rps_pin.viewer import save_html
+    from rps_pin.viewer.displayed_mechanism import motion_of, without_shapes
 
-    page = folder / "viewer.html"
-    mechanism = subject.mechanism if isinstance(subject, RPSRobot) else subject
-    chosen = chosen_layers(layers, mechanism)
+    page, motion = folder / "viewer.html", motion_of(without_shapes(subject), motion)
+    chosen = chosen_layers(layers, subject, motion)
     save_html(page, subject, motion, visual=visual, title=title, **chosen)
     return page
 

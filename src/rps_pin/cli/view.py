@@ -146,6 +146,7 @@ def view_command(
         return
     # Meshcat and its server are for this command only.
     from rps_pin.viewer import show
+    from rps_pin.viewer.displayed_mechanism import motion_of, without_shapes
 
     machine: RPSRobot | ClosedLoopModel
     motion: Any
@@ -163,18 +164,15 @@ def view_command(
     inputs = [one for one in (file, mechanism) if one is not None]
     outputs = [one for one in (html, png, video) if one is not None]
     check_outputs(outputs, overwrite, inputs=inputs)
-    tree = machine.mechanism if isinstance(machine, RPSRobot) else machine
-    chosen = chosen_layers(layers, tree) | drawn
-    picture = {"size": chosen_size(size), "background": background, "layers": chosen["layers"]}
     with helix.telling_largest(machine, motion):
-        _write_files((html, png, video), machine, motion, time, chosen, picture | drawn)
+        motion = motion_of(without_shapes(machine), motion)
+        chosen = chosen_layers(layers, machine, motion) | drawn
+    picture = {"size": chosen_size(size), "background": background, "layers": chosen["layers"]}
+    _write_files((html, png, video), machine, motion, time, chosen, picture | drawn)
     if html or png or video:
         return
     try:
-        with (
-            helix.telling_largest(machine, motion),
-            show(machine, motion, port=port, **chosen) as view,
-        ):
+        with show(machine, motion, port=port, **chosen) as view:
             say(f"Open {view.url} in a browser on this machine. Ctrl-C ends.")
             view.play()
     except KeyboardInterrupt:

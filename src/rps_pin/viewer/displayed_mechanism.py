@@ -65,10 +65,23 @@ def displayed(
         If `what` is neither.
     """
     if isinstance(what, RPSRobot):
-        return DisplayedMechanism(what.mechanism, visual or what.visual_model(), what)
+        shapes = what.visual_model() if visual is None else visual
+        return DisplayedMechanism(what.mechanism, shapes, what)
     if isinstance(what, ClosedLoopModel):
-        return DisplayedMechanism(what, visual or skeleton(what), None, visual is None)
+        shapes = skeleton(what) if visual is None else visual
+        return DisplayedMechanism(what, shapes, None, visual is None)
     raise InputError(f"{type(what).__name__} cannot be shown: an RPSRobot or ClosedLoopModel can")
+
+
+def without_shapes(what: RPSRobot | ClosedLoopModel) -> DisplayedMechanism:
+    """Return a mechanism with nothing to draw, for what does not depend on shapes.
+
+    Raises
+    ------
+    InputError
+        If `what` is no mechanism.
+    """
+    return displayed(what, pin.GeometryModel())
 
 
 def motion_of(subject: DisplayedMechanism, given: Any = None) -> Motion:

@@ -11,18 +11,26 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.validation import real_vector
 from rps_pin.viewer.displayed_mechanism import configuration_of, displayed, motion_of
-from rps_pin.viewer.layers import layers_of
+from rps_pin.viewer.layers import layer_name, layers_of
 from rps_pin.viewer.layers.bars import moving_bars
-from rps_pin.viewer.layers.base import DrawnLayer, Layer, LayerContext, Moving
+from rps_pin.viewer.layers.base import (
+    DrawnLayer,
+    Layer,
+    LayerContext,
+    Moving,
+    what_is_missing,
+)
 from rps_pin.viewer.motion import FRAME_RATE, MotionState
 from rps_pin.viewer.playback import follow_clock
+from rps_pin.viewer.scene.bounds import bounding_box, part_points
 from rps_pin.viewer.scene.keyframes import NodeKeyframes
-from rps_pin.viewer.scene.links import node_name
+from rps_pin.viewer.scene.links import links_of, node_name
 from rps_pin.viewer.scene.scene import ROBOT, Scene
 from rps_pin.viewer.scene.shapes import Part
 from rps_pin.viewer.scene.stage import WORLD
@@ -33,6 +41,8 @@ LAYERS_NODE = f"{WORLD}/layers"
 """Path of the node that holds the layers: one child each, by the layer's name."""
 _BARS_NODE = f"{ROBOT}/bars"
 """Path of the node that holds bars which are no links."""
+_MOST_SEEN = 50
+"""States of a motion at which the picture holds what moves besides the links, at most."""
 
 
 class View:
@@ -53,7 +63,7 @@ class View:
         Geometry of the mechanism. Default: a 3-RPS's own; for others, bars between the joints.
     layers, hidden
         Names (see `rps_pin.viewer.LAYERS`) or objects such as ``Trail(factor=100)``; those in
-        `hidden` are there, but switched off.
+        `hidden` are there, but switched off; they are left out if they have nothing to show here.
 
     Attributes
     ----------
@@ -69,7 +79,8 @@ class View:
     Raises
     ------
     InputError
-        If the motion does not fit, a layer is unknown, or has nothing to show here.
+        If the motion does not fit, a layer is unknown, or one of `layers` has nothing to show here;
+        says what is missing.
     """
 
     def __init__(
@@ -85,32 +96,28 @@ class View:
         self.window = window
         self.subject = displayed(what, visual)
         self.motion = motion_of(self.subject, motion)
-        on, off = layers_of(layers), layers_of(hidden)
+        on, off = self._with_contents(layers_of(layers), layers_of(hidden))
         more = [layer.configurations(self.subject, self.motion) for layer in on]
         framed = np.concatenate([self.motion.configurations, *more])
-        self.scene = Scene(self.subject.model, self.subject.visual, window, framed)
-        self._writer = self.scene.writer
+        model, visual = self.subject.model, self.subject.visual
         bars = moving_bars(self.subject)
         self._moving: dict[str, Moving | DrawnLayer] = {_BARS_NODE: bars} if bars else {}
-        for part in bars.parts if bars else ():
-            self._writer.add_part(_part_path(_BARS_NODE, part), part)
-        context = LayerContext(self.subject, self.motion, self.scene.box)
-        self.drawings: dict[str, DrawnLayer] = {}
-        self._visible: dict[str, bool] = {}
-        for layer in [*on, *off]:
-            drawn = layer.draw(context)
-            name = node_name(drawn.legend.name, self.drawings)
-            self.drawings[name] = drawn._replace(legend=replace(drawn.legend, name=name))
-            self._visible[name] = len(self._visible) < len(on)
-            path = f"{LAYERS_NODE}/{name}"
-            self._moving[path] = drawn
+        self.drawings = self._drawn([*on, *off], framed)
+        self._moving |= {f"{LAYERS_NODE}/{name}": one for name, one in self.drawings.items()}
+        self._visible = {name: k < len(on) for k, name in enumerate(self.drawings)}
+        self.scene = Scene(model, visual, window, framed, self._around())
+        self._writer = self.scene.writer
+        for path, drawn in self._moving.items():
             for part in drawn.parts:
-                self._writer.add_part(_part_path(path, part), part, casts_shadow=False)
-            if not self._visible[name]:
-                self._writer.set_visible(path, False)
+                shadow = path == _BARS_NODE
+                self._writer.add_part(_part_path(path, part), part, casts_shadow=shadow)
+        for name, visible in self._visible.items():
+            if not visible:
+                self._writer.set_visible(f"{LAYERS_NODE}/{name}", False)
         if self.drawings:
             self._send_legend()
-        self._update_layers(self.motion.state_at(0.0))
+        moves = self.motion.duration > 0.0
+        self._update_layers(self.motion.state_at(0.0), 0.0 if moves else None)
 
     def display(self, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None) -> None:
         """Show the robot and its layers in a state.
@@ -138,7 +145,7 @@ class View:
 
     def show_moment(self, elapsed: float) -> None:
         """Show the motion's state `elapsed` seconds after its beginning."""
-        self._show(self.motion.state_at(elapsed))
+        self._show(self.motion.state_at(elapsed), elapsed)
 
     def set_visible(self, name: str, visible: bool) -> None:
         """Switch a layer on or off.
@@ -171,17 +178,74 @@ class View:
         keyframes: list[NodeKeyframes] = []
         for path, drawn in self._moving.items():
             keyframes += _keyframes(path, drawn, states)
-        self.scene.animate(self.motion, frame_rate=frame_rate, more=keyframes)
+        readings = {
+            name: [drawn.reading(state) for state in states]
+            for name, drawn in self.drawings.items()
+            if drawn.reading is not None
+        }
+        self.scene.animate(self.motion, frame_rate=frame_rate, more=keyframes, readings=readings)
 
-    def _show(self, state: MotionState) -> None:
+    def _with_contents(
+        self, on: Sequence[Layer], off: Sequence[Layer]
+    ) -> tuple[Sequence[Layer], Sequence[Layer]]:
+        """Return the layers; hidden ones with nothing to show are left out, others refused."""
+        subject, motion = self.subject, self.motion
+        for layer in on:
+            missing = what_is_missing(layer, subject, motion)
+            if missing:
+                raise InputError(f"layer {layer_name(layer)!r} has nothing to show: {missing}")
+        return on, [layer for layer in off if not what_is_missing(layer, subject, motion)]
+
+    def _drawn(self, layers: Sequence[Layer], framed: Array) -> dict[str, DrawnLayer]:
+        """Return the layers, drawn, by the name of their node; arrows in one scale."""
+        model, visual = self.subject.model, self.subject.visual
+        box = bounding_box(model, links_of(model, visual), framed)
+        context = LayerContext(self.subject, self.motion, box)
+        drawings: dict[str, DrawnLayer] = {}
+        for layer in layers:
+            drawn = layer.draw(context)
+            name = node_name(drawn.legend.name, drawings)
+            drawings[name] = drawn._replace(legend=replace(drawn.legend, name=name))
+        greatest: dict[str, float] = {}
+        for drawn in drawings.values():
+            for unit, most in drawn.greatest.items():
+                greatest[unit] = max(most, greatest.get(unit, 0.0))
+        for name, drawn in drawings.items():
+            if drawn.in_scale is not None:
+                scaled = drawn.in_scale(greatest)
+                drawings[name] = scaled._replace(legend=replace(scaled.legend, name=name))
+        return drawings
+
+    def _around(self) -> Array:
+        """Return points around all that moves or is drawn besides the links, shape (k, 3)."""
+        times = np.linspace(0.0, self.motion.duration, min(_MOST_SEEN, len(self.motion.times)))
+        states = [self.motion.state_at(float(time)) for time in times]
+        points = [np.empty((0, 3))]
+        for drawn in self._moving.values():
+            updates = [drawn.update(state) for state in states] if drawn.update else []
+            for part in drawn.parts:
+                own = part_points(part)
+                places = [nodes[part.node].placement for nodes in updates if part.node in nodes]
+                for place in places or [np.eye(4)]:
+                    points.append(own @ place[:3, :3].T + place[:3, 3])
+        return np.concatenate(points)
+
+    def _show(self, state: MotionState, elapsed: float | None = None) -> None:
         self.scene.display(state.q)
-        self._update_layers(state)
+        self._update_layers(state, elapsed)
 
     def _send_legend(self) -> None:
         entries = [drawn.legend for drawn in self.drawings.values()]
         self._writer.set_legend(entries, list(self._visible.values()))
 
-    def _update_layers(self, state: MotionState) -> None:
+    def _update_layers(self, state: MotionState, elapsed: float | None) -> None:
+        readings = {
+            name: drawn.reading(state)
+            for name, drawn in self.drawings.items()
+            if drawn.reading is not None
+        }
+        if readings or elapsed is not None:
+            self._writer.set_readings(elapsed, readings)
         for path, drawn in self._moving.items():
             for node, now in (drawn.update(state) if drawn.update else {}).items():
                 self._writer.place(f"{path}/{node}", now.placement)

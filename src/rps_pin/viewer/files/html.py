@@ -87,7 +87,7 @@ def recorded_page(recorder: Recorder, scene: Scene, motion: Motion, title: str) 
     note = f"{motion.duration:.3g} s, in a loop · {grid}" if moves else grid
     # The commands are data: JSON within a script that is not run.
     commands = [base64.b64encode(command).decode("ascii") for command in recorder.packed()]
-    run = ["legend.js", "recorded.js", *(["controls.js"] if moves else [])]
+    run = ["layout.js", "legend.js", "recorded.js", *(["controls.js"] if moves else [])]
     scripts = [
         inline_script(licences(), ' type="application/json" id="licences"'),
         inline_script(json.dumps(commands), ' type="application/json" id="commands"'),

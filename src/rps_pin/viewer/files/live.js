@@ -1,5 +1,6 @@
 // Follows the scene of a server.
 const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+keepRobotFree(viewer);
 watchLayers(viewer);
 viewer.connect("ws://" + location.host + "/socket");
 viewer.connection.onclose = () => {

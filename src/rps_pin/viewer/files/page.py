@@ -30,7 +30,9 @@ def page(*, title: str, note: str, policy: str, scripts: str) -> str:
     """
     text = {"title": title, "note": note, "policy": policy}
     escaped = {name: html.escape(plain(one)) for name, one in text.items()}
-    return Template(own_file("page.html")).substitute(escaped, scripts=scripts)
+    return Template(own_file("page.html")).substitute(
+        escaped, style=own_file("page.css"), scripts=scripts
+    )
 
 
 def inline_script(source: str, attributes: str = "") -> str:

@@ -15,9 +15,8 @@ from rps_pin.validation import positive_number
 from rps_pin.viewer.files.browser import opened_page
 
 _LARGEST = 8192
-_PICTURE = "document.body.classList.add('picture')"
-_NO_PANELS = ".dg { visibility: hidden !important; } body { background: %s !important; }"
-_NO_CAPTIONS = "#caption, #layers { visibility: hidden !important; }"
+_PICTURE = "document.body.classList.add(%r); document.getElementById('legend').open = true"
+_BACKGROUND = "body { background: %s !important; }"
 _SEEK = "viewer.animator.pause(); viewer.animator.seek(%r); viewer.render()"
 
 Progress = Callable[[Iterable[float]], Iterable[float]]
@@ -65,9 +64,10 @@ def take_pictures(
         Of the pictures.
     """
     plain, transparent = style.background is not None, style.background == "transparent"
-    css = _NO_PANELS % (style.background or "#f4f6f9") + ("" if style.captions else _NO_CAPTIONS)
+    css = _BACKGROUND % (style.background or "#f4f6f9")
     with opened_page(text, style.size, style.scale) as page:
-        page.evaluate(_PICTURE)
+        for name in ("picture", *(() if style.captions else ("bare",))):
+            page.evaluate(_PICTURE % name)
         page.evaluate("viewer.set_3d_pane_size()")  # the canvas to the window's size
         if plain:
             page.evaluate("viewer.hide_background()")

@@ -8,10 +8,13 @@ A layer is given by its name, or as an object with its options::
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
-from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
+from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError, shown
-from rps_pin.viewer.layers.base import Layer
+from rps_pin.rps.robot import RPSRobot
+from rps_pin.viewer.displayed_mechanism import motion_of, without_shapes
+from rps_pin.viewer.layers.base import Layer, what_is_missing
 from rps_pin.viewer.layers.closures import Closures
 from rps_pin.viewer.layers.forces import Forces, Reactions
 from rps_pin.viewer.layers.frames import Frames
@@ -58,10 +61,29 @@ def layers_of(given: Sequence[str | Layer]) -> list[Layer]:
     return found
 
 
-def fitting_layers(mechanism: ClosedLoopModel) -> list[str]:
-    """Return the layers that fit any motion of a mechanism and are cheap to draw, by name."""
-    closed = any(isinstance(one, LoopClosure) for one in mechanism.closures)
-    of_closures = ["trail", "reactions"] if closed else []
-    held = ["closures"] if mechanism.closures else []
-    names = ["forces", "limits", "singularity", "frames", *of_closures, *held]
-    return [name for name in LAYERS if name in names]
+def layer_name(layer: Layer) -> str:
+    """Return the name that a layer goes by."""
+    kinds = (name for name, kind in LAYERS.items() if type(layer) is kind)
+    return next(kinds, type(layer).__name__)
+
+
+def fitting_layers(what: RPSRobot | ClosedLoopModel, motion: Any = None) -> list[str]:
+    """Return the layers that have something to show and are cheap to draw, by name.
+
+    Parameters
+    ----------
+    what, motion
+        A robot or mechanism and its motion or pose, as for `View`. Without a motion the mechanism
+        is at rest.
+
+    Raises
+    ------
+    InputError
+        If the motion does not fit.
+    """
+    subject = without_shapes(what)
+    if motion is None and subject.robot is not None:
+        motion = subject.robot.task.home
+    moved = motion_of(subject, motion)
+    cheap = [name for name in LAYERS if name not in ("workspace", "ghosts")]
+    return [name for name in cheap if not what_is_missing(LAYERS[name](), subject, moved)]

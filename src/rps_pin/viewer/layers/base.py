@@ -70,10 +70,20 @@ class DrawnLayer(NamedTuple):
     """Its shapes."""
     update: Callable[[MotionState], NodeStates] | None = None
     """Returns where its nodes are in a state; None where nothing moves."""
+    reading: Callable[[MotionState], str] | None = None
+    """Returns the number that the layer shows in a state, with its name and unit."""
+    greatest: Mapping[str, float] = {}
+    """Of a layer of arrows: the greatest force and moment of the motion, by unit."""
+    in_scale: Callable[[Mapping[str, float]], DrawnLayer] | None = None
+    """Returns the arrows in the scale of the greatest of all layers, by unit."""
 
 
 class Layer(Protocol):
-    """Options of a layer."""
+    """Options of a layer.
+
+    A method ``missing(subject, motion)``, where there is one, returns in words what the layer would
+    need to show anything here, or an empty text; see `what_is_missing`.
+    """
 
     def configurations(self, subject: DisplayedMechanism, motion: Motion) -> Array:
         """Return configurations (k, nq) besides the motion's that the picture is framed for."""
@@ -94,6 +104,16 @@ class RobotSizedLayer:
     def configurations(self, subject: DisplayedMechanism, motion: Motion) -> Array:
         """Return none."""
         return np.empty((0, subject.model.nq))
+
+    def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
+        """Return what is missing here, in words: nothing."""
+        return ""
+
+
+def what_is_missing(layer: Layer, subject: DisplayedMechanism, motion: Motion) -> str:
+    """Return in words what a layer would need to show anything here; empty where it has it."""
+    of_layer = getattr(layer, "missing", None)
+    return "" if of_layer is None else str(of_layer(subject, motion))
 
 
 def frame_id(model: pin.Model, name: str, layer: str) -> int:

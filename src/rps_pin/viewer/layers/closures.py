@@ -9,11 +9,11 @@ import pinocchio as pin
 
 from rps_pin.closed_loop import JointCoupling, LoopClosure
 from rps_pin.closed_loop.constraints.closures import ClosedFrame
-from rps_pin.errors import InputError
+from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.colours import BLUE, YELLOW, css
 from rps_pin.viewer.layers.parts import ball, between
-from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.motion import Motion, MotionState
 from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.links import node_name
 from rps_pin.viewer.scene.shapes import Cylinder, Material, Part, translated
@@ -34,12 +34,14 @@ class Closures(RobotSizedLayer):
 
     size: float | None = None
 
+    def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
+        """Return whether there are no closures; see `Layer`."""
+        return "" if subject.mechanism.closures else "the mechanism has no closures"
+
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the marks and lines; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
         data = model.createData()
-        if not mechanism.closures:
-            raise InputError("layer 'closures': the mechanism has no closures")
         ends = {
             node_name(f"{one.name}_{k}" if k else one.name): pair
             for one in mechanism.closures

@@ -13,6 +13,10 @@ from rps_pin.viewer.scene.legend import ColourBar
 ORANGE, SKY, GREEN, YELLOW = 0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442
 BLUE, VERMILLION, PURPLE = 0x0072B2, 0xD55E00, 0xCC79A7
 
+#: Of arrows: they differ from the legs of a 3-RPS (`BLUE`, `VERMILLION`, `GREEN`) and from each
+#: other for the three kinds of colour-blind readers too.
+GOLD, BLACK = 0xFFC20A, 0x222222
+
 _STOPS = 7
 
 

@@ -1,5 +1,7 @@
 """Layers ``forces`` and ``reactions``: arrows of forces and moments, in one scale for each unit.
 
+Both layers of a view are in the same scale, unless one is given; the legend says it.
+
 An arrow of an actuator begins at its joint and points, for a positive force, where the joint's
 coordinate grows. A torque has two heads, and its own scale. Reactions are the forces in the closed
 joints, on the first frame's side. Where constraint rows are redundant the reactions are not unique;
@@ -18,10 +20,11 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
 from rps_pin.errors import ClosureError, InfeasibleError, InputError, SingularityError
+from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
-from rps_pin.viewer.layers.colours import ORANGE, SKY, css
+from rps_pin.viewer.layers.colours import BLACK, GOLD, css
 from rps_pin.viewer.layers.parts import SMALLEST, arrow, double_arrow, pointing
-from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.motion import Motion, MotionState
 from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.links import node_name
 from rps_pin.viewer.scene.shapes import Part, translated
@@ -52,6 +55,11 @@ class Forces(RobotSizedLayer):
     newtons_per_metre: float | None = None
     newton_metres_per_metre: float | None = None
 
+    def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
+        """Return whether there are no actuators, or no masses; see `Layer`."""
+        none = "" if subject.mechanism.actuated else "no joint is actuated"
+        return none or _without_masses(subject, motion.forces)
+
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the arrows; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
@@ -72,8 +80,8 @@ class Forces(RobotSizedLayer):
 
         units = {one.node: "N m" if one.turns else "N" for one in actuators}
         scales = {"N": self.newtons_per_metre, "N m": self.newton_metres_per_metre}
-        title = LegendEntry("forces", "actuators' forces", css(ORANGE))
-        return _arrows(title, ORANGE, context, units, vectors, scales)
+        title = LegendEntry("forces", "actuators' forces", css(GOLD))
+        return _arrows(title, GOLD, context, units, vectors, scales)
 
 
 @dataclass(frozen=True)
@@ -88,13 +96,17 @@ class Reactions(RobotSizedLayer):
 
     newtons_per_metre: float | None = None
 
+    def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
+        """Return whether there are no loop closures, or no masses; see `Layer`."""
+        closed = any(isinstance(one, LoopClosure) for one in subject.mechanism.closures)
+        none = "" if closed else "the mechanism has no loop closures"
+        return none or _without_masses(subject, motion.constraint_forces)
+
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the arrows; see `Layer`."""
         mechanism, model = context.subject.mechanism, context.subject.model
         data, outside = model.createData(), context.motion.wrenches
         closures = [one for one in mechanism.closures if isinstance(one, LoopClosure)]
-        if not closures:
-            raise InputError("layer 'reactions': the mechanism has no loop closures")
 
         def vectors(state: MotionState) -> Vectors:
             forces = state.constraint_forces
@@ -115,8 +127,14 @@ class Reactions(RobotSizedLayer):
             }
 
         units = {node_name(one.name): "N" for one in closures}
-        title = LegendEntry("reactions", "forces in the closed joints", css(SKY))
-        return _arrows(title, SKY, context, units, vectors, {"N": self.newtons_per_metre})
+        title = LegendEntry("reactions", "forces in the closed joints", css(BLACK))
+        return _arrows(title, BLACK, context, units, vectors, {"N": self.newtons_per_metre})
+
+
+def _without_masses(subject: DisplayedMechanism, known: Array | None) -> str:
+    """Return a sentence where forces are not known, and would all be zero for want of masses."""
+    massive = known is not None or any(one.mass for one in subject.model.inertias)
+    return "" if massive else "no link has a mass"
 
 
 def _arrows(
@@ -143,7 +161,10 @@ def _arrows(
     scales
         By unit, the force or moment of an arrow of 1 m; None for a round number.
     """
-    motion, radius = context.motion, context.radius
+    motion = context.motion
+    for given in scales.values():
+        if given is not None and not 0.0 < given < np.inf:
+            raise InputError(f"layer {title.name!r}: a scale of {given}; it must be positive")
 
     def vectors(state: MotionState) -> Vectors:
         try:
@@ -155,33 +176,40 @@ def _arrows(
     for elapsed in np.linspace(0.0, motion.duration, min(_MOST_STATES, len(motion.times))):
         for node, (_, vector) in vectors(motion.state_at(float(elapsed))).items():
             greatest[units[node]] = max(greatest[units[node]], float(np.linalg.norm(vector)))
-    per_metre: dict[str, float] = {}
-    for unit in sorted(greatest):
-        given = scales[unit]
-        if given is None:
-            longest = _LONGEST * radius
-            given = 1.0 / (round_number(longest / greatest[unit]) if greatest[unit] else radius)
-        elif not 0.0 < given < np.inf:
-            raise InputError(f"layer {title.name!r}: a scale of {given}; it must be positive")
-        per_metre[unit] = given
-    hidden = translated(context.box.centre)
-    hidden[:3, :3] *= SMALLEST
-
-    def update(state: MotionState) -> dict[str, NodeState]:
-        found = vectors(state)
-        states = dict.fromkeys(units, NodeState(hidden))
-        for node, (origin, vector) in found.items():
-            states[node] = NodeState(pointing(origin, vector / per_metre[units[node]]))
-        return states
-
     parts: list[Part] = []
     for node, unit in units.items():
         parts += (arrow if unit == "N" else double_arrow)(node, colour)
-    lengths = ", ".join(_scale_text(unit, one, radius) for unit, one in per_metre.items())
-    at_rest = ", at rest" if motion.at_rest else ""
-    most = ", ".join(f"at most {greatest[unit]:.3g} {unit}" for unit in per_metre)
-    text = f"{title.text}{at_rest}: {lengths}; {most}"
-    return DrawnLayer(LegendEntry(title.name, text, title.colour), parts, update)
+    hidden = translated(context.box.centre)
+    hidden[:3, :3] *= SMALLEST
+
+    def in_scale(of_all: Mapping[str, float]) -> DrawnLayer:
+        """Return the layer in the scale of the greatest force and moment of all arrows."""
+        per_metre = {
+            unit: scales[unit] or _round_scale(of_all[unit], context.radius)
+            for unit in sorted(greatest)
+        }
+
+        def update(state: MotionState) -> dict[str, NodeState]:
+            states = dict.fromkeys(units, NodeState(hidden))
+            for node, (origin, vector) in vectors(state).items():
+                states[node] = NodeState(pointing(origin, vector / per_metre[units[node]]))
+            return states
+
+        lengths = ", ".join(
+            _scale_text(unit, one, context.radius) for unit, one in per_metre.items()
+        )
+        at_rest = ", at rest" if motion.at_rest else ""
+        most = ", ".join(f"at most {greatest[unit]:.3g} {unit}" for unit in per_metre)
+        text = f"{title.text}{at_rest}: {lengths}; {most}"
+        legend = LegendEntry(title.name, text, title.colour)
+        return DrawnLayer(legend, parts, update, greatest=greatest, in_scale=in_scale)
+
+    return in_scale(greatest)
+
+
+def _round_scale(greatest: float, radius: float) -> float:
+    """Return the force of an arrow of 1 m, such that the longest fits and lengths are round."""
+    return 1.0 / (round_number(_LONGEST * radius / greatest) if greatest else radius)
 
 
 def _closed_state(context: LayerContext, state: MotionState) -> MotionState:

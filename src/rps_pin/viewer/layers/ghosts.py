@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext
@@ -39,12 +38,18 @@ class Ghosts:
     at: Any = None
     above: bool = False
 
+    def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
+        """Return whether there are no other poses; see `Layer`."""
+        if self.at is None and subject.robot is None:
+            return "give the configurations, Ghosts(at=configurations)"
+        found = self.configurations(subject, motion)
+        return "" if len(found) else "these leg lengths have no other assembly mode"
+
     def configurations(self, subject: DisplayedMechanism, motion: Motion) -> Array:
         """Return the copies' configurations; see `Layer`."""
         if self.at is not None:
             return checked_configurations(subject.model, self.at)
-        if subject.robot is None:
-            raise InputError("layer 'ghosts': give the configurations, Ghosts(at=configurations)")
+        assert subject.robot is not None  # as `missing` has made sure
         return mode_configurations(subject.robot, motion.configurations[0], above=self.above)
 
     def draw(self, context: LayerContext) -> DrawnLayer:

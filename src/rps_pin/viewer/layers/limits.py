@@ -11,10 +11,11 @@ from rps_pin.arrays import Array
 from rps_pin.rps.kinematics.legs import cone_angles
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.urdf import LEGS
+from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.colours import BLUE, WARNING, colour_bar, css, warning
 from rps_pin.viewer.layers.parts import ball
-from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.motion import Motion, MotionState
 from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.links import node_name
 from rps_pin.viewer.scene.shapes import Material, translated
@@ -37,6 +38,13 @@ class Limits(RobotSizedLayer):
 
     size: float | None = None
 
+    def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
+        """Return whether no joint has limits; see `Layer`."""
+        robot = subject.robot
+        ball_limits = robot is not None and robot.parameters.spherical_cone_limit < np.pi
+        limited = _limited_joints(subject.model, robot) or ball_limits
+        return "" if limited else "no joint has position limits"
+
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the balls; see `Layer`."""
         model, data = context.subject.model, context.subject.model.createData()
@@ -54,12 +62,16 @@ class Limits(RobotSizedLayer):
                 for node, (point, share) in uses(state.q).items()
             }
 
+        def reading(state: MotionState) -> str:
+            shares = {node: share for node, (_, share) in uses(state.q).items()}
+            most = max(shares, key=shares.__getitem__)
+            return f"most: {100 * shares[most]:.0f} % ({most})"
+
         size = context.radius / 16.0 if self.size is None else self.size
-        shares = uses(context.motion.at(0.0))
-        parts = [ball(node, size, Material(0xFFFFFF, 0.6)) for node in shares]
-        text = "range of the joints in use" if shares else "no joint has limits"
-        bar = colour_bar(WARNING, "middle", "at a limit") if shares else None
-        return DrawnLayer(LegendEntry("limits", text, css(BLUE), bar), parts, update)
+        parts = [ball(node, size, Material(0xFFFFFF, 0.6)) for node in uses(context.motion.at(0.0))]
+        bar = colour_bar(WARNING, "middle", "at a limit")
+        legend = LegendEntry("limits", "range of the joints in use", css(BLUE), bar)
+        return DrawnLayer(legend, parts, update, reading)
 
 
 def _limited_joints(model: pin.Model, robot: RPSRobot | None) -> dict[str, int]:

@@ -68,6 +68,16 @@ def tube(points: Array, radius: float, sides: int = 6) -> TriangleMesh:
     return TriangleMesh(vertices, np.hstack([one, two]).T)
 
 
+def flat_ring(inner: float, outer: float, sides: int = 96) -> TriangleMesh:
+    """Return a ring in the plane z = 0, seen from above."""
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    circle = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides)], axis=1)
+    here = np.arange(sides)
+    after = (here + 1) % sides
+    near, far = (here, sides + here, sides + after), (here, sides + after, after)
+    return TriangleMesh(np.concatenate([inner * circle, outer * circle]), np.hstack([near, far]).T)
+
+
 def rotation_to(direction: Array) -> Array:
     """Return a rotation, homogeneous (4, 4), that carries z to a unit vector."""
     x, y, z = (float(part) for part in direction)

@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 
+from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.colours import BLUE, WARNING, colour_bar, css, warning
-from rps_pin.viewer.motion import MotionState
+from rps_pin.viewer.layers.parts import flat_ring
+from rps_pin.viewer.motion import Motion, MotionState
 from rps_pin.viewer.scene.legend import LegendEntry
-from rps_pin.viewer.scene.shapes import Material, Part, TriangleMesh, translated
+from rps_pin.viewer.scene.shapes import Material, Part, translated
+
+_BESIDE = np.radians(-15.0)
+"""Direction from the ring's centre, about z, to where its number stands: seen on the right."""
 
 
 @dataclass(frozen=True)
@@ -29,20 +33,31 @@ class Singularity(RobotSizedLayer):
 
     worst: float = 1e-3
 
+    def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
+        """Return whether there are no closures; see `Layer`."""
+        return "" if subject.mechanism.closures else "the mechanism has no closures"
+
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the ring; see `Layer`."""
         mechanism, box = context.subject.mechanism, context.box
-        reach = 1.25 * float((box.upper - box.lower)[:2].max()) / 2.0
-        ring = trimesh.creation.annulus(0.94 * reach, reach, 0.004 * box.radius, sections=72)
-        surface = TriangleMesh(np.array(ring.vertices), np.array(ring.faces))
+        reach = 1.12 * float((box.upper - box.lower)[:2].max()) / 2.0
         place = translated([*box.centre[:2], box.lower[2]])
-        parts = [Part("ring", "annulus", surface, Material(0xFFFFFF), np.eye(4))]
+        ring = flat_ring(0.94 * reach, reach)
+        parts = [Part("ring", "annulus", ring, Material(0xFFFFFF, flat=True), np.eye(4))]
 
         def update(state: MotionState) -> dict[str, NodeState]:
-            measure = 1.0 / max(mechanism.condition(state.q), 1.0)
-            share = np.log(max(measure, self.worst)) / np.log(self.worst)
+            share = np.log(max(measure(state), self.worst)) / np.log(self.worst)
             return {"ring": NodeState(place, warning(float(share)))}
 
-        text = "conditioning of the passive joints, 1 / cond(J_p)"
+        def measure(state: MotionState) -> float:
+            return 1.0 / max(mechanism.condition(state.q), 1.0)
+
+        def reading(state: MotionState) -> str:
+            return f"1 / cond(J_p) = {measure(state):.2g}"
+
+        text = "conditioning of the passive joints, 1 / cond(J_p), without unit"
         bar = colour_bar(WARNING, "1: best", f"{self.worst:g}: singular")
-        return DrawnLayer(LegendEntry("singularity", text, css(BLUE), bar), parts, update)
+        beside = reach * np.array([np.cos(_BESIDE), np.sin(_BESIDE)]) + box.centre[:2]
+        at = (float(beside[0]), float(beside[1]), float(box.lower[2]))
+        legend = LegendEntry("singularity", text, css(BLUE), bar, at)
+        return DrawnLayer(legend, parts, update, reading)

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rps_pin.errors import InputError
 from rps_pin.rps.workspace import Workspace, boundary, leg_grid, workspace
 from rps_pin.rps.workspace.geometry import boundary_conditioning
+from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
 from rps_pin.viewer.layers import base
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, RobotSizedLayer
 from rps_pin.viewer.layers.colours import FIELD, colour_bar
+from rps_pin.viewer.motion import Motion
 from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.shapes import Material, Part, TriangleMesh
 from rps_pin.viewer.scene.stage import round_number
@@ -38,11 +39,15 @@ class WorkspaceSurface(RobotSizedLayer):
     workspace: Workspace | None = None
     factor: float | None = None
 
+    def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
+        """Return whether it is no 3-RPS; see `Layer`."""
+        other = "only a 3-RPS has one; that of another mechanism's task is a figure of workspace()"
+        return other if subject.robot is None else ""
+
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the surface; see `Layer`."""
         robot = context.subject.robot
-        if robot is None:
-            raise InputError("layer 'workspace': only a 3-RPS has one")
+        assert robot is not None  # as `missing` has made sure
         base.check_magnification(self.factor, "workspace")
         found = self.workspace
         if found is None:

@@ -29,3 +29,5 @@ class LegendEntry:
     """``#rrggbb``, of the swatch."""
     bar: ColourBar | None = None
     """For layers whose colours are a scale."""
+    at: tuple[float, float, float] | None = None
+    """Point of the world, m, beside which the layer's reading stands; None: in the legend only."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import pinocchio as pin
 from numpy.typing import ArrayLike
@@ -20,8 +20,6 @@ from rps_pin.viewer.writers.window import Window
 
 ROBOT = f"{WORLD}/robot"
 """Path of the node that holds the robot: one child for each link, by the link's name."""
-_MOST_FRAMED = 200
-"""Configurations that the bounding box is computed from, at most."""
 
 
 class Scene:
@@ -39,6 +37,8 @@ class Scene:
     configurations : array_like, shape (nq,) or (n, nq)
         The configurations that the picture is framed for: one, or those of a whole motion. There
         is no default: the neutral configuration of a robot with closed loops is open.
+    around : ndarray, shape (k, 3)
+        Points in the world that the picture holds besides. Default: none.
 
     Attributes
     ----------
@@ -48,6 +48,8 @@ class Scene:
         The front end.
     box : BoundingBox
         The box that the robot fills at these configurations.
+    frame : BoundingBox
+        The box that the picture holds: this one, and the points `around` it.
     grid_spacing : float
         Distance between the lines of the floor's grid, in metres.
 
@@ -63,6 +65,7 @@ class Scene:
         visual: pin.GeometryModel,
         window: Window | SceneWriter,
         configurations: ArrayLike,
+        around: Array | None = None,
     ) -> None:
         self.model = model
         self.window = window
@@ -73,10 +76,10 @@ class Scene:
 
         shown = checked_configurations(model, configurations)
         parts = [part for link in self._links for part in link.parts()]
-        stride = -(-len(shown) // _MOST_FRAMED)
-        self.box = bounding_box(model, self._links, shown[::stride])
-        self.grid_spacing = grid_spacing(self.box.radius)
-        self.writer.set_stage(stage_around(self.box))
+        self.box = bounding_box(model, self._links, shown)
+        self.frame = self.box if around is None else self.box.with_points(around)
+        self.grid_spacing = grid_spacing(self.frame.radius)
+        self.writer.set_stage(stage_around(self.frame, floor=float(self.box.lower[2])))
         for part in parts:
             self.writer.add_part(f"{ROBOT}/{part.node}/{part.name}", part)
         self._place(shown[0], self._links)
@@ -105,6 +108,7 @@ class Scene:
         *,
         frame_rate: float = FRAME_RATE,
         more: Sequence[NodeKeyframes] = (),
+        readings: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         """Let the window play a motion in a loop, with Meshcat's playback controls.
 
@@ -116,6 +120,8 @@ class Scene:
             Keyframes per second; between them the browser interpolates.
         more
             Keyframes of other nodes, at the same times.
+        readings
+            Texts of the layers at these times, by the layer's name.
 
         Raises
         ------
@@ -130,7 +136,7 @@ class Scene:
         keyframes = [
             NodeKeyframes(self.paths[link.name], poses[:, k]) for k, link in enumerate(moving)
         ]
-        self.writer.animate(elapsed, [*keyframes, *more])
+        self.writer.animate(elapsed, [*keyframes, *more], readings or {})
 
     def _place(self, q: Array, links: Sequence[Link]) -> None:
         pin.forwardKinematics(self.model, self._data, q)

@@ -35,9 +35,12 @@ class Stage(NamedTuple):
     """
 
     box: BoundingBox
-    """The box that the robot fills over its whole motion."""
+    """The box that the picture holds: the robot over its whole motion, and its layers."""
     camera_position: tuple[float, float, float]
     """Position of the camera, which looks at the robot's centre."""
+    outline: tuple[float, float, float]
+    """What the camera sees of the box's contents as they turn about z once: half their width, and
+    lowest and highest point above the picture's middle, in halves of the picture's height."""
     floor_height: float
     """z of the floor, m."""
     floor_size: float
@@ -60,16 +63,32 @@ class Stage(NamedTuple):
     """Of shadows on the floor."""
 
 
-def stage_around(box: BoundingBox) -> Stage:
-    """Return the stage for a robot that fills `box`."""
+def stage_around(box: BoundingBox, floor: float) -> Stage:
+    """Return the stage for a picture that holds `box`, of a robot that stands at z = `floor`, m."""
     flat, height = _DISTANCE * math.cos(_ELEVATION), _DISTANCE * math.sin(_ELEVATION)
     # Just below the robot, so that the two do not flicker through each other.
-    floor_height = float(box.lower[2]) - 0.002 * box.radius
+    floor_height = floor - 0.002 * box.radius
     lines = LineSegments(_grid_points(box, floor_height))
     grid = Part("", "grid", lines, Material(0xB4BDC8), np.eye(4))
     axes = Part("", "axes", _axes(0.25 * box.radius), Material(0xFFFFFF), np.eye(4))
     position = (flat * math.cos(_AZIMUTH), flat * math.sin(_AZIMUTH), height)
-    return Stage(box, position, floor_height, 2.0 * _GRID_RADIUS * box.radius, (grid, axes))
+    size = 2.0 * _GRID_RADIUS * box.radius
+    return Stage(box, position, _outline(box), floor_height, size, (grid, axes))
+
+
+def _outline(box: BoundingBox) -> tuple[float, float, float]:
+    """Return the outline of a box's contents; see `Stage`."""
+    from_centre = (box.points - box.centre) / box.radius
+    around, height = np.hypot(*from_centre[:, :2].T), from_centre[:, 2]
+    turn = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)[:, None]
+    along, across = around * np.cos(turn), around * np.sin(turn)  # towards the camera, to its right
+    depth = _DISTANCE - along * math.cos(_ELEVATION) - height * math.sin(_ELEVATION)
+    up = height * math.cos(_ELEVATION) - along * math.sin(_ELEVATION)
+    half_picture = depth * math.tan(math.radians(_FIELD_OF_VIEW / 2.0))
+    x, y = across / half_picture, up / half_picture
+    # Rounded: the same picture of a robot of any size.
+    half, low, high = (round(float(one), 9) for one in (np.abs(x).max(), y.min(), y.max()))
+    return half, low, high
 
 
 def grid_spacing(radius: float) -> float:

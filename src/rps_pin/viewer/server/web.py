@@ -152,7 +152,7 @@ def application(hub: Hub, *, port: int, title: str, note: str) -> tornado.web.Ap
         "default-src 'none'; script-src 'self' 'unsafe-inline'; style-src 'unsafe-inline'; "
         f"img-src data: blob:; connect-src {sockets}"
     )
-    own = inline_script(own_file("legend.js") + own_file("live.js"))
+    own = inline_script("".join(map(own_file, ("layout.js", "legend.js", "live.js"))))
     scripts = f'<script src="{_SCRIPT_PATH}"></script>\n{own}'
     text = page(title=title, note=note, policy=policy, scripts=scripts)
     return tornado.web.Application(

@@ -7,13 +7,14 @@ scales the robot to radius one. Inside ``/world`` lengths are in metres, in the 
 Four differences to the description of the scene are bridged here: Meshcat's cylinders stand along
 y; its objects are named after the time and this machine's network address (here after their path,
 so that the same scene gives the same file); its Python package writes ``castShadow`` in lower case;
-and it knows no legend. The legend is sent as ``userData`` of ``/world``, which three.js leaves to
-its users: the pages of this package draw it, and Meshcat's own ignore it.
+and it knows no legend. The legend is sent as ``userData`` of ``/world``, readings as that of
+``/readings``, and the outline of the robot as that of ``/Cameras``, which three.js leaves to its
+users: the pages of this package draw them, and Meshcat's own ignore them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -32,6 +33,8 @@ from rps_pin.viewer.writers.window import RawCommand, Window
 
 _Y_TO_Z: Array = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 """Turns a Meshcat cylinder, which stands along y, onto z."""
+READINGS = "/readings"
+"""Path of the node whose ``userData`` are the layers' readings."""
 _FLOAT32_ARRAY = 0x17
 """Meshcat's MessagePack code for numbers that the browser reads as a ``Float32Array``."""
 
@@ -55,6 +58,7 @@ class MeshcatWriter:
         world[:3, :3] /= box.radius
         world[:3, 3] = -box.centre / box.radius
         self.place(WORLD, world)
+        self._set("/Cameras", "userData", {"outline": list(stage.outline)})
         x, y, z = stage.camera_position
         camera = "/Cameras/default/rotated/<object>"
         self._set(camera, "fov", stage.field_of_view)
@@ -108,8 +112,19 @@ class MeshcatWriter:
             lines.append(line | (line.pop("bar") or {}))
         self._set(WORLD, "userData", {"layers": lines})
 
-    def animate(self, elapsed: Array, keyframes: Sequence[NodeKeyframes]) -> None:
-        """Let the page play keyframes in a loop, with Meshcat's playback controls."""
+    def set_readings(self, time: float | None, readings: Mapping[str, str]) -> None:
+        """Send the layers' texts, and the time, to the page."""
+        self._set(READINGS, "userData", {"time": time, "readings": dict(readings)})
+
+    def animate(
+        self,
+        elapsed: Array,
+        keyframes: Sequence[NodeKeyframes],
+        readings: Mapping[str, Sequence[str]],
+    ) -> None:
+        """Let the page play keyframes in a loop, with its playback controls."""
+        every = {name: list(texts) for name, texts in readings.items()}
+        self._set(READINGS, "userData", {"every": every})
         # Meshcat's own `Animation` writes a dictionary for each keyframe; packed arrays, which
         # three.js reads as well, are a tenth of the size.
         tracks: list[tuple[str, list[dict[str, object]]]] = []

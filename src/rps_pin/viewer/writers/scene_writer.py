@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from rps_pin.arrays import Array
@@ -33,5 +33,16 @@ class SceneWriter(Protocol):
     def set_legend(self, entries: Sequence[LegendEntry], visible: Sequence[bool]) -> None:
         """Show the legend of the layers, with a switch for each."""
 
-    def animate(self, elapsed: Array, keyframes: Sequence[NodeKeyframes]) -> None:
-        """Play keyframes at times (s, from zero, shape (n,)) in a loop, without this process."""
+    def set_readings(self, time: float | None, readings: Mapping[str, str]) -> None:
+        """Show the layers' texts, by the layer's name, and a clock (s) where a time is given."""
+
+    def animate(
+        self,
+        elapsed: Array,
+        keyframes: Sequence[NodeKeyframes],
+        readings: Mapping[str, Sequence[str]],
+    ) -> None:
+        """Play keyframes at times (s, from zero, shape (n,)) in a loop, without this process.
+
+        With a clock, and the layers' texts at these times, by the layer's name.
+        """

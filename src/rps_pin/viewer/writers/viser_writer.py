@@ -8,7 +8,7 @@ frames where there is no GPU; the background's colours; and drawing over everyth
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,7 @@ class ViserWriter:
         self._scales: dict[str, Array] = {}
         self._handles: dict[str, Any] = {}
         self._ticks: dict[str, Any] = {}
+        self._hints: dict[str, str] = {}
 
     def set_stage(self, stage: Stage) -> None:
         """Set camera and lights, and draw grid and axes."""
@@ -140,10 +141,20 @@ class ViserWriter:
                 tick = self._server.gui.add_checkbox(entry.name, shown, hint=_hint(entry))
                 path = f"{WORLD}/layers/{entry.name}"
                 tick.on_update(lambda event, path=path: self.set_visible(path, event.target.value))
-                self._ticks[entry.name] = tick
+                self._ticks[entry.name], self._hints[entry.name] = tick, _hint(entry)
             self._ticks[entry.name].value = shown
 
-    def animate(self, elapsed: Array, keyframes: Sequence[NodeKeyframes]) -> None:
+    def set_readings(self, time: float | None, readings: Mapping[str, str]) -> None:
+        """Show the layers' texts in the hints of their ticks."""
+        for name, text in readings.items():
+            self._ticks[name].hint = f"{self._hints[name]}: {text}"
+
+    def animate(
+        self,
+        elapsed: Array,
+        keyframes: Sequence[NodeKeyframes],
+        readings: Mapping[str, Sequence[str]],
+    ) -> None:
         """Refuse: viser plays no keyframes."""
         raise RPSPinError("viser's page plays no motion by itself: use View.play, or Meshcat")
 
