@@ -152,7 +152,7 @@ _WRONG_VALUES = [
     (["crank_joint"], "'crank_joint': it must be JOINT=NUMBER"),
     (["crank_joint=nan"], "the value of joint 'crank_joint' is not finite"),
     (["crank_joint=1", "crank_joint=2"], "joint 'crank_joint' is named twice"),
-    (["crank_joint=99"], "outside their limits: 'crank_joint' at 99 (-6.28319 to 6.28319)"),
+    (["crank_joint=99"], "outside their limits: 'crank_joint' at 99 rad (-6.28319 to 6.28319 rad)"),
     (["rocker_joint=3.1"], "closure 'knee' stays open by 0.246978 m"),
     (["crank_joint=1", "rocker_joint=1"], "closure 'knee' stays open by 0.0828846 m"),
 ]

@@ -14,6 +14,7 @@ from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop.assembly.approach import approached
 from rps_pin.closed_loop.assembly.closing import close, is_closed
 from rps_pin.closed_loop.assembly.continuation import Followed, Path
+from rps_pin.closed_loop.assembly.reach import far_frame
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError, InputError, SingularityError
 from rps_pin.validation import numbers, real_vector
@@ -22,6 +23,8 @@ from rps_pin.validation import numbers, real_vector
 AT_LIMIT = 1e-9
 #: Values this near to those of the guess are its own, rad or characteristic lengths.
 _SAME = 1e-13
+#: Ways of this length, in characteristic lengths, are worth asking whether they leave all reach.
+_LONG = 10.0
 #: The last correction of an overdetermined configuration, characteristic lengths.
 _NEAR = 1e-3
 
@@ -51,7 +54,9 @@ def complete(
     moved = np.abs(pin.difference(system.model, start, target) / system.column_scale)
     if moved.max(initial=0.0) <= _SAME * system.equations.length:
         return target
-    found = Path(system, given, start, target).follow()
+    long = within_limits and moved.max() > _LONG * system.equations.length
+    far = far_frame(system, target) if long else None
+    found = Path(system, given, start, target, far).follow()
     q = found.q
     if found.share < 1 and not found.consistent:
         q = _overdetermined(system, named, given, start, target)

@@ -13,7 +13,8 @@ vectors U, V and values S at its beginning,
     |S^-1 U' A_k+1 V - 1| <= 1/2,   |first chord step| <= |prediction| / 4,
     |second chord step| <= |first| / 4,
 
-and nothing moves by more than 0.3 rad, or 0.3 characteristic lengths. The first bound says that no
+and nothing moves by more than 0.3 rad, or 0.3 characteristic lengths (of a frame that is farther
+away than joints within limits let it: 0.3 of how much farther). The first bound says that no
 singularity lies between: with A changing evenly, A is regular all along, and its determinant keeps
 its sign. The others are the contraction that the theorem of Newton and Kantorovich asks for: the
 steps end in the solution that continues y_k. Otherwise the step is shortened. Near a singularity A+
@@ -29,6 +30,7 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.closed_loop.assembly.closing import closed_gap
+from rps_pin.closed_loop.assembly.reach import FarFrame
 from rps_pin.closed_loop.constraints.rank_rule import largest
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.numerics.linear_algebra import rank
@@ -119,9 +121,18 @@ class Path:
         A closed configuration, shape (nq,).
     target
         The same with the given coordinates as they are wanted, shape (nq,).
+    far
+        The output frame that the target puts beyond its reach, if it does.
     """
 
-    def __init__(self, system: ConstraintSystem, given: Indices, start: Array, target: Array):
+    def __init__(
+        self,
+        system: ConstraintSystem,
+        given: Indices,
+        start: Array,
+        target: Array,
+        far: FarFrame | None = None,
+    ) -> None:
         self.system, self.given = system, given
         free = np.ones(system.model.nv, dtype=bool)
         free[given] = False
@@ -134,6 +145,7 @@ class Path:
         self._no_rank = max(_NO_RANK, rule.tolerance)
         self._inconsistent = max(_INCONSISTENT, rule.consistent)
         self._of_given = system.coordinates_of(given)
+        self._far, self._angular = far, system.equations.angular_velocities
 
     def follow(self) -> Followed:
         """Follow the path to its end, or to a singularity."""
@@ -149,8 +161,7 @@ class Path:
             tangent, consistent = self._tangent(point)
             if not consistent:
                 return Followed(point.q, done, point.condition, done > 0)
-            reach = float(np.abs(tangent / self._scale).max(initial=0.0))
-            share = min(share, 1 - done, _REACH * self._length / max(reach, 1e-300))
+            share = min(share, 1 - done, self._longest(point.q, tangent))
             end = 1 - done <= share * (1 + 1e-9)
             try:
                 reached, change = self._step(point, tangent, share, size, end)
@@ -164,6 +175,14 @@ class Path:
             if share < _SHORTEST:
                 return Followed(point.q, done, point.condition, True)
         return Followed(point.q, done, point.condition, True, is_long=True)
+
+    def _longest(self, q: Array, tangent: Array) -> float:
+        """Return the share of the path in which nothing moves too far."""
+        moves = np.abs(tangent / self._scale)
+        if self._far is not None:
+            more = max(1.0, self._far.beyond(q) / self._length)
+            moves = np.where(self._angular, moves, moves / more)
+        return _REACH * self._length / max(float(moves.max(initial=0.0)), 1e-300)
 
     def _tangent(self, point: _Point) -> tuple[Array, bool]:
         """Return the velocity for the whole path in unit time, (nv,), and whether it is one."""

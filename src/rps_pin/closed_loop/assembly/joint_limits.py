@@ -18,9 +18,12 @@ class JointLimits:
     ----------
     model
         The tree; its position limits.
+    angular
+        Which velocities are angular, shape (nv,), for the units in phrases; without, they have
+        none.
     """
 
-    def __init__(self, model: pin.Model) -> None:
+    def __init__(self, model: pin.Model, angular: Bools | None = None) -> None:
         joints = [joint for joint in list(model.joints)[1:] if joint.nq == joint.nv]
         pairs = [(joint, k) for joint in joints for k in range(joint.nv)]
         self.q = np.array([joint.idx_q + k for joint, k in pairs], dtype=np.intp)
@@ -29,6 +32,7 @@ class JointLimits:
         self.lower = model.lowerPositionLimit[self.q]
         self.upper = model.upperPositionLimit[self.q]
         self._nv = model.nv
+        self._units = ["" if angular is None else " rad" if angular[i] else " m" for i in self.v]
 
     def clip(self, q: Array) -> Array:
         """Return the configuration with every coordinate brought within its limits."""
@@ -48,8 +52,8 @@ class JointLimits:
         """Return a phrase for each joint outside its limits, by its name."""
         x = q[self.q]
         return {
-            self.names[i]: f"{self.names[i]!r} at {x[i]:.6g} ({self.lower[i]:.6g} to "
-            f"{self.upper[i]:.6g})"
+            self.names[i]: f"{self.names[i]!r} at {x[i]:.6g}{self._units[i]} "
+            f"({self.lower[i]:.6g} to {self.upper[i]:.6g}{self._units[i]})"
             for i in np.flatnonzero(self.beyond(q))
         }
 
@@ -69,7 +73,9 @@ class JointLimits:
             at = np.isfinite(limit) & (np.abs(x - limit) <= self._margin(limit))
             for i in np.flatnonzero(at):
                 name = self.names[i]
-                found.setdefault(name, f"joint {name!r} at its limit {limit[i]:.6g}")
+                found.setdefault(
+                    name, f"joint {name!r} at its limit {limit[i]:.6g}{self._units[i]}"
+                )
         return list(found.values())
 
     def _margin(self, limit: Array) -> Array:

@@ -125,7 +125,7 @@ class ConstraintSystem:
         self.completion: CompletedFactorisation | None = None
         self.effects = effects
         _ = self.springs  # refuses what can have none
-        self.limits = JointLimits(model)
+        self.limits = JointLimits(model, equations.angular_velocities)
         self._frame_ids: dict[str, int] = {}
         self.guard = Guard()
 
