@@ -6,6 +6,7 @@ attributes too, so that a program need not read the sentence.
 
 from __future__ import annotations
 
+import math
 import os
 import reprlib
 import sys
@@ -131,7 +132,14 @@ class LimitViolation(NamedTuple):
     upper: float
     """Largest allowed value, in `unit`."""
     unit: str
-    """``"m"`` or ``"rad"``."""
+    """``"m"`` or ``"rad"``; ``"deg"`` of `in_degrees`."""
+
+    def in_degrees(self) -> LimitViolation:
+        """Return it with angles in degrees."""
+        if self.unit != "rad":
+            return self
+        value, lower, upper = map(math.degrees, (self.value, self.lower, self.upper))
+        return self._replace(value=value, lower=lower, upper=upper, unit="deg")
 
     def __str__(self) -> str:
         return (

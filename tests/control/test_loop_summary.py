@@ -175,7 +175,7 @@ def test_figures_are_of_the_ticks_in_the_window(
         "ticks": len(ticks),
     }
     found = summary.as_dict()
-    assert {*expected, "statuses", "first"} == set(found)
+    assert {*expected, "statuses", "first", "turn_unit"} == set(found)
     for name, value in expected.items():
         assert found[name] == pytest.approx(value, rel=1e-7, abs=1e-8), name
 
@@ -232,6 +232,7 @@ def test_a_window_without_ticks_is_refused(window: dict[str, float]) -> None:
 def test_plain_data_goes_through_json(seed: int) -> None:
     data = LoopSummary.of(random_run(seed)).as_dict()
     assert json.loads(json.dumps(data, allow_nan=False)) == data
+    assert data.pop("turn_unit") == "urad"
     for name, value in data.items():
         kind: Any = dict if name in ("statuses", "first") else int if name == "ticks" else float
         assert type(value) is kind, name

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from rps_pin import __version__
+from rps_pin.cli.degrees import ASKED, as_asked
 from rps_pin.cli.doctor import doctor
 from rps_pin.cli.lazy_group import SETTINGS, LazyGroup
 from rps_pin.cli.printing import say, tell_error, tell_fault
@@ -102,6 +103,7 @@ def run() -> None:
     """Run the command line; an error is one line and the exit status 1, a fault 70."""
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
     FILES_READ.set(set())
+    ASKED.set(False)
     threading.excepthook = _tell_fault_of_thread
     try:
         app(prog_name="rps-pin")
@@ -120,7 +122,7 @@ def run() -> None:
         raise  # `rps_pin.cli.main` says what is missing
     except Exception as error:
         sys.exit(tell_fault(error))
-    tell_error(message)
+    tell_error(as_asked(message))
     sys.exit(1)
 
 

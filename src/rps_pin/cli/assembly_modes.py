@@ -12,11 +12,10 @@ from rps_pin.arrays import Array
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.closed_loop.column_names import column_names
+from rps_pin.plain_text import short
 
 #: Modes in the printed table at most, and the width of one.
 _MOST, _WIDTH = 8, 15
-#: Values below this are printed as zero.
-_ZERO = 1e-12
 _CONDITION = "condition number"
 
 
@@ -81,7 +80,7 @@ def assembly_modes_command(
     room = console.width - max(map(len, [*names, _CONDITION])) - 4
     shown = max(1, min(room // _WIDTH, _MOST))
     columns = [f"{k + 1} ({hits})" for k, hits in enumerate(found.hits[:shown])]
-    rows = [(name, *(_short(q[i]) for q in found.q[:shown])) for i, name in enumerate(names)]
+    rows = [(name, *(short(q[i]) for q in found.q[:shown])) for i, name in enumerate(names)]
     rows.append((_CONDITION, *(f"{c:.3g}" for c in found.condition[:shown])))
     if found.hits.size:
         console.print(common.table_of(rows, "mode (starts)", *columns))
@@ -91,10 +90,6 @@ def assembly_modes_command(
             + ("" if frame else "; --frame NAME tells modes apart by that frame alone")
         )
     console.print(str(found))
-
-
-def _short(number: float) -> str:
-    return f"{0.0 if abs(number) < _ZERO else number:.6g}"
 
 
 def _plain(number: float) -> float | None:

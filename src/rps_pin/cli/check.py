@@ -16,13 +16,14 @@ from rps_pin.cli import helix_options as helix
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli import motion_options as motions
 from rps_pin.cli import task_options as tasks
-from rps_pin.cli.degrees import check_in_degrees
+from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.given_options import refuse
 from rps_pin.errors import InputError
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.singularity.path_check import check_path
-from rps_pin.task.paths.events import PathCheck
+from rps_pin.task.paths.events import LimitEvent, PathCheck, pose_of_robot_in_words
 from rps_pin.task.paths.findings import GRAZE
+from rps_pin.task.paths.signals import pose_in_words
 from rps_pin.trajectories.path import Trajectory
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ def check_command(
     payload_centre: motions.PayloadCentreOption = (0.0, 0.0, 0.0),
     wrench: motions.WrenchOption = None,
     mechanism: tasks.MechanismOption = None,
-    degrees: tasks.DegreesOption = False,
+    degrees: DegreesOption = False,
     clearance: ClearanceOption = 0.0,
     ignore: IgnoreOption = None,
     interference: InterferenceOption = Interference.AUTO,
@@ -137,7 +138,6 @@ def check_command(
     if payload is not None or any(payload_centre) or wrench is not None:
         told = "of a 3-RPS, positions alone are checked: these options need a --mechanism"
         raise typer.BadParameter(told, param_hint="--payload, --payload-centre, --wrench")
-    tasks.refuse_degrees(degrees)
     machine = common.load_robot(robot)
     path: Trajectory
     if trajectory is None:
@@ -147,7 +147,7 @@ def check_command(
     if fastest:
         path = motions.fastest_of_robot(common.text_console(as_json), machine, path)
     found = check_path(machine, path, threshold=threshold)
-    _tell(found, {"robot": machine.parameters.name}, as_json)
+    _tell(found, {"robot": machine.parameters.name}, machine.task, degrees, as_json)
 
 
 def _task(mechanism: Path, package_path: Sequence[Path] | None) -> Task:
@@ -183,18 +183,47 @@ def _of_task(
     if fastest:
         path = motions.fastest_of_task(common.text_console(as_json), task, path, **loads)
     found = check_task_path(task, path, **asked, **loads)
+    _tell(found, {"mechanism": task.mechanism.name}, task, degrees, as_json)
+
+
+def _tell(found: PathCheck, of: dict[str, Any], task: Task, degrees: bool, as_json: bool) -> None:
     if degrees:
-        found = check_in_degrees(found, task)
-    units = {"length": "m", "angle": tasks.unit_of(True, degrees)}
-    _tell(found, {"mechanism": task.mechanism.name, "units": units}, as_json)
-
-
-def _tell(found: PathCheck, of: dict[str, Any], as_json: bool) -> None:
+        found = _in_degrees(found, task)
     if as_json:
-        common.print_json(_plain(found) | of | {"ok": found.ok})
+        units = {"units": tasks.units(degrees)}
+        common.print_json(_plain(found) | of | units | {"ok": found.ok})
     else:
         common.text_console(soft_wrap=True).print(str(found))
     raise typer.Exit(not found.ok)
+
+
+def _in_degrees(found: PathCheck, task: Task) -> PathCheck:
+    """Return findings along a path of a task with angles of poses and limits in degrees."""
+    factors = np.where(task.angular, math.degrees(1.0), 1.0)
+
+    def turned(event: Any) -> Any:
+        pose = event.pose * factors
+        changed = event._replace(pose=pose)
+        if not isinstance(event, LimitEvent):
+            of_task = bool(event.where)
+            words = (
+                pose_in_words(task, pose, "deg") if of_task else pose_of_robot_in_words(pose, "deg")
+            )
+            return changed._replace(where=words)
+        if not event.unit.startswith("rad"):
+            return changed
+        limit, unit = math.degrees(event.limit), event.unit.replace("rad", "deg")
+        return changed._replace(limit=limit, unit=unit)
+
+    links = found.interference
+    if links is not None:
+        links = links._replace(events=tuple(map(turned, links.events)))
+    return found._replace(
+        singularities=tuple(map(turned, found.singularities)),
+        limits=tuple(map(turned, found.limits)),
+        minimum_pose=found.minimum_pose * factors,
+        interference=links,
+    )
 
 
 def _plain(value: Any) -> Any:

@@ -63,19 +63,21 @@ def load_robot(name_or_file: str) -> RPSRobot:
     return robot
 
 
-def doubt_pose(name: str, pose: Three) -> None:
-    """Print a note on a pose of a height beyond `LARGEST`, or of a tilt beyond half a turn."""
+def doubt_pose(name: str, pose: Three, degrees: bool) -> None:
+    """Print a note on a pose of a height beyond `LARGEST`, or of a tilt beyond half a turn.
+
+    The tilts are in radians or degrees.
+    """
     height, *tilts = pose
     doubt_lengths(name, "a height", [height])
-    if math.hypot(*tilts) > math.pi:
-        given, radians = (
-            " ".join(f"{value:g}" for value in values) for values in (tilts, np.radians(tilts))
-        )
-        say(
-            f"note: {name}: a tilt of {given} rad is more than half a turn. Tilts are in radians; "
-            f"{given} degrees would be {radians}",
-            err=True,
-        )
+    if math.hypot(*tilts) > (180.0 if degrees else math.pi):
+        given = " ".join(f"{value:g}" for value in tilts)
+        told = f"note: {name}: a tilt of {given} {'deg' if degrees else 'rad'} is more than "
+        told += "half a turn"
+        if not degrees:
+            radians = " ".join(f"{value:g}" for value in np.radians(tilts))
+            told += f". Tilts are in radians; {given} degrees would be {radians} (see --degrees)"
+        say(told, err=True)
 
 
 def doubt_lengths(name: str, what: str, values: Sequence[float]) -> None:

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from rps_pin.cli import console as common
+from rps_pin.cli.degrees import DegreesOption, as_asked
 from rps_pin.cli.layer_options import write_page
 from rps_pin.cli.motion_options import FastestOption, fastest_of_robot, fastest_of_task
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
@@ -40,15 +41,16 @@ def control_command(
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
     fastest: FastestOption = False,
+    degrees: DegreesOption = False,
 ) -> None:
     """Run a control loop against a simulated robot that differs from the controller's model.
 
     The file has the robot (a 3-RPS, or a mechanism with a task), trajectory, controller, plant
     (wrong masses, friction, encoders, delay) and faults. Output: **report.md** with gains, margins,
-    errors in micrometres and microradians and statuses, **loop.csv** (every tick), figures,
-    **summary.json**, and **viewer.html**, the motion in 3D. The shortest time of **--fastest** is
-    that of the controller's model, and leaves no force for control: lower limits are given in the
-    trajectory (**fastest: {force: 40}**).
+    errors in micrometres and microradians (with **--degrees** in degrees) and statuses,
+    **loop.csv** (every tick), figures, **summary.json**, and **viewer.html**, the motion in 3D. The
+    shortest time of **--fastest** is that of the controller's model, and leaves no force for
+    control: lower limits are given in the trajectory (**fastest: {force: 40}**).
 
     Exit status: 0 done, also if the controller stopped; 1 it cannot be run, or not to the end (the
     error says why); 2 wrong usage; 130 Ctrl-C. What was run before the end is written.
@@ -72,17 +74,13 @@ def control_command(
     check_outputs(results, overwrite, inputs=[scenario], renewed=True)
     console = common.text_console(as_json)
     if fastest:
-        model, given = loaded.model, loaded.trajectory
-        path = (
-            fastest_of_robot(console, model, given)
-            if isinstance(model, RPSRobot)
-            else fastest_of_task(console, model, given)
-        )
-        loaded = replace(loaded, trajectory=path)
+        loaded = _fastest(loaded, console)
     common.tell_size("loop.csv", loaded.duration / loaded.entry.period, columns_of(*loaded.sizes))
     run, broken = _run(loaded, console)
     window = loaded.entry.settle if run.time[-1] > loaded.entry.settle else 0.0
     summary = summary_of(run, begin=window)
+    if degrees:
+        summary = summary.in_degrees()
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
         from rps_pin.plots import save_figure
@@ -90,10 +88,10 @@ def control_command(
         from rps_pin.viewer import Motion
 
         title = f"{robot} {name}, {scenario.name}"
-        write_loop_csv(files[1], run)
+        write_loop_csv(files[1], run, degrees=degrees)
         write_text(files[2], json.dumps(summary.as_dict(), indent=2) + "\n")
-        write_text(files[0], report(title, loaded, run, summary, _CAPTIONS))
-        files += save_figure(plot_tracking(run, begin=window), folder, "tracking")
+        write_text(files[0], as_asked(report(title, loaded, run, summary, _CAPTIONS)))
+        files += save_figure(plot_tracking(run, begin=window, degrees=degrees), folder, "tracking")
         files += save_figure(plot_loop_forces(run, begin=window), folder, "forces")
         mechanism = loaded.machine.mechanism
         model = mechanism.model
@@ -109,12 +107,25 @@ def control_command(
         console.print(summary.table())
         for event in run.events[:_MOST_SHOWN]:
             words = f"{event.time:.6g} s, {status_name(event.status)}: {event.text}"
-            console.print(words)
+            console.print(as_asked(words))
         if len(run.events) > _MOST_SHOWN:
             console.print(f"... and {len(run.events) - _MOST_SHOWN} further changes of the status")
         common.print_files(console, files)
     if broken is not None:
         raise broken
+
+
+def _fastest(scenario: Scenario, console: Console) -> Scenario:
+    """Return a scenario with the shortest motion along its trajectory."""
+    from rps_pin.rps.robot import RPSRobot
+
+    model, given = scenario.model, scenario.trajectory
+    path = (
+        fastest_of_robot(console, model, given)
+        if isinstance(model, RPSRobot)
+        else fastest_of_task(console, model, given)
+    )
+    return replace(scenario, trajectory=path)
 
 
 def _run(scenario: Scenario, console: Console) -> tuple[LoopRun, BaseException | None]:

@@ -1,50 +1,64 @@
-"""What ``--degrees`` makes of the results of commands: angles in degrees, said with their unit.
+"""``--degrees``: the angles that a command is given, prints and writes are in degrees.
 
+One rule for all commands that have the option: without it angles are in radians, with it in
+degrees, in options, text, errors, JSON and columns of CSV files, which name the unit. Not changed
+are q (``configuration`` in JSON) and what files that are read hold: they name their own units.
 Single values are converted by `rps_pin.cli.task_options.in_unit`.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
-from typing import Any
+import re
+from contextvars import ContextVar
+from typing import Annotated
 
-import numpy as np
+import typer
 
-from rps_pin.arrays import Array
-from rps_pin.task.paths.events import LimitEvent, PathCheck
-from rps_pin.task.paths.signals import pose_in_words
-from rps_pin.task.task import Task
-from rps_pin.trajectories.csv_columns import in_degrees
-
-
-def check_in_degrees(found: PathCheck, task: Task) -> PathCheck:
-    """Return findings along a path of a task with angles of poses and limits in degrees."""
-    factors = np.where(task.angular, math.degrees(1.0), 1.0)
-
-    def turned(event: Any) -> Any:
-        pose = event.pose * factors
-        changed = event._replace(pose=pose)
-        if not isinstance(event, LimitEvent):
-            return changed._replace(where=pose_in_words(task, pose, "deg"))
-        if not event.unit.startswith("rad"):
-            return changed
-        limit, unit = math.degrees(event.limit), event.unit.replace("rad", "deg")
-        return changed._replace(limit=limit, unit=unit)
-
-    links = found.interference
-    if links is not None:
-        links = links._replace(events=tuple(map(turned, links.events)))
-    return found._replace(
-        singularities=tuple(map(turned, found.singularities)),
-        limits=tuple(map(turned, found.limits)),
-        minimum_pose=found.minimum_pose * factors,
-        interference=links,
-    )
+#: Whether the command that runs was asked for degrees.
+ASKED: ContextVar[bool] = ContextVar("degrees", default=False)
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
+#: Numbers with their units: ``0.1 rad``, ``0.1 to 0.2 rad``, ``(0.1, 0.2) rad``, and
+#: ``(1, 0.2) m, rad``. Not one that may be of another unit.
+_ANGLES = re.compile(
+    rf"(?:\({_NUMBER}(?:, {_NUMBER})*\)|(?<![\w.]){_NUMBER}(?: to {_NUMBER})?)"
+    r" ((?:m, |rad, )*rad)\b(?! or )",
+    re.IGNORECASE,
+)
 
 
-def table_in_degrees(names: Sequence[str], rows: Array) -> tuple[list[str], Array]:
-    """Return names of columns and rows (n, columns) of a table with its angles in degrees."""
-    turned = [in_degrees(name) for name in names]
-    angles = [old != new for old, new in zip(names, turned, strict=True)]
-    return turned, np.where(angles, np.degrees(rows), rows)
+def _asked(degrees: bool) -> bool:
+    ASKED.set(degrees)
+    return degrees
+
+
+DegreesOption = Annotated[
+    bool,
+    typer.Option(
+        "--degrees",
+        help="Angles are given, printed and written in degrees; without, in radians.",
+        callback=_asked,
+    ),
+]
+
+
+def as_asked(text: str) -> str:
+    """Return a message in the unit of angles that the command was asked for."""
+    return words_in_degrees(text) if ASKED.get() else text
+
+
+def words_in_degrees(text: str) -> str:
+    """Return a text with its numbers of rad, rad/s and so on in degrees."""
+
+    def turned(found: re.Match[str]) -> str:
+        numbers, units = found.group()[: -len(found[1])], found[1].split(", ")
+        each = itertools.cycle(units)
+
+        def one(number: re.Match[str]) -> str:
+            angle = next(each) == "rad"
+            return f"{math.degrees(float(number[0])):.5g}" if angle else number[0]
+
+        return re.sub(_NUMBER, one, numbers) + found[1].replace("rad", "deg")
+
+    return _ANGLES.sub(turned, text)

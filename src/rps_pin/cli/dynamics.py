@@ -13,6 +13,7 @@ from rich.markup import escape
 from rps_pin.cli import console as common
 from rps_pin.cli import motion_options as motions
 from rps_pin.cli import task_options as tasks
+from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.given_options import refuse
 from rps_pin.cli.mechanism_options import AccuracyOption, IgnoreLimitsOption
 from rps_pin.cli.motion_report import motion_files, print_motion, write_motion
@@ -53,7 +54,7 @@ def dynamics_command(
     mechanism: tasks.MechanismOption = None,
     ignore_limits: IgnoreLimitsOption = False,
     accuracy: AccuracyOption = None,
-    degrees: tasks.DegreesOption = False,
+    degrees: DegreesOption = False,
     output: common.NamedFolderOption = None,
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
@@ -99,7 +100,6 @@ def dynamics_command(
         )
         return
     refuse(context, "it is an option of a mechanism", "ignore_limits", "accuracy")
-    tasks.refuse_degrees(degrees)
     machine = common.load_robot(robot)
     if gravity is not None:
         machine = RPSRobot(machine.parameters.replace(gravity=gravity))
@@ -120,13 +120,15 @@ def dynamics_command(
     run = run_motion(machine, path, rate, wrench=wrench, progress=progress)
     sheet = size_actuators(run.time, run.force, run.speed, run.length, limits)
     summary = summarise(run, machine)
+    if degrees:
+        summary = summary.in_degrees()
     folder.mkdir(parents=True, exist_ok=True)
     with console.status("writing the results"):
         from rps_pin.plots import save_figure
         from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
 
         title = f"3-RPS {name} along {trajectory.name}"
-        files = write_motion(folder, "dynamics", title, machine, run)
+        files = write_motion(folder, "dynamics", title, machine, run, degrees)
         motion = run.pose, run.rate, run.acceleration
         causes = force_causes(machine, *motion, wrench=wrench, legs=run.legs)
         drawn = plot_force_causes(run.time, causes, limit=limits.force), plot_sizing(sheet)
@@ -137,7 +139,8 @@ def dynamics_command(
     if as_json:
         answer = {"robot": name, "trajectory": trajectory}
         answer |= dict(zip(("starts", "ends"), end_states(path), strict=True))
+        answer["units"] = tasks.units(degrees)
         common.print_json(answer | summary.as_dict() | {"sizing": sheet.as_dict(), "files": files})
         return
     console.print(f"3-RPS [bold]{escape(name)}[/], {escape(str(trajectory))}", markup=True)
-    print_motion(console, sheet.table(), summary, path, files)
+    print_motion(console, sheet.table(), summary, path, files, degrees)

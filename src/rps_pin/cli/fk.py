@@ -15,6 +15,7 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli import task_options as tasks
+from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.given_options import refuse
 from rps_pin.cli.printing import say
 from rps_pin.rps.kinematics.assembly_modes import AssemblyModes
@@ -42,7 +43,7 @@ def fk_command(
         options.JointValues,
         options.joint_values("An actuator's position, m or rad; default: the home's."),
     ] = None,
-    degrees: tasks.DegreesOption = False,
+    degrees: DegreesOption = False,
     ignore_limits: options.IgnoreLimitsOption = False,
     accuracy: options.AccuracyOption = None,
     as_json: common.JsonOption = False,
@@ -83,7 +84,7 @@ def fk_command(
     answer: dict[str, Any] = {
         "robot": machine.parameters.name,
         "length": lengths,
-        "units": {"length": "m", "angle": tasks.unit_of(True, degrees)},
+        "units": tasks.units(degrees),
     }
     angle_of = partial(tasks.in_unit, angular=True, degrees=degrees)
     if near is None:
@@ -95,7 +96,7 @@ def fk_command(
             _print_modes(modes, within, degrees)
         raise typer.Exit(not len(modes.angle))
     tilts = [math.radians(tilt) if degrees else tilt for tilt in near[1:]]
-    common.doubt_pose("--near", (near[0], tilts[0], tilts[1]))
+    common.doubt_pose("--near", near, degrees)
     pose = machine.forward_kinematics(lengths, near=[near[0], *tilts])
     position, _ = machine.platform_placement(pose)
     if as_json:

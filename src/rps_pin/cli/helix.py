@@ -8,8 +8,10 @@ from rich.markup import escape
 
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
+from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.motion_report import actuator_table, motion_files, print_motion, write_motion
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
+from rps_pin.cli.task_options import in_unit, units
 from rps_pin.rps.dynamics.motion_csv import COLUMNS
 from rps_pin.rps.dynamics.motion_run import run_motion, summarise
 
@@ -23,6 +25,7 @@ def helix_command(
     duration: helix.DurationOption = helix.DEFAULT_DURATION,
     rate: common.RateOption = 1000.0,
     output: common.FolderOption = Path("helix"),
+    degrees: DegreesOption = False,
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
@@ -57,13 +60,18 @@ def helix_command(
         progress = common.progress_bar(console, "inverse dynamics")
         run = run_motion(machine, path, rate, progress=progress)
     summary = summarise(run, machine)
+    if degrees:
+        summary = summary.in_degrees()
     output.mkdir(parents=True, exist_ok=True)
     name = machine.parameters.name
     with console.status("writing the results"):
-        files = write_motion(output, "helix", f"3-RPS {name} along a helix", machine, run)
+        files = write_motion(output, "helix", f"3-RPS {name} along a helix", machine, run, degrees)
     if as_json:
         described = ("radius", "pitch", "height", "branch", "tilt")
-        answer = {"robot": name, "helix": {one: getattr(path, one) for one in described}}
+        chosen = {one: getattr(path, one) for one in described}
+        chosen["tilt"] = in_unit(path.tilt, True, degrees)
+        answer = {"robot": name, "helix": chosen}
+        answer["units"] = units(degrees)
         common.print_json(answer | summary.as_dict() | {"files": files})
         return
     console.print(
@@ -71,4 +79,4 @@ def helix_command(
         f"pitch {1e3 * path.pitch:g} mm, from {path.height:g} m",
         markup=True,
     )
-    print_motion(console, actuator_table(summary.actuators), summary, path, files)
+    print_motion(console, actuator_table(summary.actuators), summary, path, files, degrees)

@@ -15,6 +15,7 @@ from rps_pin.arrays import Array
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli import task_options as tasks
+from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.given_options import refuse
 from rps_pin.rps.kinematics.legs import cone_angles, violations
 from rps_pin.rps.robot import RPSRobot
@@ -40,7 +41,7 @@ def ik_command(
     forces: Annotated[
         bool, typer.Option("--forces", help="The actuators' forces too, at rest there.")
     ] = False,
-    degrees: tasks.DegreesOption = False,
+    degrees: DegreesOption = False,
     ignore_limits: options.IgnoreLimitsOption = False,
     accuracy: options.AccuracyOption = None,
     as_json: common.JsonOption = False,
@@ -72,7 +73,7 @@ def ik_command(
     machine = common.load_robot(robot)
     z, *tilts = pose
     x = z, *(math.radians(tilt) if degrees else tilt for tilt in tilts)
-    common.doubt_pose("--pose", (x[0], x[1], x[2]))
+    common.doubt_pose("--pose", pose, degrees)
     _of_robot(machine, np.array(x), forces, degrees, as_json)
 
 
@@ -88,6 +89,8 @@ def _of_robot(machine: RPSRobot, pose: Array, forces: bool, degrees: bool, as_js
     angle_of = partial(tasks.in_unit, angular=True, degrees=degrees)
     if as_json:
         broken = violations(parameters, legs.length, legs.angle, cone)
+        if degrees:
+            broken = [one.in_degrees() for one in broken]
         answer: dict[str, Any] = {
             "robot": parameters.name,
             "pose": [float(pose[0]), *map(angle_of, pose[1:])],
@@ -99,7 +102,7 @@ def _of_robot(machine: RPSRobot, pose: Array, forces: bool, degrees: bool, as_js
             "reachable": bool(legs.reachable),
             "violations": [one._asdict() for one in broken],
             "singularities": found,
-            "units": {"length": "m", "angle": tasks.unit_of(True, degrees)},
+            "units": tasks.units(degrees),
         }
         common.print_json(answer | ({} if force is None else {"force": force.tolist()}))
         raise typer.Exit(not legs.reachable)

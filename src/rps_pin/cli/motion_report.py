@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -11,9 +12,11 @@ from rich.table import Table
 from rps_pin.cli.console import print_files, table_of
 from rps_pin.cli.layer_options import write_page
 from rps_pin.cli.outputs import figures_in
+from rps_pin.cli.task_options import unit_of
 from rps_pin.rps.dynamics.motion_csv import write_csv
 from rps_pin.rps.dynamics.motion_run import ActuatorSummary, MotionRun, MotionSummary
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.task.paths.events import pose_of_robot_in_words
 from rps_pin.trajectories.path import Trajectory, end_states
 
 _FIGURES = ("path", "lengths", "forces")
@@ -25,14 +28,14 @@ def motion_files(folder: Path, name: str) -> list[Path]:
 
 
 def write_motion(
-    folder: Path, name: str, title: str, robot: RPSRobot, run: MotionRun
+    folder: Path, name: str, title: str, robot: RPSRobot, run: MotionRun, degrees: bool
 ) -> list[Path]:
     """Write a motion's table, figures and animation into a folder; return the files."""
     # Only commands that draw wait for these to be imported.
     from rps_pin.plots import plot_forces, plot_lengths, plot_path, save_figure
 
     table = folder / f"{name}.csv"
-    write_csv(table, run)
+    write_csv(table, run, degrees=degrees)
     files = [table]
     drawn = plot_path(run), plot_lengths(run), plot_forces(run)
     for name_of_figure, axes in zip(_FIGURES, drawn, strict=True):
@@ -61,11 +64,19 @@ def actuator_table(actuators: tuple[ActuatorSummary, ...]) -> Table:
 
 
 def print_motion(
-    console: Console, table: Table, summary: MotionSummary, path: Trajectory, files: list[Path]
+    console: Console,
+    table: Table,
+    summary: MotionSummary,
+    path: Trajectory,
+    files: list[Path],
+    degrees: bool,
 ) -> None:
-    """Print a table of the actuators, then accuracy, distance to a singularity, limits, files."""
+    """Print a table of the actuators, then accuracy, distance to a singularity, limits, files.
+
+    Tilts of the summary are in radians or degrees.
+    """
     starts, ends = end_states(path)
-    z, tilt_x, tilt_y = summary.minimum_pose
+    where = pose_of_robot_in_words(np.array(summary.minimum_pose), unit_of(True, degrees))
     rows = {
         "duration": f"{summary.duration:.6g} s ({summary.samples} samples)",
         "starts, ends": starts if starts == ends else f"{starts}, {ends}",
@@ -73,8 +84,7 @@ def print_motion(
         "largest KKT residual": f"{summary.residual_max:.2g} of the largest force",
         "smallest distance to a singularity\n(0 singular, 1 best)": (
             f"{summary.minimum_distance:.4g} ({summary.minimum_singularity}) "
-            f"at t = {summary.minimum_time:.4g} s,\n"
-            f"z = {z:.6g} m, tilt = ({tilt_x:.4g}, {tilt_y:.4g}) rad"
+            f"at t = {summary.minimum_time:.4g} s,\n{where}"
         ),
     }
     console.print(table)

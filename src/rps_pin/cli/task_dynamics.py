@@ -11,12 +11,11 @@ import typer
 
 from rps_pin.arrays import Array
 from rps_pin.cli import console as common
-from rps_pin.cli.degrees import table_in_degrees
 from rps_pin.cli.layer_options import write_page
 from rps_pin.cli.mechanism_options import load_mechanism, require_masses, shapes_of
 from rps_pin.cli.motion_options import fastest_of_task
 from rps_pin.cli.outputs import check_outputs, figures_in
-from rps_pin.cli.task_options import unit_of
+from rps_pin.cli.task_options import units
 from rps_pin.files import whole_file, write_text
 from rps_pin.plain_text import plain
 from rps_pin.task import run_motion
@@ -24,6 +23,7 @@ from rps_pin.task.sizing.motion_run import TaskMotion
 from rps_pin.task.sizing.sizing import sheet_of
 from rps_pin.task.task import Task
 from rps_pin.task.trajectory_file import load_task_trajectory
+from rps_pin.trajectories.csv_columns import table_in_degrees
 
 
 def refuse_options_of_robots(gravity: Any, power: float | None) -> None:
@@ -82,7 +82,7 @@ def dynamics_of_task(
         save_figure(plot_sizing(sheet), folder, "force_over_speed")
     if as_json:
         answer = {"mechanism": model.name, "trajectory": trajectory, "duration": path.duration}
-        answer["units"] = {"length": "m", "angle": unit_of(True, degrees)}
+        answer["units"] = units(degrees)
         common.print_json(answer | {"sizing": sheet.as_dict(), "files": files})
         return
     console.print(plain(f"{model.name}, {trajectory}: {path.duration:.6g} s"))

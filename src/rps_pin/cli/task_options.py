@@ -15,14 +15,12 @@ from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.errors import InputError
+from rps_pin.plain_text import ROUNDING
 from rps_pin.rps.robot_file import kind_of_file
 from rps_pin.task.paths.findings import GRAZE
 
 if TYPE_CHECKING:
     from rps_pin.task import SingularityMeasures, Task
-
-#: Values below this are printed as zero.
-_ZERO = 1e-12
 
 MechanismOption = Annotated[
     Path | None,
@@ -34,10 +32,6 @@ MechanismOption = Annotated[
         "name of one that comes with the package, such as **stewart**.",
         autocompletion=names_or_files(mechanism_names),
     ),
-]
-DegreesOption = Annotated[
-    bool,
-    typer.Option("--degrees", help="Angles are given and printed in degrees."),
 ]
 
 
@@ -89,7 +83,7 @@ def of_actuators(task: Task) -> tuple[tuple[str, ...], tuple[bool, ...]]:
 
 def in_unit(value: float, angular: bool, degrees: bool) -> float:
     """Return a value in the unit that is printed; rounding errors are zero."""
-    value = 0.0 if abs(value) < _ZERO else float(value)
+    value = 0.0 if abs(value) < ROUNDING else float(value)
     return math.degrees(value) if angular and degrees else value
 
 
@@ -98,10 +92,9 @@ def unit_of(angular: bool, degrees: bool) -> str:
     return ("deg" if degrees else "rad") if angular else "m"
 
 
-def refuse_degrees(degrees: bool) -> None:
-    """Refuse the option without a mechanism: a 3-RPS's angles are in radians."""
-    if degrees:
-        raise typer.BadParameter("this option needs a --mechanism", param_hint="--degrees")
+def units(degrees: bool) -> dict[str, str]:
+    """Return the units of lengths and angles, for JSON."""
+    return {"length": "m", "angle": unit_of(True, degrees)}
 
 
 def table(
@@ -202,7 +195,7 @@ def print_answer(
                 name: in_unit(value, is_angle, degrees)
                 for name, is_angle, value in zip(of_side, turns, values, strict=True)
             }
-        answer["units"] = {"length": "m", "angle": unit_of(True, degrees)}
+        answer["units"] = units(degrees)
         if forces is not None:
             answer["forces"] = dict(zip(names, forces.tolist(), strict=True))
         common.print_json(answer | {"singularities": found, "configuration": q.tolist()})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +13,7 @@ import typer
 from rps_pin.cli import console as common
 from rps_pin.cli import helix_options as helix
 from rps_pin.cli.completion import mechanism_names, names_or_files, preset_names
+from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.given_options import given, refuse
 from rps_pin.cli.layer_options import LayersOption, SizeOption, chosen_layers, chosen_size
 from rps_pin.cli.mechanism_options import (
@@ -57,6 +59,7 @@ def view_command(
         common.Three | None,
         common.pose_option("Show this pose (m, rad, rad) instead of the helix."),
     ] = None,
+    degrees: DegreesOption = False,
     radius: helix.RadiusOption = helix.DEFAULT_RADIUS,
     pitch: helix.PitchOption = helix.DEFAULT_PITCH,
     height: helix.HeightOption = None,
@@ -139,7 +142,9 @@ def view_command(
     ):
         raise typer.BadParameter("there is no trajectory", param_hint="--fastest")
     if pose is not None:
-        common.doubt_pose("--pose", pose)
+        common.doubt_pose("--pose", pose, degrees)
+        if degrees:
+            pose = pose[0], math.radians(pose[1]), math.radians(pose[2])
     if interactive:
         loaded = None if mechanism is None else load_mechanism(mechanism, ignore_limits, accuracy)
         _interact(robot, pose, loaded, package_path, port, layers)

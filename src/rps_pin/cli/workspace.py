@@ -11,7 +11,9 @@ import typer
 from rich.table import Table
 
 from rps_pin.cli import console as common
+from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
+from rps_pin.cli.task_options import in_unit, unit_of, units
 from rps_pin.errors import InputError
 from rps_pin.paper import PaperComparison, paper_comparison
 from rps_pin.rps import workspace as space
@@ -33,6 +35,7 @@ def workspace_command(
     points: Annotated[
         int, typer.Option(help="Lengths per leg; 51 are the paper's 1 mm steps over 50 mm.")
     ] = 51,
+    degrees: DegreesOption = False,
     output: common.FolderOption = Path("workspace"),
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
@@ -60,7 +63,7 @@ def workspace_command(
     progress = common.progress_bar(console, "direct kinematics")
     found = space.workspace(machine, grid, progress=progress)
     rows = paper_comparison() if parameters.name == "micro" else ()
-    summary = _summary(machine, found, rows)
+    summary = _summary(machine, found, rows, degrees)
     with console.status("writing the results"):
         # Slow to import: only for commands that draw.
         from rps_pin import plots
@@ -84,7 +87,7 @@ def workspace_command(
     if as_json:
         common.print_json(summary | {"files": files})
         return
-    console.print(_table(summary))
+    console.print(_table(summary, unit_of(True, degrees)))
     if rows:
         texts = (
             (
@@ -100,7 +103,10 @@ def workspace_command(
 
 
 def _summary(
-    robot: RPSRobot, found: space.Workspace, rows: tuple[PaperComparison, ...]
+    robot: RPSRobot,
+    found: space.Workspace,
+    rows: tuple[PaperComparison, ...],
+    degrees: bool,
 ) -> dict[str, Any]:
     inside = found.position[found.inside]
     if not len(inside):
@@ -108,6 +114,7 @@ def _summary(
     size = space.volume(found)
     sides = np.stack([inside.min(axis=0), inside.max(axis=0)], axis=1).tolist()
     height = sides[2][1] - sides[2][0]
+    full = space.largest_tilt_range(robot)
     return {
         "robot": robot.parameters.name,
         "points": found.grid.size,
@@ -116,7 +123,8 @@ def _summary(
         "volume": size.position,
         "cylinder_volume": math.pi * robot.parameters.platform_radius**2 * height,
         "pose_volume": size.pose,
-        "full_tilt": space.largest_tilt_range(robot)._asdict(),
+        "full_tilt": full._asdict() | {"tilt": in_unit(full.tilt, True, degrees)},
+        "units": units(degrees),
         "out": {
             reason.text: count
             for reason, count in found.counts().items()
@@ -126,7 +134,7 @@ def _summary(
     }
 
 
-def _table(summary: dict[str, Any]) -> Table:
+def _table(summary: dict[str, Any], angle: str) -> Table:
     tilts = summary["full_tilt"]
     sides = {f"p_{axis}": [1e3 * value for value in summary[axis]] for axis in "xyz"}
     rows = [
@@ -139,7 +147,7 @@ def _table(summary: dict[str, Any]) -> Table:
         ),
         (
             "largest cylinder of full tilt",
-            f"every tilt up to {math.degrees(tilts['tilt']):.3g} degrees, "
+            f"every tilt up to {tilts['tilt']:.3g} {angle}, "
             f"for z from {1e3 * tilts['lower']:.4g} to {1e3 * tilts['upper']:.4g} mm",
         ),
         *(("out", f"{count}: {reason}") for reason, count in summary["out"].items()),

@@ -32,7 +32,9 @@ Draw = Callable[[Axes], None]
 
 
 @styled
-def plot_tracking(run: LoopRun, figure: Figure | None = None, *, begin: float = 0.0) -> Figure:
+def plot_tracking(
+    run: LoopRun, figure: Figure | None = None, *, begin: float = 0.0, degrees: bool = False
+) -> Figure:
     """Draw target and actual values over time, and the errors: actual minus target.
 
     Of a 3-RPS: leg lengths (mm), and errors of legs and centre (um) and of the orientation (urad).
@@ -47,10 +49,13 @@ def plot_tracking(run: LoopRun, figure: Figure | None = None, *, begin: float = 
         To draw on; default: a new one.
     begin
         Start of what is drawn, s.
+    degrees
+        Whether errors of angles are in degrees; else in urad.
     """
     here = run.time >= begin
     time = run.time[here]
-    draws = _of_task(run, here) if run.task is not None else _of_legs(run, here)
+    small = (np.degrees(1.0), "degrees") if degrees else (1e6, "µrad")
+    draws = (_of_legs if run.task is None else _of_task)(run, here, small)
     axes = panels(figure, len(draws), 0.4 + 1.35 * len(draws))
     for own, draw in zip(axes, draws, strict=True):
         draw(own)
@@ -93,7 +98,7 @@ def plot_loop_forces(run: LoopRun, figure: Figure | None = None, *, begin: float
     return figure_of(axes[0])
 
 
-def _of_legs(run: LoopRun, here: Any) -> list[Draw]:
+def _of_legs(run: LoopRun, here: Any, small: tuple[float, str]) -> list[Draw]:
     """Return the panels of a 3-RPS."""
     time, errors = run.time[here], TrackingErrors.of(run)
 
@@ -113,19 +118,19 @@ def _of_legs(run: LoopRun, here: Any) -> list[Draw]:
         legend_above(axes)
 
     def of_turn(axes: Axes) -> None:
-        axes.plot(time, 1e6 * errors.turn[here], color="black")
-        axes.set_ylabel("turn error (µrad)")
+        axes.plot(time, small[0] * errors.turn[here], color="black")
+        axes.set_ylabel(f"turn error ({small[1]})")
 
     return [lengths, of_legs, of_centre, of_turn]
 
 
-def _of_task(run: LoopRun, here: Any) -> list[Draw]:
+def _of_task(run: LoopRun, here: Any, small: tuple[float, str]) -> list[Draw]:
     """Return the panels of a task: lengths, angles and the errors of each, if it has them."""
     time = run.time[here]
     draws: list[Draw] = []
-    for unit, shown, factor, small in (
-        ("m", "position (mm)", 1e3, "error (µm)"),
-        ("rad", "angle (degrees)", np.degrees(1.0), "error (µrad)"),
+    for unit, shown, factor, (scale, of_error) in (
+        ("m", "position (mm)", 1e3, (1e6, "µm")),
+        ("rad", "angle (degrees)", np.degrees(1.0), small),
     ):
         places = [k for k, (_, own) in enumerate(run.of_pose) if own == unit]
         if not places:
@@ -140,10 +145,10 @@ def _of_task(run: LoopRun, here: Any) -> list[Draw]:
             _with_targets(axes, time, a - start, t - start, names)
             axes.set_ylabel("change of " + shown if apart else shown)
 
-        def errors(axes: Axes, e: Array = 1e6 * (actual - target), names: Any = names,
-                   small: str = small) -> None:  # fmt: skip
+        def errors(axes: Axes, e: Array = scale * (actual - target), names: Any = names,
+                   unit: str = of_error) -> None:  # fmt: skip
             plot_curves(axes, time, e, names)
-            axes.set_ylabel(small)
+            axes.set_ylabel(f"error ({unit})")
             legend_above(axes)
 
         draws += [values, errors]

@@ -14,6 +14,9 @@ from difflib import get_close_matches
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 
 _TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -214,6 +217,13 @@ OF_RPS = Columns(
 def in_degrees(column: str) -> str:
     """Return the name of a column with its angles in degrees; of others, the same."""
     return re.sub(r"_rad((_per_s2?)?)$", r"_deg\1", column)
+
+
+def table_in_degrees(names: Sequence[str], rows: Array) -> tuple[list[str], Array]:
+    """Return names of columns and rows (n, columns) of a table with its angles in degrees."""
+    turned = [in_degrees(name) for name in names]
+    angles = [old != new for old, new in zip(names, turned, strict=True)]
+    return turned, np.where(angles, np.degrees(rows), rows)
 
 
 def is_number(cell: str) -> bool:

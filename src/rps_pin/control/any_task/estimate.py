@@ -33,6 +33,7 @@ from rps_pin.errors import (
 )
 from rps_pin.one_thread import TickGuard, guarded
 from rps_pin.other_kinds import refuses_other_kinds
+from rps_pin.plain_text import listed
 from rps_pin.task import SingularityMeasures, Task
 from rps_pin.validation import numbers, positive_number, real_vector
 
@@ -120,6 +121,7 @@ class TaskEstimate(LastGood):
         self.task, self.guard = task, TickGuard()
         length = task.characteristic_length
         turning = mechanism.angular_velocities[actuators]
+        self._position_units = ["rad" if one else "m" for one in turning]
         #: Of the actuators: characteristic length, or 1 rad.
         self._scale = np.where(turning, 1.0, length)
         limit = np.abs(mechanism.model.velocityLimit[actuators])
@@ -336,16 +338,22 @@ class TaskEstimate(LastGood):
         status, state = self.status, self.state
         messages = []
         if status & Status.BAD_INPUT:
-            read = "not as many finite numbers" if self._length is None else _text(self._length)
+            read = "not as many finite numbers"
+            if self._length is not None:
+                read = listed(self._length, self._position_units)
             messages.append(
                 "position, speed or dt is not finite, not positive, or out of range: positions "
                 f"are {read}"
             )
         if status & Status.JUMP:
             assert self._length is not None
+            read, jump, last = (
+                listed(values, self._position_units)
+                for values in (self._length, self._jump, state.geometry.length)
+            )
             messages.append(
-                f"positions {_text(self._length)} are more than {_text(self._jump)} a tick from "
-                f"the prediction by the last good ones, {_text(state.geometry.length)}"
+                f"positions {read} are more than {jump} a tick from the prediction by the last "
+                f"good ones, {last}"
             )
         if status & Status.NOT_CONVERGED:
             messages.append(f"the positions cannot be followed: {self._why}")
@@ -359,10 +367,11 @@ class TaskEstimate(LastGood):
         if status & Status.BEYOND_LIMIT:
             messages += self.messages(state.geometry.configuration)
             names = self.task.mechanism.actuated
-            rows = zip(names, state.speed.tolist(), self._fastest.tolist(), strict=True)
+            speeds = state.speed.tolist(), self._fastest.tolist()
+            rows = zip(names, *speeds, self._position_units, strict=True)
             messages += [
-                f"actuator {name}: speed is {speed:.6g}; its limit is {most:.6g}"
-                for name, speed, most in rows
+                f"actuator {name}: speed is {speed:.6g} {unit}/s; its limit is {most:.6g} {unit}/s"
+                for name, speed, most, unit in rows
                 if abs(speed) > most
             ]
         return "; ".join(messages) or "ok"
@@ -396,7 +405,3 @@ def _jump(given: ArrayLike, count: int) -> Array:
     if found.shape not in ((), (count,)) or not (found > 0).all():
         raise InputError(f"largest_jump = {shown(given)}: it must be positive, one or {count}")
     return np.broadcast_to(found, count).copy()
-
-
-def _text(values: Any) -> str:
-    return "(" + ", ".join(f"{value:.6g}" for value in values) + ")"

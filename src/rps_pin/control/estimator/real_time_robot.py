@@ -35,6 +35,7 @@ from rps_pin.control.loop.setpoints import LARGEST_RATE, all_below
 from rps_pin.control.loop.status import STATUSES, Status
 from rps_pin.one_thread import TickGuard, guarded, one_thread
 from rps_pin.other_kinds import refuses_other_kinds
+from rps_pin.plain_text import short
 from rps_pin.rps.kinematics.forward_kinematics import CONDITION_LIMIT, start_of
 from rps_pin.rps.kinematics.tracking import LegDirections, Triple, follow
 from rps_pin.rps.robot import RPSRobot
@@ -582,4 +583,4 @@ def _proven_dynamics(
 
 
 def _text(values: Triple | None) -> str:
-    return "(" + ", ".join(f"{value:.6g}" for value in values or ()) + ")"
+    return "(" + ", ".join(map(short, values or ())) + ")"

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from rps_pin.control.loop.rejoining import Rejoining
 from rps_pin.control.model import ControlModel
 from rps_pin.numerics.elementary import Number
+from rps_pin.plain_text import listed
 
 #: Rates whose squares are not finite, or nearly, have no forces: m/s and rad/s.
 LARGEST_RATE = 1e150
@@ -147,8 +148,7 @@ class Setpoints:
         model = self._model
         if x is None:
             return [f"the target is not three finite {model.rows}: pose, rate and acceleration"]
-        numbers = ", ".join(f"{value:.6g}" for value in x)
-        target = f"the target ({numbers}) {', '.join(model.units)}"
+        target = f"the target {listed(x, model.units)}"
         geometry = model.geometry(x, self.current.geometry)
         if geometry is None:
             return [f"{target} {model.out_of_reach(x, self.current.geometry)}"]

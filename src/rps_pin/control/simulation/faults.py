@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -91,9 +91,13 @@ class Fault:
         return -_ROUNDING <= time - self.start < self.duration - _ROUNDING
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, units: Sequence[str] = ("m", "rad", "rad")) -> str:
+        """Return the fault in words; the units are those of the coordinates of a target."""
         which = "" if self.leg is None else f" of leg {self.leg}"
         size = f" by {self.size:.6g} m" if self.kind == "jump" else ""
-        size += f" by {self.offset} m, rad, rad" if self.kind == "target" else ""
+        size += f" by {self.offset} {', '.join(units)}" if self.kind == "target" else ""
         until = "" if self.duration == math.inf else f" for {self.duration:.6g} s"
         return f"{self.kind}{which}{size} from t = {self.start:.6g} s{until}"
 

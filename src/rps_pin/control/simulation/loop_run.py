@@ -23,6 +23,7 @@ from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.task import Task
+from rps_pin.trajectories.csv_columns import table_in_degrees
 from rps_pin.trajectories.path import PathSample, Trajectory
 from rps_pin.validation import choice, positive_number
 
@@ -275,7 +276,7 @@ def _units(angular: Iterable[bool]) -> tuple[str, ...]:
 
 
 @refuses_other_kinds
-def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
+def write_loop_csv(path: str | os.PathLike[str], run: LoopRun, *, degrees: bool = False) -> None:
     """Write a run as CSV, one row per tick, with units in the header.
 
     Parameters
@@ -284,6 +285,8 @@ def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
         The file; it is written completely or not at all.
     run
         The run.
+    degrees
+        Whether angles are written in degrees; else in radians.
     """
     columns = {"time_s": run.time}
     for name in ("target", "pose", "estimate"):
@@ -298,6 +301,9 @@ def write_loop_csv(path: str | os.PathLike[str], run: LoopRun) -> None:
         legs = (f"{name}_{one[0]}_{one[which].replace(' ', '')}{more}" for one in run.of_actuators)
         columns |= zip(legs, getattr(run, name).T, strict=True)
     table = np.column_stack([*columns.values(), run.type_ii, run.status])
+    names = [*columns, "type_ii", "status"]
+    if degrees:
+        names, table = table_in_degrees(names, table)
     with whole_file(path) as scratch:
-        header = ",".join([*columns, "type_ii", "status"])
+        header = ",".join(names)
         np.savetxt(scratch, table, fmt="%.12g", delimiter=",", header=header, comments="")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+import math
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 from rich.table import Column, Table
@@ -63,7 +64,7 @@ class LoopSummary:
     centre_rms, centre_max, centre_end
         Distance of the platform's centre from the target's, um.
     turn_rms, turn_max, turn_end
-        Angle between platform and target, urad.
+        Angle between platform and target, in `turn_unit`.
     length_rms, length_max
         Over all legs, um.
     force_peak, force_rms
@@ -80,6 +81,8 @@ class LoopSummary:
         Number of ticks with each status that occurred, by name, over the whole run.
     first
         Time of the first of these ticks, s.
+    turn_unit
+        ``"urad"`` or ``"deg"``.
     """
 
     centre_rms: float
@@ -98,6 +101,7 @@ class LoopSummary:
     ticks: int
     statuses: dict[str, int]
     first: dict[str, float]
+    turn_unit: str = "urad"
 
     @classmethod
     def of(cls, run: LoopRun, *, begin: float = 0.0, end: float = np.inf) -> LoopSummary:
@@ -124,6 +128,15 @@ class LoopSummary:
             **_common(run, here),
         )
 
+    def in_degrees(self) -> Self:
+        """Return it with angles in degrees."""
+        if self.turn_unit == "deg":
+            return self
+        rms, most, end = (
+            math.degrees(1e-6 * one) for one in (self.turn_rms, self.turn_max, self.turn_end)
+        )
+        return replace(self, turn_rms=rms, turn_max=most, turn_end=end, turn_unit="deg")
+
     @property
     def nearest_singular(self) -> float:
         """Deprecated name of `minimum_type_ii`."""
@@ -135,9 +148,10 @@ class LoopSummary:
 
     def rows(self) -> list[list[str]]:
         """Return name, RMS, largest, last and unit of the errors and forces."""
+        turns = self.turn_rms, self.turn_max, self.turn_end
         rows = (
             ("error of the centre", (self.centre_rms, self.centre_max, self.centre_end), "um"),
-            ("error of the orientation", (self.turn_rms, self.turn_max, self.turn_end), "urad"),
+            ("error of the orientation", turns, self.turn_unit),
             ("error of the leg lengths", (self.length_rms, self.length_max, None), "um"),
             ("force of an actuator", (self.force_rms, self.force_peak, None), "N"),
         )
@@ -159,9 +173,9 @@ class TaskSummary:
     Attributes
     ----------
     names, units
-        Of the task's coordinates.
+        Of the task's coordinates: ``"m"``, ``"rad"`` or ``"deg"``.
     rms, largest, at_end
-        Of the errors of these, actual less target: m or rad.
+        Of the errors of these, actual less target, in these units.
     force_peak, force_rms
         Of the actuators, largest of all, N or N m.
     saturated, minimum_type_ii, gap, ticks, statuses, first
@@ -202,16 +216,35 @@ class TaskSummary:
             **_common(run, here),
         )
 
+    def in_degrees(self) -> Self:
+        """Return it with angles in degrees."""
+        factors = [math.degrees(1.0) if unit == "rad" else 1.0 for unit in self.units]
+
+        def turned(values: tuple[float, ...]) -> tuple[float, ...]:
+            return tuple(f * value for f, value in zip(factors, values, strict=True))
+
+        return replace(
+            self,
+            units=tuple(unit.replace("rad", "deg") for unit in self.units),
+            rms=turned(self.rms),
+            largest=turned(self.largest),
+            at_end=turned(self.at_end),
+        )
+
     def as_dict(self) -> dict[str, Any]:
         """Return the figures as plain data."""
         return asdict(self)
 
     def rows(self) -> list[list[str]]:
         """Return name, RMS, largest, last and unit of the errors and forces."""
-        small = {"m": "um", "rad": "urad"}
+        small = {"m": (1e6, "um"), "rad": (1e6, "urad"), "deg": (1.0, "deg")}
         errors = zip(self.names, self.units, self.rms, self.largest, self.at_end, strict=True)
         rows = [
-            [f"error of {name}", *(f"{1e6 * value:.4g}" for value in values), small[unit]]
+            [
+                f"error of {name}",
+                *(f"{small[unit][0] * value:.4g}" for value in values),
+                small[unit][1],
+            ]
             for name, unit, *values in errors
         ]
         force = f"{self.force_rms:.4g}", f"{self.force_peak:.4g}"

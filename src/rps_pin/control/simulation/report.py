@@ -63,7 +63,8 @@ def report(
     ]
     lines += ["## Statuses", "", *_statuses(run, summary), ""]
     if scenario.faults:
-        lines += ["Faults:", "", *(f"- {fault}" for fault in scenario.faults), ""]
+        units = [unit for _, unit in run.of_pose]
+        lines += ["Faults:", "", *(f"- {fault.text(units)}" for fault in scenario.faults), ""]
     for name, caption in figures.items():
         lines += [f"![{caption}]({name})", ""]
     return "\n".join(lines)

@@ -9,6 +9,7 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.files import whole_file
 from rps_pin.rps.dynamics.motion_run import MotionRun
+from rps_pin.trajectories.csv_columns import table_in_degrees
 
 #: How many columns `motion_columns` returns.
 COLUMNS = 24
@@ -39,11 +40,11 @@ def motion_columns(run: MotionRun) -> dict[str, Array]:
     return columns
 
 
-def write_csv(path: str | os.PathLike[str], run: MotionRun) -> None:
-    """Write a motion as CSV, all digits, whole or not at all."""
+def write_csv(path: str | os.PathLike[str], run: MotionRun, *, degrees: bool = False) -> None:
+    """Write a motion as CSV, all digits, whole or not at all; angles in radians or degrees."""
     columns = motion_columns(run)
-    table = np.column_stack(list(columns.values()))
+    names, table = list(columns), np.column_stack(list(columns.values()))
+    if degrees:
+        names, table = table_in_degrees(names, table)
     with whole_file(path) as scratch:
-        np.savetxt(
-            scratch, table, fmt="%.17g", delimiter=",", header=",".join(columns), comments=""
-        )
+        np.savetxt(scratch, table, fmt="%.17g", delimiter=",", header=",".join(names), comments="")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -142,6 +142,11 @@ class MotionSummary:
     def singularity_pose(self) -> tuple[float, float, float]:
         """Deprecated name of `minimum_pose`."""
         return self.minimum_pose
+
+    def in_degrees(self) -> Self:
+        """Return it with the tilts of its pose in degrees."""
+        z, tilt_x, tilt_y = self.minimum_pose
+        return replace(self, minimum_pose=(z, math.degrees(tilt_x), math.degrees(tilt_y)))
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, strings, lists and dictionaries, as JSON has them."""

@@ -13,7 +13,7 @@ from rps_pin.rps.kinematics.legs import cone_angles, violations
 from rps_pin.rps.kinematics.pose import rotation
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.path_check import check_path
-from rps_pin.task.paths.events import LimitEvent, PathCheck
+from rps_pin.task.paths.events import LimitEvent, PathCheck, pose_of_robot_in_words
 from rps_pin.trajectories.path import Trajectory
 
 #: At how many times between leaving a limit and coming back the worst is looked for.
@@ -69,14 +69,13 @@ def require_clear(
     singular = [event for event in found.singularities if event.kind != "grazes"]
     if singular:
         first = singular[0]
-        z, tilt_x, tilt_y = first.pose
         stays = f"stays for {first.width:.6g}{words.unit} in"
         times = ", ".join(f"{event.time:.6g}{words.unit}" for event in singular[1:])
         raise SingularityError(
             f"at {words.at(first.time, words.digits)} of {found.duration:.6g}{words.unit} "
             f"the {words.path} {'crosses' if first.kind == 'crosses' else stays} a {first.which}, "
-            f"at z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad: no actuator forces carry "
-            f"the robot through it"
+            f"at {pose_of_robot_in_words(first.pose)}: no actuator forces carry the robot through "
+            f"it"
             f"{f'; again at {times}' if times else ''}",
             math.inf,
             robot.mechanism.max_condition,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rps_pin.arrays import Array
+from rps_pin.plain_text import short
 
 
 class SingularityEvent(NamedTuple):
@@ -35,7 +36,7 @@ class SingularityEvent(NamedTuple):
         return f"{self.singularity} singularity" + (f" of leg {self.leg}" if self.leg else "")
 
     def __str__(self) -> str:
-        where, which = self.where or _place(self.pose), self.which
+        where, which = self.where or pose_of_robot_in_words(self.pose), self.which
         if self.kind == "ends":
             return (
                 f"{self.time:.9f} s: the assembly mode ends in a {which} (+- {self.width / 2:.1g} "
@@ -236,10 +237,10 @@ def _counted(check: PathCheck) -> str:
     )
 
 
-def _place(pose: Array) -> str:
-    """Return a pose of a 3-RPS in words."""
-    z, tilt_x, tilt_y = pose
-    return f"z = {z:.6g} m, tilt = ({tilt_x:.6g}, {tilt_y:.6g}) rad"
+def pose_of_robot_in_words(pose: Array, angle: str = "rad") -> str:
+    """Return a pose of a 3-RPS in words, whose angles are in that unit."""
+    z, tilt_x, tilt_y = map(short, pose)
+    return f"z = {z} m, tilt = ({tilt_x}, {tilt_y}) {angle}"
 
 
 def _pairs(count: int) -> str:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import ClosureError, RPSPinError, SingularityError
+from rps_pin.plain_text import short
 from rps_pin.task.loads import Loads
 from rps_pin.task.maps import TaskState
 from rps_pin.task.paths.events import SingularityEvent
@@ -273,5 +274,5 @@ def pose_in_words(task: Task, pose: Array, angle: str = "rad") -> str:
     """Return coordinates of a task by name, with their units; angles in that unit."""
     named = zip(task.coordinates, task.angular, pose, strict=True)
     return ", ".join(
-        f"{name} = {value:.6g} {angle if turns else 'm'}" for name, turns, value in named
+        f"{name} = {short(value)} {angle if turns else 'm'}" for name, turns, value in named
     )
