@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -51,3 +53,22 @@ def test_it_opens_with_a_film_of_at_most_two_megabytes() -> None:
 def test_the_files_it_names_exist() -> None:
     for target in re.findall(r"\]\(([^)#:]+)\)", README):
         assert (ROOT / target).is_file(), target
+
+
+def test_it_goes_from_the_film_by_ten_lines_and_two_commands_to_who_should_use_it() -> None:
+    pip, command, who = "\n    pip install", "\n    rps-pin ", "\n## Who should use it"
+    parts = ["![", "```python", pip, command, who, "\n## Speed"]
+    places = [README.index(part) for part in parts]
+    assert places == sorted(places)
+
+
+def test_speeds_are_those_of_the_benchmark(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    monkeypatch.delitem(sys.modules, "update_readme", raising=False)
+    update_readme = importlib.import_module("update_readme")
+    table = update_readme.speeds()
+    assert table in README
+    inverse = update_readme.measured("inverse dynamics (us)")["3-RPS"]
+    assert table.splitlines()[2].startswith(
+        f"| inverse dynamics, generated code | {inverse['generated']} | "
+    )
