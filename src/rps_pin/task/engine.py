@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.codegen.engine.batches import Errors, by_samples
 from rps_pin.one_thread import guarded
@@ -45,6 +45,14 @@ class PinocchioEngine:
             return self._mechanism.complete(x, q, within_limits=within_limits, restarts=restarts)
 
         return self._each(answer, (values, guess), (self._nq,), errors)
+
+    def continued(self, values: Array, q: Array) -> tuple[Array, Bools]:
+        """Return configurations (n, nq) continued to actuated coordinates, and which of them are.
+
+        What is returned of the others has no meaning.
+        """
+        found = self.complete(values, q, within_limits=False, restarts=0, errors="mask")
+        return found, np.asarray(np.isfinite(found).all(axis=-1))
 
     def velocity(self, q: ArrayLike, v_actuated: ArrayLike, errors: Errors = "raise") -> Array:
         """Return velocities of given actuated ones, (..., nv)."""

@@ -157,6 +157,11 @@ class TaskMaps:
         """What a unit of each coordinate counts for as a length, shape (m,): 1, or m/rad."""
         return 1 / self._units
 
+    def in_one_unit(self, K: Array) -> Array:
+        """Return K (..., na, m) of speeds in one unit, m/s: angles count as arcs."""
+        of_actuators = self.mechanism.velocity_scale[self._actuated]
+        return np.asarray(K * self._units / of_actuators[:, None])
+
     @property
     def actuator_columns(self) -> tuple[str, ...]:
         """Names of the actuators' columns in tables of a motion: positions, speeds and forces."""
@@ -358,6 +363,13 @@ class TaskMaps:
             If the task's coordinates do not determine the motion here (type I).
         """
         return self._basis(q, x, errors)[..., self._actuated, :]
+
+    def basis(self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise") -> Array:
+        """Return T, the speeds of all joints by the task's, v = T x', shape (..., nv, m).
+
+        Arguments and errors are those of `jacobian`, whose K are the actuators' rows of T.
+        """
+        return self._basis(q, x, errors)[..., : self._nv, :]
 
     def hessian(
         self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise"

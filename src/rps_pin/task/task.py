@@ -428,7 +428,7 @@ class Task(TaskMaps):
     def _solved(self, matrix: Array, right: Array, errors: Errors) -> Array:
         """Return X with matrix X = right, matrix (..., m, na) = K'; checked in one unit."""
         of_actuators = self.mechanism.velocity_scale[self._actuated]
-        scaled = matrix * self._units[:, None] / of_actuators
+        scaled = np.swapaxes(self.in_one_unit(np.swapaxes(matrix, -1, -2)), -1, -2)
         values = np.linalg.svd(np.nan_to_num(scaled), compute_uv=False)
         limit = self.mechanism.max_condition
         bad = np.atleast_1d(values[..., -1] * limit < values[..., 0])

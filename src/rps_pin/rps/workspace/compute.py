@@ -14,9 +14,10 @@ from rps_pin.errors import InputError, SingularityError, UnreachableError
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.assembly_mode import AssemblyMode
-from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, Fields, evaluate, side_of_singularity
+from rps_pin.rps.workspace.evaluate import Fields, evaluate, side_of_singularity
 from rps_pin.rps.workspace.grids import WHOLE, Block, Grid, checked_grid, leg_grid
 from rps_pin.rps.workspace.result import Workspace
+from rps_pin.task.workspace.evaluate import MIN_CONDITIONING
 from rps_pin.validation import real, real_vector
 
 if TYPE_CHECKING:

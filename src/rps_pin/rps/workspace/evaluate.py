@@ -16,9 +16,7 @@ from rps_pin.rps.kinematics.pose import components, stacked, tilt_of
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.measures import measures
 from rps_pin.rps.workspace.reasons import Flags, Reason, broken_limits
-
-#: A pose whose conditioning, 1/cond(K), is below this counts as singular unless told otherwise.
-MIN_CONDITIONING = 1e-3
+from rps_pin.task.workspace.evaluate import MIN_CONDITIONING
 
 
 class Fields(NamedTuple):

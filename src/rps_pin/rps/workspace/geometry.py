@@ -22,6 +22,8 @@ from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
 from rps_pin.rps.workspace.result import Workspace
+from rps_pin.task.workspace.grids import shares
+from rps_pin.task.workspace.volume import refuse_slices
 from rps_pin.validation import choice, whole_number
 
 Space = Literal["position", "pose"]
@@ -55,9 +57,9 @@ def volume(workspace: Workspace) -> Volume:
     InputError
         If the grid is a slice: one of its axes has a single value.
     """
-    _refuse_slices(workspace)
+    refuse_slices(workspace.grid.shape)
     inside = workspace.inside
-    ends = [(np.diff(a, prepend=a[0]) + np.diff(a, append=a[-1])) / 2 for a in workspace.grid.axes]
+    ends = [shares(axis) for axis in workspace.grid.axes]
     element = np.einsum("i,j,k->ijk", *ends)[inside]
     h = workspace.parameters.platform_radius
     if workspace.grid.kind == "leg lengths":
@@ -95,7 +97,7 @@ def boundary(workspace: Workspace, space: Space = "position") -> trimesh.Trimesh
         If the grid is a slice, no cell is inside, or there is no such space.
     """
     choice(space, "space", ("position", "pose"))
-    _refuse_slices(workspace)
+    refuse_slices(workspace.grid.shape)
     quads = _outer_faces(workspace.inside)
     if not len(quads):
         raise InputError("no cell of the grid is inside the workspace: it has no boundary")
@@ -208,10 +210,3 @@ def _outer_faces(inside: Bools) -> Indices:
             upwards, downwards = upwards[:, ::-1], downwards[:, ::-1]
         quads += [upwards, downwards[:, ::-1]]
     return np.concatenate(quads)
-
-
-def _refuse_slices(workspace: Workspace) -> None:
-    if min(workspace.grid.shape) < 2:
-        raise InputError(
-            f"the grid has shape {workspace.grid.shape}: a volume needs 2 points along each axis"
-        )

@@ -13,7 +13,8 @@ from rps_pin.bounds import POINTS, check_size
 from rps_pin.errors import InputError
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.validation import positive_number, real, real_array, whole_number
+from rps_pin.task.workspace.grids import checked_axis
+from rps_pin.validation import positive_number, real, whole_number
 
 GridKind = Literal["leg lengths", "poses"]
 
@@ -130,8 +131,8 @@ def pose_grid(z: ArrayLike, tilt_x: ArrayLike, tilt_y: ArrayLike | None = None) 
     InputError
         If an axis is empty, not finite or not increasing.
     """
-    first, second = _axis(z, "z"), _axis(tilt_x, "tilt_x")
-    third = second.copy() if tilt_y is None else _axis(tilt_y, "tilt_y")
+    first, second = checked_axis(z, "z"), checked_axis(tilt_x, "tilt_x")
+    third = second.copy() if tilt_y is None else checked_axis(tilt_y, "tilt_y")
     return Grid("poses", (first, second, third))
 
 
@@ -150,17 +151,8 @@ def checked_grid(grid: object) -> Grid:
     if len(grid.axes) != 3:
         raise InputError(f"a grid has three axes, not {len(grid.axes)}")
     named = zip(grid.axes, AXES[grid.kind], strict=True)
-    first, second, third = (_axis(axis, name) for axis, (name, _) in named)
+    first, second, third = (checked_axis(axis, name) for axis, (name, _) in named)
     for axis, (name, _) in zip((first, second, third), AXES[grid.kind], strict=True):
         if grid.kind == "leg lengths" and axis[0] <= 0:
             raise InputError(f"{name} begins at {axis[0]:.6g} m; it must be positive")
     return Grid(grid.kind, (first, second, third))
-
-
-def _axis(values: ArrayLike, name: str) -> Array:
-    axis = np.atleast_1d(real_array(values, name))
-    if axis.ndim != 1 or not len(axis):
-        raise InputError(f"{name} has shape {axis.shape}; it must be (n,) with n at least 1")
-    if not (np.diff(axis) > 0).all():
-        raise InputError(f"{name} must increase from value to value")
-    return axis

@@ -16,8 +16,9 @@ from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.pose import stacked
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import checked_start, parameters_of
-from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, evaluate, side_of_singularity
+from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
 from rps_pin.rps.workspace.grids import pose_grid
+from rps_pin.task.workspace.evaluate import MIN_CONDITIONING
 from rps_pin.validation import choice, whole_number
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.evaluate import Fields
 from rps_pin.rps.workspace.grids import Grid
 from rps_pin.rps.workspace.reasons import Flags, Reason
+from rps_pin.task.workspace.grids import nearest_value
 
 
 @refuses_other_kinds
@@ -126,11 +127,7 @@ class Workspace:
         if axis not in (0, 1, 2):
             raise InputError(f"axis = {axis!r}; it must be 0, 1 or 2")
         values = self.grid.axes[axis]
-        if not values[0] <= value <= values[-1]:
-            raise InputError(
-                f"axis {axis} has values from {values[0]:.6g} to {values[-1]:.6g}, not {value:.6g}"
-            )
-        nearest = int(np.argmin(np.abs(values - value)))
+        nearest = nearest_value(values, value, f"axis {axis}")
         part = slice(nearest, nearest + 1)
         where = tuple(part if i == axis else slice(None) for i in range(3))
         first, second, third = (a[part] if i == axis else a for i, a in enumerate(self.grid.axes))

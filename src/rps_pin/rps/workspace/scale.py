@@ -23,7 +23,7 @@ from rps_pin.interruption import end_with_parent, workers_without_signals
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import BLOCK, GridJob, Progress
-from rps_pin.rps.workspace.evaluate import MIN_CONDITIONING, Fields
+from rps_pin.rps.workspace.evaluate import Fields
 from rps_pin.rps.workspace.grids import Block, Grid
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.storage import (
@@ -32,6 +32,7 @@ from rps_pin.rps.workspace.storage import (
     checked_fields,
     new_workspace_file,
 )
+from rps_pin.task.workspace.evaluate import MIN_CONDITIONING
 from rps_pin.validation import whole_number
 
 if TYPE_CHECKING:
