@@ -22,12 +22,12 @@ from rps_pin.panel import BrowserPanel, RPSPanel
 from rps_pin.viewer.files.browser import ARGUMENTS, find_browser
 
 SECONDS = 5.0
-#: Counts the heights that the readings show one after the other.
+#: Counts the lengths of the first leg that the readings show one after the other.
 WATCH = """() => {
     let last = "";
     window.shown = 0;
     new MutationObserver(() => {
-        const found = document.body.textContent.match(/height\\s*([0-9.]{7}) mm/);
+        const found = document.body.textContent.match(/leg 1\\s*([0-9.]{7}) mm/);
         if (found && found[1] != last) { last = found[1]; window.shown += 1; }
     }).observe(document.body, {subtree: true, childList: true, characterData: true});
 }"""

@@ -22,6 +22,7 @@ from tests.cli.commands import rps_pin
 from tests.processes import RPS_PIN, start
 from tests.worst import worst
 
+SAMPLES = Path(__file__).parents[2] / "src" / "rps_pin" / "cli" / "samples"
 FIGURES = [
     f"{name}.{suffix}" for name in ("path", "lengths", "forces") for suffix in ("png", "svg")
 ]
@@ -206,7 +207,7 @@ def test_a_robot_without_a_middle_is_told_to_give_a_height() -> None:
         ([], "meshcat"),
         (["--pose", "0.4", "0.1", "0"], "meshcat"),
         (["--interactive", "--robot", "micro"], "viser"),
-        (["--interactive", "--mechanism", "delta"], "viser"),
+        (["--interactive", "--mechanism", "stewart", str(SAMPLES / "stewart.csv")], "viser"),
     ],
 )
 def test_view_serves_this_machine_until_ctrl_c(arguments: list[str], in_page: str) -> None:

@@ -39,10 +39,10 @@ def test_sliders_move_the_robot_and_each_other(served: BrowserPanel) -> None:
     assert moved(lambda: np.allclose(panel.pose, [0.23, np.radians(4.0), 0.0], atol=1e-12))
     length = MICRO.inverse_kinematics(panel.pose).length
     assert moved(lambda: np.allclose(served.shown("lengths"), 1e3 * length, atol=1e-6))
-    assert "230.000 mm" in served.text
+    assert f"{1e3 * length[0]:.3f} mm" in served.text
     assert "within all limits" in served.text
     served.move("lengths", [255.0, *served.shown("lengths")[1:]])
-    assert moved(lambda: "its limits are 0.2 to 0.25 m" in served.text)
+    assert moved(lambda: "its limits are 200 to 250 mm" in served.text)
     assert panel.length[0] == pytest.approx(0.255)
     assert moved(lambda: np.isclose(served.shown("pose")[0], 1e3 * panel.pose[0]))
 
@@ -113,7 +113,7 @@ def test_sliders_in_the_page(served: BrowserPanel) -> None:
         box.fill("255")
         box.press("Enter")
         page.get_by_text("255.000 mm").first.wait_for(timeout=30_000)
-        page.get_by_text("its limits are 0.2 to 0.25 m").first.wait_for(timeout=30_000)
+        page.get_by_text("its limits are 200 to 250 mm").first.wait_for(timeout=30_000)
         after = _settled(page)
         browser.close()
     assert served._panel.pose[0] == pytest.approx(0.255)  # type: ignore[attr-defined]

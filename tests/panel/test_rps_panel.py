@@ -49,7 +49,7 @@ def test_beyond_a_limit_it_is_shown_and_said(panel: RPSPanel) -> None:
     assert panel.move("pose", [0.255, 0.0, 0.0])
     assert panel.pose[0] == 0.255
     assert len(panel.trouble) == 3
-    assert "leg 1: length would be 0.255 m; its limits are 0.2 to 0.25 m" in panel.trouble
+    assert "leg 1: length would be 255 mm; its limits are 200 to 250 mm" in panel.trouble
     assert panel.move("pose", [0.225, 0.0, 0.0])
     assert panel.trouble == []
 
@@ -76,7 +76,7 @@ def test_nothing_raises_and_the_loops_stay_closed(moves: list) -> None:
             panel.move(group, values)
         assert MICRO.mechanism.loop_gap(panel.configuration) < 1e-9
         assert np.isfinite(panel.force).all()
-        assert len(panel.readings()) == 7
+        assert len(panel.readings()) == 8
 
 
 @pytest.mark.parametrize("preset", ["micro", "sokolov"])

@@ -6,7 +6,7 @@ import contextlib
 import math
 import threading
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -34,6 +34,9 @@ from rps_pin.files import is_folder, is_there
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.robot_file import Kind, kind_of_file
+
+if TYPE_CHECKING:
+    from rps_pin.panel import Panel
 
 #: Options by what they are of.
 _CURVE = ("radius", "pitch", "height", "branch", "duration")
@@ -85,8 +88,13 @@ def view_command(
         ),
     ] = None,
     interactive: Annotated[
-        bool, typer.Option("--interactive", "-i", help="A panel with sliders and values.")
+        bool,
+        typer.Option("--interactive", "-i", help="A panel: sliders, a handle to drag, plots."),
     ] = False,
+    poses: Annotated[
+        Path | None,
+        typer.Option(help="YAML file of named poses, that the panel goes to and adds to."),
+    ] = None,
     mechanism: Annotated[
         Path | None,
         typer.Option(
@@ -108,8 +116,8 @@ def view_command(
 
     Without FILE: a 3-RPS on the helix, or the home of a mechanism. Starts a Meshcat server for this
     machine only, prints its address, and runs until Ctrl-C. With **--html**, **--png** or
-    **--video** it writes files instead. With **--interactive** it serves a page with sliders for
-    pose and leg lengths, or for the joints of any mechanism.
+    **--video** it writes files instead. With **--interactive** it serves a panel: sliders of the
+    pose and of the actuators, the platform to drag, a trajectory to play, and plots.
 
     Examples:
 
@@ -125,6 +133,8 @@ def view_command(
 
     - `rps-pin view --interactive --mechanism delta`
 
+    - `rps-pin view path.csv --robot mine.yaml --interactive --poses poses.yaml`
+
     - `rps-pin view stewart.csv --mechanism stewart` columns time_s, x_m, ..., rz_rad
     """
     kind = None if file is None else _kind(file)
@@ -137,9 +147,8 @@ def view_command(
         mechanism = file
     _refuse_what_does_not_fit(context, trajectory, mechanism, pose is not None, interactive)
     still_robot = kind == "parameters" and not given(context, *_CURVE)
-    if fastest and (
-        interactive or pose is not None or still_robot or (mechanism and trajectory is None)
-    ):
+    at_home = trajectory is None and (mechanism is not None or interactive)
+    if fastest and (pose is not None or still_robot or at_home):
         raise typer.BadParameter("there is no trajectory", param_hint="--fastest")
     if pose is not None:
         common.doubt_pose("--pose", pose, degrees)
@@ -147,7 +156,8 @@ def view_command(
             pose = pose[0], math.radians(pose[1]), math.radians(pose[2])
     if interactive:
         loaded = None if mechanism is None else load_mechanism(mechanism, ignore_limits, accuracy)
-        _interact(robot, pose, loaded, package_path, port, layers)
+        panel, title = _panel(robot, pose, loaded, package_path, trajectory, fastest)
+        _interact(panel, title, port, layers, poses)
         return
     # Meshcat and its server are for this command only.
     from rps_pin.viewer import show
@@ -243,8 +253,6 @@ def _refuse_what_does_not_fit(
     interactive: bool,
 ) -> None:
     """Refuse options that do not go together."""
-    if trajectory is not None and interactive:
-        raise typer.BadParameter("the panel takes no trajectory", param_hint="FILE|NAME")
     if mechanism is not None:
         refuse(context, "it does not go with a mechanism", "robot", "pose", *_CURVE)
     else:
@@ -257,6 +265,7 @@ def _refuse_what_does_not_fit(
         alone = "it does not go with --interactive"
         refuse(context, alone, *_OF_FILES, "overwrite", "time", "size", "background", *_CURVE)
         return
+    refuse(context, "it is of the panel: see --interactive", "poses")
     if given(context, *_OF_FILES):
         refuse(context, "a file is written, and no server started", "port")
     else:
@@ -299,18 +308,19 @@ def _of_robot(
     return fastest_of_robot(PlainConsole(stderr=True), machine, motion) if fastest else motion
 
 
-def _interact(
+def _panel(
     robot: str,
     pose: common.Three | None,
     loaded: tuple[ClosedLoopModel, Path] | None,
     package_path: list[Path] | None,
-    port: int | None,
-    layers: str | None,
-) -> None:
-    """Serve a panel until Ctrl-C."""
-    from rps_pin.panel import BrowserPanel, MechanismPanel, Panel, RPSPanel
+    trajectory: Path | None,
+    fastest: bool,
+) -> tuple[Panel, str]:
+    """Return a panel, with its trajectory, and its title."""
+    from rps_pin.panel import MechanismPanel, RPSPanel
 
     panel: Panel
+    console = PlainConsole(stderr=True)
     if loaded is None:
         machine = common.load_robot(robot)
         panel, title = RPSPanel(machine, pose), f"3-RPS {machine.parameters.name}"
@@ -319,8 +329,37 @@ def _interact(
         shapes, missing = shapes_of(file, mechanism, package_path)
         print_notes([*mechanism.notes, *missing])
         panel, title = MechanismPanel(mechanism, visual=shapes), mechanism.name
+    if trajectory is None:
+        return panel, title
+    motion = panel.read(trajectory)
+    if fastest and loaded is None:
+        motion = fastest_of_robot(console, machine, motion)
+    elif fastest:
+        motion = fastest_of_task(console, mechanism.task, motion)
+    panel.load(motion)
+    return panel, title
+
+
+def _layers_of(panel: Panel, layers: str | None) -> dict[str, Any]:
+    """Return the layers of a panel, those that have something to show."""
     chosen = chosen_layers(layers or "none", panel.mechanism)
-    with BrowserPanel(panel, port=port, title=title, **chosen) as page:
+    robot = getattr(panel, "robot", None)
+    bounded = robot is not None and math.isfinite(robot.parameters.leg_length_limits[1])
+    more = ["workspace"] if bounded and "workspace" not in chosen["layers"] else []
+    at_rest = panel.recording is None
+    hidden = [name for name in chosen["hidden"] if not (at_rest and name == "trail")]
+    return chosen | {"hidden": [*hidden, *more]}
+
+
+def _interact(
+    panel: Panel, title: str, port: int | None, layers: str | None, poses: Path | None
+) -> None:
+    """Serve a panel until Ctrl-C."""
+    from rps_pin.panel import BrowserPanel, PoseFile
+
+    chosen = _layers_of(panel, layers)
+    saved = None if poses is None else PoseFile(poses, panel)
+    with BrowserPanel(panel, port=port, title=title, poses=saved, **chosen) as page:
         say(f"Open {page.url} in a browser on this machine. Ctrl-C ends.")
         with contextlib.suppress(KeyboardInterrupt):
             threading.Event().wait()

@@ -1,19 +1,42 @@
-"""Panel in the browser: sliders, readings and the robot in viser's page, on this machine only."""
+"""Panel in the browser: the robot in viser's page, with all that moves it, on this machine only."""
 
 from __future__ import annotations
 
-import html
-import threading
-from collections.abc import Sequence
+import itertools
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Self
 
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.errors import RPSPinError
 from rps_pin.panel.guarded_server import guarded_server, stop
-from rps_pin.panel.panel import Panel, Slider
+from rps_pin.panel.history import History
+from rps_pin.panel.page import texts
+from rps_pin.panel.page.charts import Charts
+from rps_pin.panel.page.gizmo import Gizmo
+from rps_pin.panel.page.worker import Worker
+from rps_pin.panel.panel import Panel
+from rps_pin.panel.pose_file import PoseFile
+from rps_pin.panel.recording import SPEEDS, Player
+from rps_pin.panel.slider import Slider, beyond
 from rps_pin.plain_text import plain
 from rps_pin.viewer import Layer, View
+from rps_pin.viewer.motion import Motion
 from rps_pin.viewer.writers.viser_writer import ViserWriter
 
-_STYLE = "font-size: 85%; line-height: 1.3; margin: 0 0.8em 0.8em"
+_FRAME, _TEXTS, _PLOTS = 1.0 / 30.0, 0.1, 0.25
+"""Least times between pictures, texts and plots of a motion that is played, s."""
+_PATIENCE = 1.5
+"""After which sliders go back from what was refused, s: a number is typed digit by digit."""
+_RED = (0.84, 0.10, 0.10)
+_RIGHT, _LEFT = 350, 310
+"""Widths of the columns, pixels."""
+_BACK = 1.15
+"""The camera is so much farther away than in the exported page, which has no columns."""
+_NO_POSE = "(none)"
 
 
 class BrowserPanel:
@@ -22,14 +45,17 @@ class BrowserPanel:
     Parameters
     ----------
     panel
-        An `RPSPanel` or a `MechanismPanel`.
+        An `RPSPanel` or a `MechanismPanel`. A trajectory that it has loaded is played in the page.
     port
         The port to serve on. Default: a free one from 8080 on.
     title
         Plain text, above the sliders.
     layers, hidden
         Layers as for `rps_pin.viewer.View`, with a switch for each below the readings; those in
-        `hidden` are switched off at first. Forces are those that hold the weight.
+        `hidden` are switched off at first. Forces are those that hold the weight, and of a
+        trajectory those that move it.
+    poses
+        Named poses that the page can go to, and add to.
 
     Attributes
     ----------
@@ -38,6 +64,8 @@ class BrowserPanel:
         without it, from pages of other sites, or by another name of this machine, are refused.
     view : View
         The robot with its layers.
+    player : Player or None
+        The clock of the trajectory.
 
     Raises
     ------
@@ -55,39 +83,35 @@ class BrowserPanel:
         title: str = "Robot",
         layers: Sequence[str | Layer] = (),
         hidden: Sequence[str | Layer] = (),
+        poses: PoseFile | None = None,
     ) -> None:
-        self._panel, self._lock, self._following = panel, threading.RLock(), False
+        self._panel, self._poses, self._history = panel, poses, History()
+        self._shown: dict[str, list[float]] = {}
+        self._beyond: dict[str, float] = {}
+        self._red: frozenset[str] = frozenset()
+        self._notice, self._replace = "", ""
+        self._due_at: dict[str, tuple[float, Callable[[], object]]] = {}
+        self._texts_at = 0.0
+        self.player = None if panel.recording is None else Player(panel.recording.duration)
+        self._worker = Worker(self._due)
         self._server: Any
-        self._server, self.url = guarded_server(port)
+        self._server, self.url = guarded_server(port, self._refused)
+        self._writer = ViserWriter(self._server)
         try:
-            self._server.gui.configure_theme(show_logo=False, show_share_button=False)
-            self._server.gui.main_panel.dock_right()
-            self._heading = self._server.gui.add_html(
-                f'<h2 style="{_STYLE}">{_escaped(title)}</h2>'
-            )
-            self._sliders = {
-                group: [
-                    (slider, self._handle(group, slider, value))
-                    for slider, value in zip(sliders, panel.values(group).tolist(), strict=True)
-                ]
-                for group, sliders in panel.groups.items()
-            }
-            self._text = self._server.gui.add_html("")
-            self.view = View(
-                ViserWriter(self._server),
-                getattr(panel, "robot", panel.mechanism),
-                panel.configuration,
-                visual=panel.visual_model(),
-                layers=layers,
-                hidden=hidden,
-            )
-            self._update()
+            self._build(title, layers, hidden)
+            self._refresh()
+            if panel.recording is None:
+                self._plot()
+            else:
+                self._charts.show_recording(panel.recording)
+            self._worker.start()
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
         """End the server."""
+        self._worker.end()
         stop(self._server)
 
     def __enter__(self) -> Self:
@@ -98,8 +122,8 @@ class BrowserPanel:
 
     @property
     def text(self) -> str:
-        """The readings, as HTML."""
-        return str(self._text.content)
+        """The state and the readings, as HTML."""
+        return "".join(str(one.content) for one in (self._state, self._table, self._remarks))
 
     def move(self, group: str, shown: Sequence[float]) -> None:
         """Set the sliders of a group, in the units they show, as a user of the page does."""
@@ -110,52 +134,372 @@ class BrowserPanel:
         """Return where the sliders of a group are, in the units they show."""
         return [float(handle.value) for _, handle in self._sliders[group]]
 
-    def _handle(self, group: str, slider: Slider, value: float) -> Any:
-        now = slider.scale * value
-        handle = self._server.gui.add_slider(
-            plain(slider.name),
-            min=min(slider.low, now),
-            max=max(slider.high, now),
-            step=slider.step,
-            initial_value=now,
+    # The page -------------------------------------------------------------------------------------
+
+    def _build(
+        self, title: str, layers: Sequence[str | Layer], hidden: Sequence[str | Layer]
+    ) -> None:
+        gui, panel = self._server.gui, self._panel
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(_RIGHT)
+        gui.add_html(texts.STYLE)
+        self._heading = gui.add_html(texts.heading(title))
+        self._sliders = {
+            group: [
+                (one, self._slider(group, one, value))
+                for one, value in zip(sliders, panel.values(group).tolist(), strict=True)
+            ]
+            for group, sliders in panel.groups.items()
+        }
+        self._buttons("go to", {"Home": self._go_home, "Reset": self._reset})
+        self._state = gui.add_html("")  # below the sliders, which it must not move
+        self._remarks = gui.add_html("")
+        with gui.add_folder("layers"):
+            self.view = self._view(layers, hidden)
+            self._gizmo = self._handle()
+            shadows = gui.add_checkbox("shadows", True, hint="off: faster where there is no GPU")
+            shadows.on_update(lambda event: self._writer.set_shadows(event.target.value))
+        if self._poses is not None:
+            self._add_poses()
+        beside = gui.add_panel()
+        with beside.add_tab("in time"):
+            self._mark = gui.add_html(texts.mark(None))
+            if self.player is not None:
+                self._add_player(self.player)
+            self._table = gui.add_html("")
+            self._charts = Charts(gui, panel)
+        beside.dock_left()
+        beside.set_width(_LEFT)
+        camera = self._server.initial_camera  # for the space between the columns, which is narrow
+        middle = np.asarray(camera.look_at)
+        camera.position = middle + _BACK * (np.asarray(camera.position) - middle)
+
+    def _view(self, layers: Sequence[str | Layer], hidden: Sequence[str | Layer]) -> View:
+        panel, motion = self._panel, None
+        if panel.recording is not None:
+            recording = panel.recording
+            motion = Motion(panel.mechanism.model, recording.sample_time, recording.configuration)
+        return View(
+            self._writer,
+            getattr(panel, "robot", panel.mechanism),
+            panel.configuration if motion is None else motion,
+            visual=panel.visual_model(),
+            layers=layers,
+            hidden=hidden,
         )
-        handle.on_update(lambda _: self._moved(group))
+
+    def _handle(self) -> Gizmo | None:
+        """Return the handle of the task's frame, with its switch."""
+        if self._panel.handle is None:
+            return None
+        size = 0.38 * self.view.scene.box.radius
+        gizmo = Gizmo(self._server.scene, self._panel.handle, size, self._dragged)
+        tick = self._server.gui.add_checkbox(
+            "handle", True, hint="arrows and rings that drag the task's frame"
+        )
+        tick.on_update(lambda event: gizmo.set_visible(event.target.value))
+        return gizmo
+
+    def _slider(self, group: str, one: Slider, value: float) -> Any:
+        now = _shown(one, value)
+        marks = [end for end in one.limits if one.low <= end <= one.high]
+        handle = self._server.gui.add_slider(
+            _label(one),
+            min=min(one.low, now),
+            max=max(one.high, now),
+            step=one.step,
+            initial_value=now,
+            marks=[(end, f"{end:.6g}") for end in marks or (one.low, one.high)],
+            hint=f"limits: {one.limits[0]:.6g} to {one.limits[1]:.6g}" if marks else None,
+        )
+        handle.precision = len(f"{one.step:.6f}".rstrip("0").partition(".")[2])
+        handle.on_update(
+            lambda _: self._worker.submit(("move", group), lambda: self._follow(group))
+        )
         return handle
 
-    def _moved(self, group: str) -> None:
+    def _buttons(self, label: str, jobs: dict[str, Callable[[], object]]) -> Any:
+        """Add buttons in a row."""
+        buttons = self._server.gui.add_button_group(label, list(jobs))
+        buttons.on_click(lambda event: self._worker.submit(label, jobs[event.target.value]))
+        return buttons
+
+    def _add_player(self, player: Player) -> None:
+        gui = self._server.gui
+        self._clock = gui.add_html(texts.clock(0.0, player.duration))
+        self._buttons(
+            "trajectory", {"Play": lambda: self._play(True), "Pause": lambda: self._play(False)}
+        )
+        self._scrub = gui.add_slider(
+            "time (s)",
+            min=0.0,
+            max=player.duration,
+            step=player.duration / 1000,
+            initial_value=0.0,
+            marks=[(0.0, "0"), (player.duration, f"{player.duration:.4g}")],
+        )
+        self._scrub.precision = 3
+        self._scrub_shown = 0.0
+        self._scrub.on_update(lambda _: self._worker.submit("time", self._seek))
+        speed = gui.add_dropdown("speed", [f"{one:g}" for one in SPEEDS], initial_value="1")
+
+        def set_speed() -> None:
+            player.speed = float(speed.value)
+
+        speed.on_update(lambda _: self._worker.submit("speed", set_speed))
+
+    def _add_poses(self) -> None:
+        gui = self._server.gui
+        with gui.add_folder("poses"):
+            self._saved = gui.add_dropdown("saved", self._names())
+            self._buttons("pose", {"Go": self._go_to_pose, "Save as": self._save_pose})
+            self._name = gui.add_text("name", "")
+
+    def _names(self) -> list[str]:
+        assert self._poses is not None
+        return [plain(name) for name in self._poses.poses] or [_NO_POSE]
+
+    # What a user does -----------------------------------------------------------------------------
+
+    def _follow(self, group: str) -> None:
         """Follow the sliders of a group."""
-        with self._lock:
-            if self._following:  # set here, not by a user
+        values, sliders = self._panel.values(group), self._sliders[group]
+        changed = [
+            k for k, (_, handle) in enumerate(sliders) if handle.value != self._shown[group][k]
+        ]
+        if not changed:  # set here, not by a user
+            return
+        for k in changed:
+            one, handle = sliders[k]
+            typed = self._beyond.pop(handle._impl.uuid, None)
+            if typed is not None and _is_cut(handle, typed):  # by the page, when the box is left
+                self._settle()
                 return
-            values = [handle.value / slider.scale for slider, handle in self._sliders[group]]
-            self._panel.move(group, values)
-            self.view.display(self._panel.configuration)
-            self._update(moved=group)
+            values[k] = handle.value / one.scale
+        self._by_hand()
+        followed = self._panel.move(group, values)
+        self._shown[group] = [float(handle.value) for _, handle in sliders]
+        self._refresh(but=group)
+        if followed:
+            self._due_at.pop("settle", None)
+        else:
+            self._later("settle", _PATIENCE, self._settle)
 
-    def _update(self, moved: str | None = None) -> None:
-        """Show the readings, and put the sliders of all other groups where the panel is."""
-        self._text.content = f'<div style="{_STYLE}">{_as_html(self._panel)}</div>'
-        self._following = True
+    def _refused(self, handle: Any, value: float) -> None:
+        """Say, from viser's thread, that a number beyond its slider was typed."""
+        for one, mine in itertools.chain(*self._sliders.values()):
+            if mine is handle:
+                self._worker.submit("refused", partial(self._refuse, one, handle, value))
+
+    def _refuse(self, one: Slider, handle: Any, value: float) -> None:
+        self._beyond[handle._impl.uuid] = value
+        self._panel.refuse(beyond(one, value))
+        self._write()
+        self._later("settle", 2.0 * _PATIENCE, self._settle)
+
+    def _settle(self) -> None:
+        """Put all sliders where the robot is."""
+        self._put_sliders(None, again=True)
+
+    def _dragged(self, placement: Array, ended: bool) -> None:
+        """Follow the handle: told by viser's thread."""
+        self._worker.submit("drag", lambda: self._drag(placement))
+        if ended:
+            self._worker.submit("drag ended", self._place_handle)
+
+    def _drag(self, placement: Array) -> None:
+        self._by_hand()
+        self._panel.drag(placement)
+        self._refresh()
+
+    def _place_handle(self) -> None:
+        if self._gizmo is not None:
+            self._gizmo.place(self._panel.configuration)
+
+    def _go_home(self) -> None:
+        self._by_hand()
+        self._panel.home()
+        self._refresh()
+
+    def _reset(self) -> None:
+        """Go home, forget the last seconds, and put clock and camera at their beginning."""
+        self._by_hand()
+        self._panel.home()
+        self._history.clear()
+        if self.player is not None:
+            self.player.time = 0.0
+            self._plot_recording()
+            self._show_time()
+        for client in self._server.get_clients().values():
+            self._frame(client)
+        self._refresh()
+
+    def _frame(self, client: Any) -> None:
+        """Put a page's camera where it was at the beginning, or farther in a narrow window."""
+        camera = self._server.initial_camera
+        middle = np.asarray(camera.look_at)
+        back = max(1.0, 1.0 / client.camera.aspect / _BACK)
+        client.camera.position = middle + back * (np.asarray(camera.position) - middle)
+        client.camera.look_at = middle
+
+    def _by_hand(self) -> None:
+        """Pause the trajectory: the robot is moved by hand."""
+        self._notice = ""
+        if self.player is not None and self.player.playing:
+            self.player.play(False)
+        self._later("plots", _PLOTS, self._plot)
+
+    def _go_to_pose(self) -> None:
+        assert self._poses is not None
+        name = self._saved.value
+        found = {plain(one): values for one, values in self._poses.poses.items()}.get(name)
+        self._by_hand()
+        if found is None:
+            self._notice = "no pose is saved yet"
+        else:
+            self._panel.move(self._poses.group, found)
+        self._refresh()
+
+    def _save_pose(self) -> None:
+        assert self._poses is not None
+        poses, name = self._poses, self._name.value.strip()
         try:
-            for group in self._panel.groups.keys() - {moved}:
-                values = self._panel.values(group).tolist()
-                for (slider, handle), value in zip(self._sliders[group], values, strict=True):
-                    handle.value = min(max(slider.scale * value, handle.min), handle.max)
-        finally:
-            self._following = False
+            replace = name == self._replace and bool(name)
+            poses.save(name, self._panel.values(poses.group), replace=replace)
+            self._notice, self._replace = "", ""
+            self._saved.options = self._names()
+            self._saved.value = plain(name)
+        except RPSPinError as error:
+            self._notice = str(error)
+            if name in poses.poses:
+                self._notice += "; press 'Save as' again to replace it"
+                self._replace = name
+        self._write()
+
+    # Trajectory -----------------------------------------------------------------------------------
+
+    def _play(self, playing: bool) -> None:
+        assert self.player is not None
+        self._plot_recording()
+        self.player.play(playing)
+        self._show_moment()
+
+    def _seek(self) -> None:
+        assert self.player is not None
+        if self._scrub.value == self._scrub_shown:
+            return
+        self.player.play(False)
+        self.player.time = self._scrub_shown = float(self._scrub.value)
+        self._plot_recording()
+        self._show_moment()
+
+    def _show_moment(self) -> None:
+        """Show the trajectory now, and again soon if it plays."""
+        assert self.player is not None
+        self._panel.show(self.player.time)
+        self._show_time()
+        now = time.monotonic()
+        if self.player.playing:
+            self._later("frame", _FRAME, self._show_moment)
+        if not self.player.playing or now > self._texts_at:
+            self._texts_at = now + _TEXTS
+            self._refresh(remember=False)
+        else:
+            self._draw()
+
+    def _show_time(self) -> None:
+        assert self.player is not None
+        elapsed, duration = self.player.time, self.player.duration
+        self._clock.content = texts.clock(elapsed, duration)
+        self._mark.content = texts.mark(elapsed / duration)
+        self._scrub_shown = elapsed
+        self._scrub.value = elapsed
+
+    def _plot_recording(self) -> None:
+        assert self._panel.recording is not None
+        self._notice = ""
+        self._due_at.pop("plots", None)
+        self._charts.show_recording(self._panel.recording)
+
+    # Showing --------------------------------------------------------------------------------------
+
+    def _refresh(self, but: str | None = None, *, remember: bool = True) -> None:
+        """Show the robot, the readings, and the sliders of all other groups where it is."""
+        self._draw()
+        self._write()
+        self._put_sliders(but)
+        if remember:
+            panel = self._panel
+            row = np.hstack([panel.position, panel.forces, panel.conditioning])
+            self._history.add(time.monotonic(), row)
+
+    def _draw(self) -> None:
+        """Show the robot."""
+        panel = self._panel
+        self.view.display(panel.configuration, panel.velocity, panel.acceleration)
+        for joint in panel.outside ^ self._red:
+            self.view.scene.set_joint_colour(joint, _RED if joint in panel.outside else None)
+        self._red = panel.outside
+        if self._gizmo is not None:
+            self._gizmo.place(panel.configuration)
+
+    def _write(self) -> None:
+        """Show the readings."""
+        self._state.content = texts.state(self._panel, self._notice)
+        self._remarks.content = texts.remarks(self._panel)
+        self._table.content = texts.actuators(self._panel)
+
+    def _put_sliders(self, but: str | None, *, again: bool = False) -> None:
+        """Put sliders where the robot is; `again` those too that are said to be there."""
+        for group in self._panel.groups.keys() - {but}:
+            values, shown = self._panel.values(group).tolist(), []
+            for (one, handle), value in zip(self._sliders[group], values, strict=True):
+                shown.append(min(max(_shown(one, value), handle.min), handle.max))
+            self._shown[group] = shown
+            for (_, handle), value in zip(self._sliders[group], shown, strict=True):
+                if again and handle.value == value:  # the page may show what was refused
+                    handle._queue_update("value", value)
+                handle.value = value
+
+    def _plot(self) -> None:
+        """Plot the last seconds."""
+        self._mark.content = texts.mark(None)
+        self._charts.show_history(self._history, len(self._panel.actuators))
+
+    # Time -----------------------------------------------------------------------------------------
+
+    def _later(self, key: str, delay: float, job: Callable[[], object]) -> None:
+        """Do a job after a time; one with the same key that waits already is put off, or stays."""
+        due = time.monotonic() + delay
+        if key == "plots" and key in self._due_at:
+            return
+        self._due_at[key] = (due, job)
+
+    def _due(self) -> float | None:
+        """Do what is due; return the seconds until something else is."""
+        now = time.monotonic()
+        for key, (due, job) in list(self._due_at.items()):
+            if due <= now:
+                del self._due_at[key]
+                job()
+        if not self._due_at:
+            return None
+        return max(0.0, min(due for due, _ in self._due_at.values()) - time.monotonic())
 
 
-def _as_html(panel: Panel) -> str:
-    """Return broken limits or refusals as a line, and the readings as a table."""
-    words = "<br>".join(map(_escaped, panel.trouble))
-    colour = "#b00000" if words else "#006000"
-    rows = "".join(
-        f"<tr><td>{_escaped(name)}</td><td>{_escaped(value)}</td></tr>"
-        for name, value in panel.readings()
-    )
-    line = f'<p style="color:{colour}; margin: 0.5em 0">{words or "within all limits"}</p>'
-    return f"{line}<table>{rows}</table>"
+def _shown(one: Slider, value: float) -> float:
+    """Return a value in the unit shown; rounding errors about zero are zero."""
+    shown = one.scale * value
+    return 0.0 if abs(shown) < 1e-6 * one.step else shown
 
 
-def _escaped(text: str) -> str:
-    return html.escape(plain(text))
+def _label(one: Slider) -> str:
+    """Return a slider's name with a short unit: a line of the page is short."""
+    return plain(one.name).replace(" (degrees)", ", °").replace(" (mm)", ", mm")
+
+
+def _is_cut(handle: Any, typed: float) -> bool:
+    """Return whether a slider's value is what its page makes of a number beyond it."""
+    end = handle.max if typed > handle.max else handle.min
+    return bool(handle.value == end and not f"{end:g}".startswith(f"{typed:g}"))

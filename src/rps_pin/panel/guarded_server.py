@@ -23,6 +23,10 @@ from rps_pin.viewer.server.local_only import HOST, REFUSAL, is_foreign, listener
 
 _LARGEST_MESSAGE = 64 * 1024
 """Bytes of a message from a page, which sends cameras and numbers."""
+_LONGEST_TEXT = 200
+"""Characters."""
+_FARTHEST = 1e4
+"""Of a handle that is dragged, m."""
 _STARTING = threading.Lock()
 _SILENT = logging.getLogger("rps_pin.panel")
 """No lines on the terminal for connections that fail."""
@@ -54,8 +58,12 @@ class Guard:
         return others(connection, request)
 
 
-def guarded_server(port: int | None) -> tuple[Any, str]:
+def guarded_server(
+    port: int | None, refused: Callable[[Any, float], object] | None = None
+) -> tuple[Any, str]:
     """Return a ``viser.ViserServer`` on a port, and its address; default: a free one from 8080 on.
+
+    `refused` is told a number beyond its slider that the page sends, in viser's thread.
 
     Raises
     ------
@@ -77,7 +85,7 @@ def guarded_server(port: int | None) -> tuple[Any, str]:
     try:
         if not guard.installed:
             raise RPSPinError(f"viser {viser.__version__} cannot be guarded: use viser 1.1")
-        _check_messages(server)
+        _check_messages(server, refused)
         # A page can ask viser for a tunnel to the internet: not from here.
         server.request_share_url = lambda *_, **__: None  # type: ignore[method-assign]
     except BaseException:
@@ -114,22 +122,37 @@ def _in_front_of_viser(guard: Guard) -> Iterator[None]:
             servers.serve = serve  # type: ignore[misc]
 
 
-def _check_messages(server: Any) -> None:
+def _check_messages(server: Any, refused: Callable[[Any, float], object] | None) -> None:
     """Let only messages through that a page of the panel sends, with finite numbers in range."""
     from viser import _messages as messages  # noqa: PLC0415
 
     inputs = server.gui._gui_input_handle_from_uuid
+    controls = server.scene._handle_from_transform_controls_name
+    starts_or_ends = (
+        messages.TransformControlsDragStartMessage,
+        messages.TransformControlsDragEndMessage,
+    )
+
+    def may_pass(message: Any) -> bool:
+        if isinstance(message, messages.GuiUpdateMessage):
+            handle = inputs.get(message.uuid)
+            if _is_sound(handle, message.updates):
+                return True
+            if refused and _is_beyond(handle, message.updates):
+                refused(handle, float(message.updates["value"]))
+            return False
+        if isinstance(message, messages.TransformControlsUpdateMessage):
+            return message.name in controls and _is_placement(message.wxyz, message.position)
+        if isinstance(message, starts_or_ends):
+            return message.name in controls
+        return isinstance(message, messages.ViewerCameraMessage)
 
     def check(connections: Any) -> None:
         deliver = connections._handle_incoming_message
 
         async def checked(client: Any, message: Any) -> None:
-            if isinstance(message, messages.GuiUpdateMessage):
-                if not _is_sound(inputs.get(message.uuid), message.updates):
-                    return
-            elif not isinstance(message, messages.ViewerCameraMessage):
-                return
-            await deliver(client, message)
+            if may_pass(message):
+                await deliver(client, message)
 
         connections._handle_incoming_message = checked
 
@@ -138,13 +161,44 @@ def _check_messages(server: Any) -> None:
 
 
 def _is_sound(handle: Any, updates: Any) -> bool:
-    """Return whether a page may set an input so: a switch to true or false, a slider in range."""
+    """Return whether a page may set an input so.
+
+    A switch to true or false, a choice to one of its options, a text to a short one, a slider in
+    range.
+    """
     if handle is None or not isinstance(updates, dict) or set(updates) != {"value"}:
         return False
     value = updates["value"]
     if isinstance(handle.value, bool) or isinstance(value, bool):
         return isinstance(handle.value, bool) and isinstance(value, bool)
-    if not isinstance(value, int | float):
+    if isinstance(handle.value, str):
+        options = getattr(handle, "options", None)
+        return isinstance(value, str) and (
+            len(value) <= _LONGEST_TEXT if options is None else value in options
+        )
+    if not _is_number(value):
         return False
     low, high = getattr(handle, "min", math.nan), getattr(handle, "max", math.nan)
     return bool(low <= value <= high)  # not of a NaN
+
+
+def _is_beyond(handle: Any, updates: Any) -> bool:
+    """Return whether a page sets a slider to a number beyond it."""
+    if not isinstance(updates, dict) or set(updates) != {"value"} or not hasattr(handle, "min"):
+        return False
+    value = updates["value"]
+    return _is_number(value) and math.isfinite(value) and not _is_sound(handle, updates)
+
+
+def _is_placement(wxyz: Any, position: Any) -> bool:
+    """Return whether numbers are a quaternion of unit length, and a position not too far away."""
+    if not all(isinstance(part, list | tuple) for part in (wxyz, position)):
+        return False
+    if (len(wxyz), len(position)) != (4, 3) or not all(map(_is_number, (*wxyz, *position))):
+        return False
+    near = all(abs(one) <= _FARTHEST for one in position)
+    return near and abs(math.hypot(*wxyz) - 1.0) < 1e-3
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

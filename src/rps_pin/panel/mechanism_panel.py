@@ -1,9 +1,10 @@
-"""Panel of any mechanism: sliders of its actuated joints, and of its task's coordinates."""
+"""Panel of any mechanism: its actuated joints, and its task's coordinates."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+import os
+from collections.abc import Iterable
 
 import numpy as np
 import pinocchio as pin
@@ -12,18 +13,22 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.assembly.joint_limits import JointLimits
-from rps_pin.errors import InputError, RPSPinError
-from rps_pin.panel.panel import Slider, quantity, slider_values
-from rps_pin.task import Task
+from rps_pin.errors import InputError
+from rps_pin.panel.panel import Actuator, Panel
+from rps_pin.panel.slider import DEGREE, MM, Slider, quantity, slider
+from rps_pin.task.maps import TaskState
+from rps_pin.trajectories.path import Trajectory
 
-_MM, _DEGREE = 1e3, 180.0 / math.pi
 #: Sliders of a task's angles reach so far to both sides, rad; those of lengths reach the
 #: characteristic length.
 _TURN = math.pi / 3
+#: Sliders of joints reach beyond their limits by this share of the range.
+_ROOM = 0.1
+_WIDEST = 1e3
 
 
-class MechanismPanel:
-    """Sliders of a mechanism's actuated joints, ``"joints"``, and of its task, ``"task"``.
+class MechanismPanel(Panel):
+    """Panel of a mechanism: its actuated joints, ``"joints"``, and its task, ``"task"``.
 
     The second group is there if the mechanism has a task. The loops are closed for the joints' or
     the task's coordinates, in the assembly mode of the last configuration. Joints
@@ -51,140 +56,126 @@ class MechanismPanel:
         q: ArrayLike | None = None,
         visual: pin.GeometryModel | None = None,
     ) -> None:
-        self.mechanism, self._visual = mechanism, visual
+        self._visual = visual
         model = mechanism.model
-        parts = [name for name in mechanism.actuated if not model.existJointName(name)]
-        if parts:
-            raise InputError(f"{parts[0]!r} is a part of a joint; a slider moves a whole joint")
-        self._joints = [model.joints[model.getJointId(name)] for name in mechanism.actuated]
-        for name, joint in zip(mechanism.actuated, self._joints, strict=True):
-            if joint.nq != 1:
+        for name in mechanism.actuated:
+            if not model.existJointName(name):
+                raise InputError(f"{name!r} is a part of a joint; a slider moves a whole joint")
+            count = model.joints[model.getJointId(name)].nq
+            if count != 1:
                 raise InputError(
-                    f"the actuated joint {name!r} has {joint.nq} coordinates; a slider moves one"
+                    f"the actuated joint {name!r} has {count} coordinates; a slider moves one"
                 )
-        self._limits = JointLimits(model)
-        self._q: Array = mechanism.close(mechanism.home if q is None else q)
-        self._units = [
-            (_MM, "mm", "N") if "P" in joint.shortname()[10:11] else (_DEGREE, "degrees", "N m")
-            for joint in self._joints
-        ]
-        self.groups = {"joints": tuple(map(self._slider, range(len(self._joints))))}
-        self._task: Task | None = mechanism.task if mechanism.has_task else None
-        if self._task is not None:
-            self._x: Array = self._task.at(self._q)
-            sliders = tuple(map(self._task_slider, range(self._task.size)))
-            self.groups = {"task": sliders, **self.groups}
-        self._take(self._q)
-
-    def values(self, group: str = "joints") -> Array:
-        """Return the coordinates of the actuated joints, or of the task, rad or m."""
-        if group == "task" and self._task is not None:
-            return self._x.copy()
-        return np.array([self._q[joint.idx_q] for joint in self._joints])
-
-    def move(self, group: str, values: Any) -> bool:
-        """Close the loops for the joints' or the task's coordinates; return whether they close."""
-        try:
-            asked = slider_values(self.groups, group, values)
-            if group == "task" and self._task is not None:
-                self._take(self._task.configuration(asked, self._q, within_limits=False), asked)
-                return True
-            wanted = dict(zip(self.mechanism.actuated, asked.tolist(), strict=True))
-            closed = self.mechanism.complete(wanted, self._q, within_limits=False)
-        except RPSPinError as error:
-            self.trouble = [*self._beyond(), f"not followed: {error}"]
-            return False
-        self._take(closed)
-        return True
-
-    def readings(self) -> list[tuple[str, str]]:
-        """Return coordinates, the forces that hold the weight, conditioning and the loop gap."""
-        names, units = self.mechanism.actuated, self._units
-        rows = [
-            *self._of_task(),
-            *(
-                (name, quantity(value, scale, unit))
-                for name, value, (scale, unit, _) in zip(names, self.values(), units, strict=True)
-            ),
-        ]
-        if isinstance(self._held, str):
-            rows.append(("holds", self._held))
-        else:
-            rows += [
-                (f"holds: {name}", quantity(tau, 1.0, unit))
-                for name, tau, (_, _, unit) in zip(names, self._held, units, strict=True)
-            ]
-        conditioning = 1.0 / self.mechanism.condition(self._q)
-        words = f"{conditioning:.4f} (0 singular, 1 best)"
-        rows.append(("conditioning of the passive joints", words))
-        rows.append(("largest loop gap", f"{self.mechanism.loop_gap(self._q):.1e} m"))
-        return rows
-
-    @property
-    def configuration(self) -> Array:
-        """Configuration of the mechanism, shape (nq,)."""
-        return self._q
+        self._joint_limits = JointLimits(model)
+        turns = mechanism.angular_velocities
+        actuators = tuple(
+            Actuator(name, DEGREE, "degrees", "N m")
+            if turns[index]
+            else Actuator(name, MM, "mm", "N")
+            for name, index in zip(mechanism.actuated, mechanism.actuated_indices, strict=True)
+        )
+        task = mechanism.task if mechanism.has_task else None
+        super().__init__(
+            mechanism, task, actuators, mechanism.close(mechanism.home if q is None else q)
+        )
 
     def visual_model(self) -> pin.GeometryModel | None:
         """Return its visual geometry; None for bars between its joints."""
         return self._visual
 
-    def _take(self, q: Array, x: Array | None = None) -> None:
-        """Go to a closed configuration, whose task coordinates may be known."""
-        still = np.zeros(self.mechanism.model.nv)
-        self._q = q
-        if self._task is not None:
-            self._x = self._task.at(q, near=self._x) if x is None else x.copy()
-        self._held: Array | str
-        try:
-            self._held = self.mechanism.inverse_dynamics(q, still, still).tau
-        except RPSPinError as error:
-            self._held = str(error)
-        self.trouble = self._beyond()
-
-    def _of_task(self) -> list[tuple[str, str]]:
-        """Return the task's coordinates, and how far it is from singularities."""
-        if self._task is None:
+    def coordinates(self) -> list[tuple[str, str]]:
+        """Return the task's coordinates."""
+        if self.task is None or self._x is None:
             return []
-        rows = [
-            (name, quantity(value, *((_DEGREE, "degrees") if turns else (_MM, "mm"))))
+        return [
+            (name, quantity(value, *((DEGREE, "degrees") if turns else (MM, "mm"))))
             for name, value, turns in zip(
-                self._task.coordinates, self._x, self._task.angular, strict=True
+                self.task.coordinates, self._x, self.task.angular, strict=True
             )
         ]
-        found = self._task.singularities(self._q)
-        for kind, distance in (("I", found.type_i), ("II", found.type_ii)):
-            rows.append((f"distance to type {kind}", f"{float(distance):.4f} (0 singular)"))
-        return rows
+
+    def of_actuators(self) -> list[tuple[str, str]]:
+        """Return the actuators' positions, and the forces that hold the weight or move it."""
+        rows = [
+            (one.name, quantity(value, one.scale, one.unit))
+            for one, value in zip(self.actuators, self._position, strict=True)
+        ]
+        if isinstance(self._held, str):
+            return rows
+        return rows + [
+            (f"holds: {one.name}", quantity(tau, 1.0, one.force_unit))
+            for one, tau in zip(self.actuators, self._held, strict=True)
+        ]
+
+    def remarks(self) -> list[tuple[str, str]]:
+        """Return how far it is from singularities, and the loop gap."""
+        rows: list[tuple[str, str]] = []
+        if self.task is not None:
+            found = self.task.singularities(self._q)
+            for kind, distance in (("I", found.type_i), ("II", found.type_ii)):
+                rows.append((f"distance to type {kind}", f"{float(distance):.4f} (0 singular)"))
+        gap = f"{self.mechanism.loop_gap(self._q):.1e} m"
+        return [*rows, *super().remarks(), ("largest loop gap", gap)]
+
+    def _sliders(self) -> dict[str, tuple[Slider, ...]]:
+        found = {"joints": tuple(map(self._slider, range(len(self.actuators))))}
+        if self.task is None:
+            return found
+        return {"task": tuple(map(self._task_slider, range(self.task.size))), **found}
 
     def _task_slider(self, number: int) -> Slider:
-        task = self._task
-        assert task is not None
-        name, here, turns = task.coordinates[number], float(self._x[number]), task.angular[number]
-        scale, unit = (_DEGREE, "degrees") if turns else (_MM, "mm")
-        reach = _TURN if turns else task.characteristic_length
-        low, high = here - reach, here + reach
-        return Slider(f"{name} ({unit})", scale * low, scale * high, scale * reach / 500, scale)
-
-    def _beyond(self) -> list[str]:
-        """Return a sentence for each limit that is broken."""
-        words = [f"joint {phrase}" for phrase in self._limits.outside(self._q).values()]
-        if isinstance(self._held, str):
-            return words
-        model = self.mechanism.model
-        joints = zip(self.mechanism.actuated, self._joints, self._units, strict=True)
-        for (name, joint, (*_, unit)), tau in zip(joints, self._held.tolist(), strict=True):
-            low, high = model.lowerEffortLimit[joint.idx_v], model.upperEffortLimit[joint.idx_v]
-            if not low <= tau <= high:
-                need = f"would need {tau:.6g} {unit} ({low:.6g} to {high:.6g})"
-                words.append(f"joint {name!r} {need}")
-        return words
+        assert self.task is not None and self._x is not None
+        here, turns = float(self._x[number]), self.task.angular[number]
+        reach = _TURN if turns else self.task.characteristic_length
+        return slider(self.task.coordinates[number], turns, here - reach, here + reach)
 
     def _slider(self, number: int) -> Slider:
-        index, (scale, unit, _) = self._joints[number].idx_q, self._units[number]
-        model, here = self.mechanism.model, float(self._q[index])
+        one, model = self.actuators[number], self.mechanism.model
+        index, turns = self._actuated[number], one.unit == "degrees"
+        here = float(self._q[index])
         low, high = float(model.lowerPositionLimit[index]), float(model.upperPositionLimit[index])
-        if not high - low < 1e3:  # no limits
-            low, high = (-math.pi, math.pi) if unit == "degrees" else (here - 1.0, here + 1.0)
-        name = f"{self.mechanism.actuated[number]} ({unit})"
-        return Slider(name, scale * low, scale * high, scale * (high - low) / 1000, scale)
+        if not high - low < _WIDEST:  # no limits
+            ends = (-math.pi, math.pi) if turns else (here - 1.0, here + 1.0)
+            return slider(one.name, turns, *ends)
+        room = _ROOM * (high - low)
+        return slider(one.name, turns, low - room, high + room, (low, high))
+
+    def _read(self, path: str | os.PathLike[str]) -> Trajectory:
+        from rps_pin.task.trajectory_file import load_task_trajectory  # noqa: PLC0415
+
+        assert self.task is not None
+        return load_task_trajectory(path, self.task)
+
+    def _of_task(self, x: Array, near: Array) -> Array:
+        assert self.task is not None
+        return self.task.configuration(x, near, within_limits=False)
+
+    def _of_actuators(self, position: Array) -> Array:
+        wanted = dict(zip(self.mechanism.actuated, position.tolist(), strict=True))
+        return self.mechanism.complete(wanted, self._q, within_limits=False)
+
+    def _moving(self, q: Array, x: Array, rate: Array, acceleration: Array) -> TaskState:
+        assert self.task is not None
+        return self.task.motion(q, rate, acceleration, x=x)
+
+    def _dynamics(self, state: TaskState) -> Array:
+        return np.asarray(self.mechanism.inverse_dynamics(*state).tau)
+
+    def _broken(self) -> Iterable[tuple[str, str]]:
+        joints, turns = self._joint_limits, self.mechanism.angular_velocities
+        for k in np.flatnonzero(joints.beyond(self._q)):
+            scale, unit = (DEGREE, "degrees") if turns[joints.v[k]] else (MM, "mm")
+            here, low, high = (
+                scale * float(one)
+                for one in (self._q[joints.q[k]], joints.lower[k], joints.upper[k])
+            )
+            name = joints.names[k]
+            yield f"joint {name!r} at {here:.6g} {unit} ({low:.6g} to {high:.6g})", name
+
+    def _too_weak(self) -> Iterable[tuple[str, str]]:
+        model, indices = self.mechanism.model, self.mechanism.actuated_indices
+        for one, index, tau in zip(self.actuators, indices, self.forces.tolist(), strict=True):
+            low, high = model.lowerEffortLimit[index], model.upperEffortLimit[index]
+            if not low <= tau <= high:
+                need = f"would need {tau:.6g} {one.force_unit} ({low:.6g} to {high:.6g})"
+                yield f"joint {one.name!r} {need}", one.name

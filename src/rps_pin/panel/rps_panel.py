@@ -1,31 +1,37 @@
-"""Panel of a 3-RPS: sliders of its pose, and of its leg lengths."""
+"""Panel of a 3-RPS: its pose, and its leg lengths, with closed forms."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+import os
+from collections.abc import Iterable
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, RPSPinError
-from rps_pin.panel.panel import Slider, quantity, slider_values
+from rps_pin.errors import InputError
+from rps_pin.panel.panel import Actuator, Panel
+from rps_pin.panel.slider import DEGREE, MM, Slider, quantity, slider
 from rps_pin.rps.kinematics.legs import cone_angles, violations
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.measures import singularity_measures
+from rps_pin.rps.urdf import LEGS
+from rps_pin.task.maps import TaskState
+from rps_pin.trajectories.path import Trajectory
 from rps_pin.validation import real_vector
 
-_MM, _DEGREE = 1e3, 180.0 / math.pi
 _STILL = np.zeros(3)
 #: Tilts that can be asked for, rad.
 _LARGEST_TILT = math.radians(60.0)
+#: The joint whose links show that a limit is broken.
+_SHOWS = {"length": "prismatic", "angle": "revolute", "spherical joint": "prismatic"}
 
 
-class RPSPanel:
-    """Sliders of a 3-RPS, in two groups: ``"pose"`` and ``"lengths"``.
+class RPSPanel(Panel):
+    """Panel of a 3-RPS, with sliders in two groups: ``"pose"`` and ``"lengths"``.
 
     A pose beyond the robot's limits is shown, and the limits are listed in `trouble`. Leg lengths
     are followed in the current assembly mode. Where there is no such pose, or the path to it meets
@@ -38,6 +44,13 @@ class RPSPanel:
     pose
         Its first pose, shape (3,), m and rad. Default: level, in the middle of its stroke.
 
+    Attributes
+    ----------
+    pose, length, angle, force : ndarray, shape (3,)
+        Pose (m, rad, rad); lengths (m), angles (rad) and forces (N) of the legs.
+    place : ndarray, shape (3,)
+        Of the platform's centre, m.
+
     Raises
     ------
     InputError
@@ -46,73 +59,99 @@ class RPSPanel:
         If the robot cannot be there.
     """
 
+    task_group, actuator_group = "pose", "lengths"
+
     def __init__(self, robot: RPSRobot, pose: ArrayLike | None = None) -> None:
-        self.robot, self.mechanism = robot, robot.mechanism
+        self.robot = robot
         self._free = RPSRobot(robot.parameters.without_limits()).with_payload(robot.payload)
         start = _middle(robot.parameters) if pose is None else real_vector(pose, 3, "pose")
-        self.groups = _groups(robot.parameters, float(start[0]))
-        self.trouble: list[str] = []
-        self._take(start)
-
-    def values(self, group: str) -> Array:
-        """Return pose (m, rad, rad) or leg lengths (m), shape (3,)."""
-        return (self.pose if group == "pose" else self.length).copy()
-
-    def move(self, group: str, values: Any) -> bool:
-        """Go to a pose, or to leg lengths; return whether the robot can."""
-        try:
-            asked = slider_values(self.groups, group, values)
-            if group == "lengths":
-                asked = self._free.forward_kinematics(asked, near=self.pose)
-            self._take(asked)
-        except RPSPinError as error:
-            self.trouble = [*self._limits(), f"not followed: {error}"]
-            return False
-        return True
-
-    def readings(self) -> list[tuple[str, str]]:
-        """Return pose, lengths, angles, forces that hold the weight, and the distances."""
-        measure = singularity_measures(self.robot.parameters, self.pose, errors="mask")
-        return [
-            ("height", quantity(self.pose[0], _MM, "mm")),
-            ("tilt about x, y", quantity(self.pose[1:], _DEGREE, "degrees")),
-            ("centre sideways, x, y", quantity(self.position[:2], 1e6, "um", 1)),
-            ("leg lengths", quantity(self.length, _MM, "mm")),
-            ("leg angles", quantity(self.angle, _DEGREE, "degrees", 2)),
-            ("forces that hold it", quantity(self.force, 1.0, "N")),
-            ("distance to type II", f"{float(measure.type_ii):.4f} (0 singular, 1 best)"),
-        ]
-
-    @property
-    def configuration(self) -> Array:
-        """Pinocchio's q, shape (13,)."""
-        return self._q
+        actuators = tuple(Actuator(f"leg {leg}", MM, "mm", "N") for leg in LEGS)
+        q = self._free.state(start, _STILL, _STILL)[0]
+        super().__init__(robot.mechanism, robot.task, actuators, q)
 
     def visual_model(self) -> pin.GeometryModel:
         """Return the robot's visual geometry."""
         return self.robot.visual_model()
 
-    def _take(self, pose: Array) -> None:
-        """Go to a pose."""
-        q = self._free.state(pose, _STILL, _STILL)[0]
-        legs = self._free.inverse_kinematics(pose)
-        force = self._free.actuator_forces(pose, _STILL, _STILL)
-        self.position, self._rotation = self._free.platform_placement(pose)
-        self.pose, self._q, self.force = pose.copy(), q, force
-        self.length, self.angle = legs.length, legs.angle
-        self.trouble = self._limits()
+    def coordinates(self) -> list[tuple[str, str]]:
+        """Return height and tilt."""
+        return [
+            ("height", quantity(self.pose[0], MM, "mm")),
+            ("tilt about x, y", quantity(self.pose[1:], DEGREE, "degrees")),
+        ]
 
-    def _limits(self) -> list[str]:
-        """Return a sentence for each limit that is broken."""
+    def of_actuators(self) -> list[tuple[str, str]]:
+        """Return leg lengths, and the forces that hold the weight or move it."""
+        return [
+            ("leg lengths", quantity(self.length, MM, "mm")),
+            ("forces that hold it", quantity(self.force, 1.0, "N")),
+        ]
+
+    def remarks(self) -> list[tuple[str, str]]:
+        """Return the centre's place, the legs' angles, and the distances to singularities."""
+        measure = singularity_measures(self.robot.parameters, self.pose, errors="mask")
+        return [
+            ("centre sideways, x, y", quantity(self.place[:2], 1e6, "um", 1)),
+            ("leg angles", quantity(self.angle, DEGREE, "degrees", 2)),
+            ("distance to type II", f"{float(measure.type_ii):.4f} (0 singular, 1 best)"),
+            *super().remarks(),
+        ]
+
+    def _sliders(self) -> dict[str, tuple[Slider, ...]]:
+        height, limits = float(self.pose[0]), self.robot.parameters.leg_length_limits
+        low, high = (0.3 * height, 2.0 * height) if math.isinf(limits[1]) else limits
+        room = 0.2 * (high - low)
+        ends = max(low - room, 0.01 * high), high + room
+        tilts = [slider(f"tilt about {axis}", True, -_LARGEST_TILT, _LARGEST_TILT) for axis in "xy"]
+        legs = [slider(f"leg {leg}", False, *ends, limits) for leg in LEGS]
+        return {"pose": (slider("height", False, *ends), *tilts), "lengths": tuple(legs)}
+
+    def _read(self, path: str | os.PathLike[str]) -> Trajectory:
+        from rps_pin.rps.motion.trajectory_file import load_trajectory  # noqa: PLC0415
+
+        return load_trajectory(path, self.robot)
+
+    def _of_task(self, x: Array, near: Array) -> Array:
+        return self._free.state(x, _STILL, _STILL)[0]
+
+    def _of_actuators(self, position: Array) -> Array:
+        pose = self._free.forward_kinematics(position, near=self.pose)
+        return self._of_task(np.asarray(pose), self._q)
+
+    def _moving(self, q: Array, x: Array, rate: Array, acceleration: Array) -> TaskState:
+        return TaskState(*self._free.state(x, rate, acceleration))
+
+    def _dynamics(self, state: TaskState) -> Array:
+        return np.asarray(self._free.inverse_dynamics(*state).tau)
+
+    def _take(self, q: Array, x: Array | None = None, state: TaskState | None = None) -> None:
+        pose = self._free.task.at(q) if x is None else x.copy()
+        self._free.actuator_forces(pose, _STILL, _STILL)  # or refuses: it is singular
+        legs = self._free.inverse_kinematics(pose)
+        self.place, self._rotation = self._free.platform_placement(pose)
+        self.pose, self.length, self.angle = pose, legs.length, legs.angle
+        super()._take(q, pose, state)
+
+    @property
+    def force(self) -> Array:
+        """Forces of the legs, shape (3,), N."""
+        return self.forces
+
+    def _broken(self) -> Iterable[tuple[str, str]]:
         p = self.robot.parameters
         cone = cone_angles(self.angle, self._rotation, p.spherical_rest_angle)
-        words = [str(one) for one in violations(p, self.length, self.angle, cone)]
-        limit = p.actuator_force_limit
-        return words + [
-            f"leg {leg}: force would be {force:.6g} N; its limit is {limit:.6g} N"
-            for leg, force in enumerate(self.force.tolist(), start=1)
-            if abs(force) > limit
-        ]
+        for one in violations(p, self.length, self.angle, cone):
+            scale, unit = (DEGREE, "degrees") if one.unit == "rad" else (MM, "mm")
+            value, lower, upper = (scale * part for part in (one.value, one.lower, one.upper))
+            said = one._replace(value=value, lower=lower, upper=upper, unit=unit)
+            yield str(said), f"leg_{one.leg}_{_SHOWS[one.quantity]}"
+
+    def _too_weak(self) -> Iterable[tuple[str, str]]:
+        limit = self.robot.parameters.actuator_force_limit
+        for leg, force in zip(LEGS, self.force.tolist(), strict=True):
+            if abs(force) > limit:
+                said = f"leg {leg}: force would be {force:.6g} N; its limit is {limit:.6g} N"
+                yield said, f"leg_{leg}_prismatic"
 
 
 def _middle(parameters: RPSParameters) -> Array:
@@ -125,19 +164,3 @@ def _middle(parameters: RPSParameters) -> Array:
     if length <= abs(inwards):
         raise InputError("there is no level pose in the middle of the stroke; give a first pose")
     return np.array([math.sqrt(length**2 - inwards**2), 0.0, 0.0])
-
-
-def _groups(parameters: RPSParameters, height: float) -> dict[str, tuple[Slider, ...]]:
-    low, high = parameters.leg_length_limits
-    if math.isinf(high):
-        low, high = 0.3 * height, 2.0 * height
-    room = 0.2 * (high - low)
-    lowest, highest = max(low - room, 0.01 * high), high + room
-    tilt = _DEGREE * _LARGEST_TILT
-    step = round(_MM * (highest - lowest) / 2000, 3) or 0.001
-    height_slider, *legs = (
-        Slider(f"{name} (mm)", _MM * lowest, _MM * highest, step, _MM)
-        for name in ("height", "leg 1", "leg 2", "leg 3")
-    )
-    tilts = [Slider(f"tilt about {axis} (degrees)", -tilt, tilt, 0.05, _DEGREE) for axis in "xy"]
-    return {"pose": (height_slider, *tilts), "lengths": tuple(legs)}

@@ -138,6 +138,16 @@ class Scene:
         ]
         self.writer.animate(elapsed, [*keyframes, *more], readings or {})
 
+    def set_joint_colour(self, joint: str, colour: Sequence[float] | None) -> None:
+        """Colour all links that a joint carries (red, green, blue, 0 to 1); None: as they were."""
+        index = self.model.getJointId(joint)
+        for link in (one for one in self._links if one.joint == index):
+            for part in link.parts():
+                own, opacity = part.material.colour, part.material.opacity
+                shares = [((own >> shift) & 0xFF) / 255 for shift in (16, 8, 0)]
+                path = f"{ROBOT}/{part.node}/{part.name}"
+                self.writer.set_colour(path, shares if colour is None else colour, opacity)
+
     def _place(self, q: Array, links: Sequence[Link]) -> None:
         pin.forwardKinematics(self.model, self._data, q)
         for link in links:

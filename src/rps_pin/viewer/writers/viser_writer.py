@@ -1,8 +1,8 @@
 """viser as a front end: a scene in viser's page.
 
-Three parts of the description are left to Meshcat: shadows and reflections, which take half of the
-frames where there is no GPU; the background's colours; and drawing over everything else
-(`Material.on_top`), which viser has not. Motions are played by `View.play`.
+Three parts of the description are left to Meshcat: reflections, and shadows of the robot on itself;
+the background's colours, which the page has; and drawing over everything else (`Material.on_top`),
+which viser has not. Motions are played by `View.play`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.shapes import Box, Cylinder, LineSegments, Part, TriangleMesh
 from rps_pin.viewer.scene.stage import WORLD, Stage
 
-_LIGHT = math.pi
+_LIGHT = 1.35 * math.pi
 """viser's unit of light in Meshcat's: three.js has divided by pi since its release 155."""
+_LAMP_ANGLE = 0.4
 
 
 class ViserWriter:
@@ -52,8 +53,19 @@ class ViserWriter:
         scene.configure_environment_map(None)
         scene.add_light_ambient("/light/ambient", intensity=_LIGHT * stage.ambient)
         position = np.asarray(stage.camera_position)
+        lamp = np.asarray(stage.lamp_position)
+        self._lamp = scene.add_light_spot(
+            "/light/lamp",
+            intensity=_LIGHT * stage.lamp,
+            decay=0.0,
+            angle=_LAMP_ANGLE,
+            penumbra=0.5,
+            cast_shadow=True,
+            direction=tuple(-lamp),
+            position=tuple(box.centre + box.radius * lamp),
+        )
+        self._lay_floor(stage)
         for name, direction, intensity in (
-            ("lamp", stage.lamp_position, stage.lamp),
             ("fill", position, stage.fill),
             ("side_1", (-1.0, 0.0, 0.0), stage.sides),
             ("side_2", (1.0, 0.0, 0.0), stage.sides),
@@ -70,7 +82,7 @@ class ViserWriter:
         camera.near, camera.far = 0.01 * distance, 100.0 * distance
 
     def add_part(self, path: str, part: Part, *, casts_shadow: bool = True) -> None:
-        """Draw a part at a path; there are no shadows here."""
+        """Draw a part at a path."""
         node, scene, shape = path.rpartition("/")[0], self._server.scene, part.shape
         self._node(node)
         colour = tuple((part.material.colour >> shift) & 0xFF for shift in (16, 8, 0))
@@ -103,12 +115,30 @@ class ViserWriter:
                 opacity=None if opacity == 1.0 else opacity,
                 flat_shading=part.material.flat or isinstance(shape, Box | Cylinder),
                 side="double",
-                cast_shadow=False,
+                cast_shadow=casts_shadow,
                 receive_shadow=False,
             )
         self._handles[path] = handle
         self._parts.setdefault(node, []).append((handle, part.placement))
         _place(handle, part.placement)
+
+    def set_shadows(self, shadows: bool) -> None:
+        """Cast shadows on the floor, or none: a page without a GPU draws faster so."""
+        self._lamp.cast_shadow = shadows
+
+    def _lay_floor(self, stage: Stage) -> None:
+        """Lay an invisible floor that shows nothing but shadows."""
+        corners = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+        middle = np.array([*stage.box.centre[:2], stage.floor_height])
+        self._server.scene.add_mesh_simple(
+            "/floor",
+            stage.floor_size / 2.0 * corners,
+            np.array([[0, 1, 2], [0, 2, 3]]),
+            opacity=0.0,
+            cast_shadow=False,
+            receive_shadow=stage.shadow_opacity,
+            position=tuple(middle),
+        )
 
     def place(self, path: str, placement: Array) -> None:
         """Place a node in its parent's frame."""

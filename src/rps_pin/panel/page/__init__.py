@@ -1,0 +1,1 @@
+"""Parts of the panel's page, drawn by viser."""

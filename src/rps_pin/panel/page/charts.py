@@ -1,0 +1,83 @@
+"""Plots of positions, forces and conditioning in time, beside the robot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rps_pin.arrays import Array
+from rps_pin.panel.history import WINDOW, History
+from rps_pin.panel.panel import Panel
+from rps_pin.panel.recording import Recording
+
+COLOURS = ("#D55E00", "#009E73", "#0072B2", "#CC79A7", "#E69F00", "#56B4E9", "#777777", "#000000")
+"""Of the actuators, in order, repeated; of a 3-RPS those that its legs have."""
+_HEIGHT = 120
+_FONT = "11px sans-serif"
+
+
+class Charts:
+    """Three plots of the same time axis, with a mark at the present.
+
+    Parameters
+    ----------
+    gui
+        viser's.
+    panel
+        What is plotted.
+    """
+
+    def __init__(self, gui: Any, panel: Panel) -> None:
+        self._scales = np.array([one.scale for one in panel.actuators])
+        positions = {one.unit: None for one in panel.actuators}
+        forces = {one.force_unit: None for one in panel.actuators}
+        colours = [COLOURS[k % len(COLOURS)] for k in range(len(panel.actuators))]
+        nothing = np.array([-WINDOW, 0.0])
+        self._charts: list[Any] = []
+        for title, count in (
+            (f"actuators, {' and '.join(positions)}", len(colours)),
+            (f"forces, {' and '.join(forces)}", len(colours)),
+            ("conditioning (0 singular, 1 best)", 1),
+        ):
+            series = [_line(colour) for colour in colours]
+            last = len(self._charts) == 2
+            chart = gui.add_uplot(
+                (nothing, *[np.full(2, np.nan)] * count),
+                ({}, *(series if not last else [_line("#333333")])),
+                title=title,
+                scales={"x": {"time": False}},
+                cursor={"drag": {"x": False, "y": False}},
+                axes=(_axis(28) if last else {"show": False}, _axis(46)),
+                legend={"show": False},
+                height=_HEIGHT + (20 if last else 0),
+                padding=(6, 12, 0 if last else 8, 0),
+            )
+            self._charts.append(chart)
+
+    def show_recording(self, recording: Recording) -> None:
+        """Plot a trajectory."""
+        self._show(recording.time, recording.position, recording.force, recording.conditioning)
+
+    def show_history(self, history: History, actuators: int) -> None:
+        """Plot the last seconds."""
+        time, rows = history.arrays()
+        if len(time) < 2:
+            time, rows = np.array([-WINDOW, 0.0]), np.repeat(rows, 2, axis=0)
+        self._show(time, rows[:, :actuators], rows[:, actuators:-1], rows[:, -1])
+
+    def _show(self, time: Array, position: Array, force: Array, conditioning: Array) -> None:
+        for chart, rows in zip(
+            self._charts, (position * self._scales, force, conditioning[:, None]), strict=True
+        ):
+            chart.data = (time.copy(), *(np.ascontiguousarray(column) for column in rows.T))
+
+
+def _line(colour: str) -> dict[str, Any]:
+    """Return a curve of a plot, without points."""
+    return {"stroke": colour, "width": 1.5, "points": {"show": False}}
+
+
+def _axis(size: int) -> dict[str, Any]:
+    """Return an axis of a plot that takes `size` pixels."""
+    return {"size": size, "font": _FONT, "ticks": {"size": 4}, "gap": 3}

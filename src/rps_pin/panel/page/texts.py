@@ -1,0 +1,90 @@
+"""Texts of the panel's page: its style, the state, tables; as HTML without anything of a user's."""
+
+from __future__ import annotations
+
+import html
+import math
+
+from rps_pin.panel.page.charts import COLOURS
+from rps_pin.panel.panel import Panel
+from rps_pin.plain_text import plain
+
+_TEXT = "font-size: 85%; line-height: 1.35; margin: 0 0.8em 0.5em"
+#: Number boxes are as wide as their numbers; names are not cut into letters; the canvas has the
+#: background of the exported page; and a mark is drawn over viser's plots.
+STYLE = """<style>
+.mantine-NumberInput-root {width: 4.6rem !important}
+.mantine-NumberInput-input {text-align: right; letter-spacing: 0 !important}
+div:has(> .mantine-Text-root > label) {width: 8.2em !important}
+canvas[data-engine] {background: linear-gradient(#DBE6F0, #FCFCFF)}
+.uplot .u-title {font-size: 12px; font-weight: 500; text-align: left; padding-left: 46px}
+.u-over::after {content: ""; position: absolute; top: 0; bottom: 0; left: var(--now, 100%);
+  border-left: 1.5px solid #333333; display: var(--mark, none)}
+.rps-table {border-collapse: collapse; width: 100%}
+.rps-table td, .rps-table th {padding: 1px 4px; text-align: right;
+  font-variant-numeric: tabular-nums}
+.rps-table td:first-child, .rps-table th:first-child {text-align: left}
+.rps-table th {font-weight: 500; color: #666666}
+.rps-remarks {font-size: 92%}
+.rps-remarks td:last-child {text-align: left}
+.rps-swatch {display: inline-block; width: 0.7em; height: 0.7em; margin-right: 0.5em}
+</style>"""
+
+
+def escaped(text: str) -> str:
+    """Return plain text as HTML."""
+    return html.escape(plain(text))
+
+
+def heading(title: str) -> str:
+    """Return the page's title."""
+    return f'<h2 style="{_TEXT}; font-size: 105%; margin-top: 0.5em">{escaped(title)}</h2>'
+
+
+def state(panel: Panel, notice: str = "") -> str:
+    """Return broken limits and refusals, or that there are none."""
+    words = [*panel.trouble, *([notice] if notice else [])]
+    said = "<br>".join(map(escaped, words)) or "within all limits"
+    colour = "#B00000" if words else "#006000"
+    return f'<div style="{_TEXT}; color: {colour}">{said}</div>'
+
+
+def actuators(panel: Panel) -> str:
+    """Return a table of positions and forces, with the colours of the plots."""
+    rows = []
+    for k, one in enumerate(panel.actuators):
+        colour = COLOURS[k % len(COLOURS)]
+        position = f"{one.scale * panel.position[k] + 0.0:.3f} {one.unit}"
+        force = panel.forces[k]
+        held = f"{force + 0.0:.3f} {one.force_unit}" if math.isfinite(force) else "-"
+        red = ' style="color: #B00000"' if panel.mechanism.actuated[k] in panel.outside else ""
+        rows.append(
+            f'<tr{red}><td><span class="rps-swatch" style="background: {colour}"></span>'
+            f"{escaped(one.name)}</td><td>{position}</td><td>{held}</td></tr>"
+        )
+    head = "<tr><th>actuator</th><th>position</th><th>force</th></tr>"
+    return f'<div style="{_TEXT}"><table class="rps-table">{head}{"".join(rows)}</table></div>'
+
+
+def remarks(panel: Panel) -> str:
+    """Return a table of the other readings."""
+    rows = "".join(
+        f"<tr><td>{escaped(name)}</td><td>{escaped(value)}</td></tr>"
+        for name, value in panel.remarks()
+    )
+    return f'<div style="{_TEXT}"><table class="rps-table rps-remarks">{rows}</table></div>'
+
+
+def clock(elapsed: float, duration: float) -> str:
+    """Return the time in a trajectory."""
+    return (
+        f'<div style="{_TEXT}; font-size: 100%; font-variant-numeric: tabular-nums">'
+        f"t = {elapsed:.2f} s <span style='color: #666666'>of {duration:.2f} s</span></div>"
+    )
+
+
+def mark(share: float | None) -> str:
+    """Return the place of the mark in the plots, as a share of the time axis; None: no mark."""
+    if share is None:
+        return "<style>:root {--mark: none}</style>"
+    return f"<style>:root {{--mark: block; --now: {100.0 * share:.2f}%}}</style>"
