@@ -150,14 +150,11 @@ def view_command(
     at_home = trajectory is None and (mechanism is not None or interactive)
     if fastest and (pose is not None or still_robot or at_home):
         raise typer.BadParameter("there is no trajectory", param_hint="--fastest")
-    if pose is not None:
-        common.doubt_pose("--pose", pose, degrees)
-        if degrees:
-            pose = pose[0], math.radians(pose[1]), math.radians(pose[2])
+    pose = None if pose is None else _in_radians(pose, degrees)
     if interactive:
-        loaded = None if mechanism is None else load_mechanism(mechanism, ignore_limits, accuracy)
-        panel, title = _panel(robot, pose, loaded, package_path, trajectory, fastest)
-        _interact(panel, title, port, layers, poses)
+        of_file = None if mechanism is None else load_mechanism(mechanism, ignore_limits, accuracy)
+        shown = _panel(robot, pose, of_file, package_path, trajectory, fastest)
+        _interact(*shown, port, layers, poses)
         return
     # Meshcat and its server are for this command only.
     from rps_pin.viewer import show
@@ -192,6 +189,12 @@ def view_command(
             view.play()
     except KeyboardInterrupt:
         say("\nended")
+
+
+def _in_radians(pose: common.Three, degrees: bool) -> common.Three:
+    """Return a pose in m and rad; what looks like another unit is told."""
+    common.doubt_pose("--pose", pose, degrees)
+    return (pose[0], math.radians(pose[1]), math.radians(pose[2])) if degrees else pose
 
 
 def _write_files(
@@ -340,24 +343,16 @@ def _panel(
     return panel, title
 
 
-def _layers_of(panel: Panel, layers: str | None) -> dict[str, Any]:
-    """Return the layers of a panel, those that have something to show."""
-    chosen = chosen_layers(layers or "none", panel.mechanism)
-    robot = getattr(panel, "robot", None)
-    bounded = robot is not None and math.isfinite(robot.parameters.leg_length_limits[1])
-    more = ["workspace"] if bounded and "workspace" not in chosen["layers"] else []
-    at_rest = panel.recording is None
-    hidden = [name for name in chosen["hidden"] if not (at_rest and name == "trail")]
-    return chosen | {"hidden": [*hidden, *more]}
-
-
 def _interact(
     panel: Panel, title: str, port: int | None, layers: str | None, poses: Path | None
 ) -> None:
     """Serve a panel until Ctrl-C."""
     from rps_pin.panel import BrowserPanel, PoseFile
 
-    chosen = _layers_of(panel, layers)
+    robot = getattr(panel, "robot", None)
+    chosen = chosen_layers(layers or "none", robot or panel.mechanism, panel.motion)
+    # Further layers are left out where they have nothing to show.
+    chosen["hidden"] += [one for one in ("workspace",) if one not in chosen["layers"]]
     saved = None if poses is None else PoseFile(poses, panel)
     with BrowserPanel(panel, port=port, title=title, poses=saved, **chosen) as page:
         say(f"Open {page.url} in a browser on this machine. Ctrl-C ends.")

@@ -24,7 +24,6 @@ from rps_pin.panel.recording import SPEEDS, Player
 from rps_pin.panel.slider import Slider, beyond
 from rps_pin.plain_text import plain
 from rps_pin.viewer import Layer, View
-from rps_pin.viewer.motion import Motion
 from rps_pin.viewer.writers.viser_writer import ViserWriter
 
 _FRAME, _TEXTS, _PLOTS = 1.0 / 30.0, 0.1, 0.25
@@ -176,14 +175,11 @@ class BrowserPanel:
         camera.position = middle + _BACK * (np.asarray(camera.position) - middle)
 
     def _view(self, layers: Sequence[str | Layer], hidden: Sequence[str | Layer]) -> View:
-        panel, motion = self._panel, None
-        if panel.recording is not None:
-            recording = panel.recording
-            motion = Motion(panel.mechanism.model, recording.sample_time, recording.configuration)
+        panel = self._panel
         return View(
             self._writer,
             getattr(panel, "robot", panel.mechanism),
-            panel.configuration if motion is None else motion,
+            panel.motion,
             visual=panel.visual_model(),
             layers=layers,
             hidden=hidden,

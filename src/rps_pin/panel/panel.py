@@ -21,6 +21,7 @@ from rps_pin.task import Task
 from rps_pin.task.maps import TaskState
 from rps_pin.task.sizing.motion_run import sample_times
 from rps_pin.trajectories.path import Trajectory
+from rps_pin.viewer.motion import Motion
 
 _RATE, _MOST_SAMPLES = 100.0, 3000
 """A trajectory is followed at so many samples a second, and at most so many."""
@@ -190,6 +191,14 @@ class Panel(ABC):
             return False
         return True
 
+    @property
+    def motion(self) -> Motion:
+        """The trajectory that was loaded, or the present configuration at rest, to be drawn."""
+        model, recording = self.mechanism.model, self.recording
+        if recording is None:
+            return Motion(model, [0.0], self._q[None])
+        return Motion(model, recording.sample_time, recording.configuration, *recording.rates)
+
     # Readings -------------------------------------------------------------------------------------
 
     @property
@@ -269,24 +278,25 @@ class Panel(ABC):
         """Follow a trajectory from home, in its assembly mode, within limits or not."""
         rate = min(_RATE, _MOST_SAMPLES / trajectory.duration)
         times = sample_times(trajectory.duration, rate)
-        x, rates, accelerations = trajectory.sample(times)
+        motion = trajectory.sample(times)
         rows = np.unique(np.linspace(0, len(times) - 1, min(len(times), _ROWS)).astype(int))
-        found = np.empty((len(times), self.mechanism.model.nq))
-        forces = np.full((len(rows), len(self.actuators)), np.nan)
-        q = self._home
-        for k, elapsed in enumerate(times):
+        model = self.mechanism.model
+        q, v, a = (np.empty((len(times), size)) for size in (model.nq, model.nv, model.nv))
+        near = self._home
+        for k, (elapsed, x, *rates) in enumerate(zip(times, *motion, strict=True)):
             try:
-                found[k] = q = self._of_task(x[k], q)
+                near = self._of_task(x, near)
+                q[k], v[k], a[k] = self._moving(near, x, *rates)
             except RPSPinError as error:
                 error.args = (f"at t = {elapsed:.4g} s: {error}", *error.args[1:])
                 raise
+        forces = np.full((len(rows), len(self.actuators)), np.nan)
         for row, k in enumerate(rows):
             with suppress(RPSPinError):  # where they are not determined
-                state = self._moving(found[k], x[k], rates[k], accelerations[k])
-                forces[row] = self._dynamics(state)
-        condition = np.array([self.mechanism.condition(q) for q in found[rows]])
-        position = self._positions(found[rows])
-        return Recording(times[rows], position, forces, 1.0 / condition, times, found)
+                forces[row] = self._dynamics(TaskState(q[k], v[k], a[k]))
+        condition = np.array([self.mechanism.condition(one) for one in q[rows]])
+        position = self._positions(q[rows])
+        return Recording(times[rows], position, forces, 1.0 / condition, times, q, (v, a))
 
     def _require_task(self) -> None:
         if self.task is None:

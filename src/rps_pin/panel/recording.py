@@ -29,6 +29,8 @@ class Recording(NamedTuple):
     """Shape (n,), s."""
     configuration: Array
     """At each of these times, shape (n, nq)."""
+    rates: tuple[Array, Array]
+    """Velocities and accelerations then, shape (n, nv) each."""
 
     @property
     def duration(self) -> float:

@@ -40,9 +40,12 @@ class WorkspaceSurface(RobotSizedLayer):
     factor: float | None = None
 
     def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
-        """Return whether it is no 3-RPS; see `Layer`."""
+        """Return whether it is no 3-RPS, or one without limits; see `Layer`."""
         other = "only a 3-RPS has one; that of another mechanism's task is a figure of workspace()"
-        return other if subject.robot is None else ""
+        if subject.robot is None:
+            return other
+        endless = not np.isfinite(subject.robot.parameters.leg_length_limits[1])
+        return "the stroke has no limits" if endless and self.workspace is None else ""
 
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the surface; see `Layer`."""

@@ -7,6 +7,7 @@ which viser has not. Motions are played by `View.play`.
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -44,7 +45,9 @@ class ViserWriter:
         self._scales: dict[str, Array] = {}
         self._handles: dict[str, Any] = {}
         self._ticks: dict[str, Any] = {}
-        self._hints: dict[str, str] = {}
+        self._entries: list[LegendEntry] = []
+        self._readings: dict[str, str] = {}
+        self._legend: Any = None
 
     def set_stage(self, stage: Stage) -> None:
         """Set camera and lights, and draw grid and axes."""
@@ -165,19 +168,34 @@ class ViserWriter:
         self._node(path).visible = visible
 
     def set_legend(self, entries: Sequence[LegendEntry], visible: Sequence[bool]) -> None:
-        """Show a tick for each layer beside the scene, with the entry's text as its hint."""
+        """Show a tick for each layer beside the scene, and what those that are on mean."""
+        gui = self._server.gui
         for entry, shown in zip(entries, visible, strict=True):
             if entry.name not in self._ticks:
-                tick = self._server.gui.add_checkbox(entry.name, shown, hint=_hint(entry))
+                tick = gui.add_checkbox(entry.name, shown, hint=entry.text)
                 path = f"{WORLD}/layers/{entry.name}"
-                tick.on_update(lambda event, path=path: self.set_visible(path, event.target.value))
-                self._ticks[entry.name], self._hints[entry.name] = tick, _hint(entry)
+                tick.on_update(lambda event, path=path: self._switch(path, event.target.value))
+                self._ticks[entry.name] = tick
             self._ticks[entry.name].value = shown
+        if self._legend is None:
+            self._legend = gui.add_html("")
+        self._entries = list(entries)
+        self._show_legend()
 
     def set_readings(self, time: float | None, readings: Mapping[str, str]) -> None:
-        """Show the layers' texts in the hints of their ticks."""
-        for name, text in readings.items():
-            self._ticks[name].hint = f"{self._hints[name]}: {text}"
+        """Show the layers' texts in the legend."""
+        self._readings = dict(readings)
+        self._show_legend()
+
+    def _switch(self, path: str, visible: bool) -> None:
+        self.set_visible(path, visible)
+        self._show_legend()
+
+    def _show_legend(self) -> None:
+        """Show the entries of the layers that are on."""
+        if self._legend is not None:
+            on = [one for one in self._entries if self._ticks[one.name].value]
+            self._legend.content = "".join(_line(one, self._readings.get(one.name)) for one in on)
 
     def animate(
         self,
@@ -204,9 +222,18 @@ def _place(handle: Any, placement: Array) -> None:
     handle.position = tuple(placement[:3, 3])
 
 
-def _hint(entry: LegendEntry) -> str:
-    bar = entry.bar
-    return entry.text if bar is None else f"{entry.text} ({bar.low} to {bar.high})"
+def _line(entry: LegendEntry, reading: str | None) -> str:
+    """Return an entry of the legend as HTML: its colour or colours, its text and its reading."""
+    bar, text = (
+        entry.bar,
+        html.escape(entry.text if reading is None else f"{entry.text}: {reading}"),
+    )
+    swatch = f"background: {entry.colour}; width: 0.8em"
+    if bar is not None:
+        swatch = f"background: linear-gradient(90deg, {', '.join(bar.colours)}); width: 3em"
+        text += f" ({html.escape(bar.low)} to {html.escape(bar.high)})"
+    box = f'<span style="display: inline-block; height: 0.8em; {swatch}"></span>'
+    return f'<div style="font-size: 80%; margin: 0 0.9em 0.3em">{box} {text}</div>'
 
 
 def _mesh(shape: shapes.Shape) -> Any:
