@@ -21,7 +21,7 @@ SOURCE = Path(rps_pin.__file__).parent
 
 #: Formula, and the one function that defines it, in `rps_pin`.
 FORMULAS = {
-    "Stumpff functions": "rps.kernels.tilt_functions.stumpff",
+    "Stumpff functions": "numerics.stumpff.stumpff",
     "coefficients of rotation and angular velocity, and their derivatives": (
         "rps.kernels.tilt_functions.tilt_functions"
     ),
@@ -65,11 +65,11 @@ FORMULAS = {
 
 #: Traces of a formula in the text of an expression, and the only modules that may hold it.
 TRACES = {
-    "a factorial series": (r"\bfactorial\(", {"rps.kernels.tilt_functions"}),
+    "a factorial series": (r"\bfactorial\(", {"numerics.stumpff"}),
     "sin(x) / x": (  # a speed profile is a sine of its own
         r"\bsin\((\w+)\) / \1\b",
         # joints of any mechanism are a layer below
-        {"rps.kernels.tilt_functions", "task.motion.speed_profile", "codegen.expressions.joints"},
+        {"numerics.stumpff", "task.motion.speed_profile", "codegen.expressions.joints"},
     ),
     "(1 - cos(x)) / x^2": (r"\(1(\.0)? - \S*cos\((\w+)\)\) / \2", set[str]()),
     "Eq. 1 in a leg's plane": (

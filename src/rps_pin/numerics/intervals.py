@@ -216,7 +216,8 @@ class Enclosure:
         With slopes g +- d, f(x) >= f(c) + g (x - c) - d |x - c|: a plane bounds that part.
         """
         half = np.maximum(-offsets.lower, offsets.upper)
-        low, high = self.slopes.lower, self.slopes.upper
+        wide = half.max(axis=1, initial=0.0) > 0.0  # coordinates that are not held
+        half, low, high = (one[wide] for one in (half, self.slopes.lower, self.slopes.upper))
         g, d = (low + high) / 2, np.maximum(high - low, 0.0) * (0.5 + 2.0**-40)
         return _share_beyond(np.abs(g) * half, (d * half).sum(axis=0) - centre.lower)
 

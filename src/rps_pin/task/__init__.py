@@ -5,6 +5,8 @@ positions, velocities, accelerations, forces and gains both ways between these a
 of any mechanism, single and in batches, and `Task.compile` does so in generated code.
 """
 
+from rps_pin.numerics.boxes import CertifiedBoxes
+from rps_pin.task.certified import certify
 from rps_pin.task.loads import Payload
 from rps_pin.task.maps import TaskState
 from rps_pin.task.motion.limits import MotionLimits
@@ -29,6 +31,7 @@ from rps_pin.task.trajectory_file import load_task_trajectory
 
 __all__ = [
     "Ball",
+    "CertifiedBoxes",
     "Cone",
     "DriveLimits",
     "InterferenceEvent",
@@ -46,6 +49,7 @@ __all__ = [
     "TaskMotion",
     "TaskSizing",
     "TaskState",
+    "certify",
     "check_path",
     "force_causes",
     "load_task_trajectory",

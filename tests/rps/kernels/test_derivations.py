@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_slope
+from rps_pin.numerics.stumpff import stumpff
 from rps_pin.rps.kernels import forces, leg_equations, legs, placement, platform, tips
-from rps_pin.rps.kernels.tilt_functions import stumpff, tilt_functions
+from rps_pin.rps.kernels.tilt_functions import tilt_functions
 from tests import strategies
 from tests.reference import newton_euler as ne
 

@@ -5,7 +5,7 @@ complex numbers (derivatives by complex step) or CasADi expressions. There are n
 objects; those stand around the kernels, in `rps_pin.rps.kinematics` and `rps_pin.rps.dynamics`.
 Ticks of control loops are generated from them (see `rps_pin.control.generated`).
 
-- `tilt_functions`: Stumpff functions and the coefficients of the rotation
+- `tilt_functions`: the coefficients of the rotation, of Stumpff functions
 - `platform`: rotation, quaternion, angular velocity and acceleration, rigid-body wrench
 - `tips`: the spherical joints, their slopes, rates and accelerations
 - `legs`: length, direction, rates, the cone of the spherical joint

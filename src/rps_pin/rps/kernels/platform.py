@@ -11,7 +11,8 @@ component. Vectors are triples of numbers; the moment of inertia is (xx, yy, zz,
 from __future__ import annotations
 
 from rps_pin.numerics.elementary import Number
-from rps_pin.rps.kernels.tilt_functions import TiltFunctions, stumpff
+from rps_pin.numerics.stumpff import stumpff
+from rps_pin.rps.kernels.tilt_functions import TiltFunctions
 
 Vector = tuple[Number, Number, Number]
 Inertia = tuple[Number, Number, Number, Number, Number, Number]

@@ -1,38 +1,20 @@
-"""Functions of the squared tilt: Stumpff functions, and the coefficients of the rotation.
+"""The coefficients of a rotation by its squared tilt, from Stumpff functions.
 
-With s the squared tilt, beta = sqrt(s), the Stumpff functions are c_n(s) = sum_k (-s)^k / (2 k +
-n)!, so that c_0 = cos(beta), c_1 = sin(beta) / beta, and
-
-    c_n = 1/n! - s c_(n+2),     dc_n/ds = (n c_(n+2) - c_(n+1)) / 2.
-
-The coefficients of the rotation and of the angular velocity (see `rps_pin.rps.kinematics.pose`) are
-A = c_1, B = c_2, C = c_0 and D = c_3.
+With s the squared tilt, the coefficients of the rotation and of the angular velocity (see
+`rps_pin.rps.kinematics.pose`) are A = c_1, B = c_2, C = c_0 and D = c_3 (see
+`rps_pin.numerics.stumpff`).
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from rps_pin.numerics.elementary import Number, cos, is_real_array, less, select, sin, sqrt
+from rps_pin.numerics.elementary import Number
 from rps_pin.numerics.intervals import Enclosure, Interval, is_enclosing
+from rps_pin.numerics.stumpff import Stumpff, bounds_at_ends, stumpff
 
 #: A, B, C, D, dA/ds, dB/ds, dD/ds, d2A/ds2, d2B/ds2.
 TiltFunctions = tuple[Number, Number, Number, Number, Number, Number, Number, Number, Number]
-_Stumpff = tuple[Number, Number, Number, Number, Number, Number, Number]
-
-#: Below this s the series are summed, exact to rounding; above, the recursion from c_0 and c_1 is.
-_SERIES_BELOW = 4.0
-#: Least upper bound, rounded up, of the error of the summed series: 40 roundings, each of at most
-#: 2^-53 of sum_k s^k / (2 k)! = cosh(2), and what is left out, below 1e-19 (Horner's rule; Higham,
-#: Accuracy and Stability of Numerical Algorithms, section 5.1).
-_ROUNDING = 2e-14
-#: Terms of c_5 and c_6, from the last to the second.
-_TERMS = tuple(
-    ((-1.0) ** k / math.factorial(2 * k + 5), (-1.0) ** k / math.factorial(2 * k + 6))
-    for k in range(9, 0, -1)
-)
 
 
 def tilt_functions(s: Number) -> TiltFunctions:
@@ -42,7 +24,7 @@ def tilt_functions(s: Number) -> TiltFunctions:
     return _of_stumpff(stumpff(s))
 
 
-def _of_stumpff(c: _Stumpff) -> TiltFunctions:
+def _of_stumpff(c: Stumpff) -> TiltFunctions:
     c0, c1, c2, c3, c4, c5, c6 = c
     b_s, d_s = c4 - 0.5 * c3, 1.5 * c5 - 0.5 * c4
     return (
@@ -52,69 +34,13 @@ def _of_stumpff(c: _Stumpff) -> TiltFunctions:
 
 
 def _enclosed(s: Interval | Enclosure) -> TiltFunctions:
-    """Return enclosures over boxes; without bounds where s passes `_SERIES_BELOW`.
-
-    Each function is monotone for s < pi^2: c_n^(k)(s) is an integral of c_0^(k)(t^2 s) with
-    positive weights, and the derivatives of c_0 keep their signs there. So the ends of s bound it.
-    """
+    """Return enclosures over boxes: each function is monotone, so that the ends of s bound it."""
     values = s.values if isinstance(s, Enclosure) else s
-    near = values.upper < _SERIES_BELOW
-    ends = []
-    for end in (values.lower, values.upper):
-        of_floats = _from_series(np.clip(end, 0.0, _SERIES_BELOW))
-        ends.append(_of_stumpff(tuple(Interval(c).widened(_ROUNDING) for c in of_floats)))  # type: ignore[arg-type]
-    found = []
-    for one, other in zip(*ends, strict=True):
-        whole = one.hull(other)
-        found.append(
-            Interval(np.where(near, whole.lower, -np.inf), np.where(near, whole.upper, np.inf))
-        )
+    ends = [_of_stumpff(end) for end in bounds_at_ends(values)]
+    found = [one.hull(other) for one, other in zip(*ends, strict=True)]
     if not isinstance(s, Enclosure):
-        return tuple(found)  # type: ignore[return-value]
+        return tuple(found)
     a, _, _, _, a_s, b_s, d_s, a_ss, b_ss = found
-    none = Interval(np.full(near.shape, -np.inf), np.full(near.shape, np.inf))
-    slopes = (a_s, b_s, -0.5 * a, d_s, a_ss, b_ss, none, none, none)
+    unknown = Interval(np.full(a.lower.shape, -np.inf), np.full(a.lower.shape, np.inf))
+    slopes = (a_s, b_s, -0.5 * a, d_s, a_ss, b_ss, unknown, unknown, unknown)
     return tuple(s.through(one, slope) for one, slope in zip(found, slopes, strict=True))  # type: ignore[return-value]
-
-
-def _from_series(s: Number) -> _Stumpff:
-    """Return c_0 to c_6 from the series of c_5 and c_6: of small s."""
-    c5, c6 = 0.0 * s, 0.0 * s
-    for term_5, term_6 in _TERMS:
-        c5 += term_5  # in place, of arrays
-        c5 *= s
-        c6 += term_6
-        c6 *= s
-    c5 += 1.0 / 120.0
-    c6 += 1.0 / 720.0
-    c3, c4 = 1.0 / 6.0 - s * c5, 1.0 / 24.0 - s * c6
-    c1, c2 = 1.0 - s * c3, 0.5 - s * c4
-    return 1.0 - s * c2, c1, c2, c3, c4, c5, c6
-
-
-def _by_recursion(s: Number) -> _Stumpff:
-    """Return c_0 to c_6, upwards: of s that are not small."""
-    beta = sqrt(s)
-    c0, c1 = cos(beta), sin(beta) / beta
-    c2, c3 = (1.0 - c0) / s, (1.0 - c1) / s
-    c4, c5 = (0.5 - c2) / s, (1.0 / 6.0 - c3) / s
-    return c0, c1, c2, c3, c4, c5, (1.0 / 24.0 - c4) / s
-
-
-def stumpff(s: Number) -> _Stumpff:
-    """Return the Stumpff functions c_0 to c_6 of s >= 0."""
-    if type(s) is float:
-        return _from_series(s) if s < _SERIES_BELOW else _by_recursion(s)
-    if is_real_array(s):
-        if s.max(initial=0.0) < _SERIES_BELOW:
-            return _from_series(s)
-        values, far = _from_series(np.minimum(s, _SERIES_BELOW)), s >= _SERIES_BELOW
-        for value, beyond in zip(values, _by_recursion(s[far]), strict=True):
-            value[far] = beyond
-        return values
-    small = less(s, _SERIES_BELOW)
-    near = _from_series(select(small, s, 1.0))
-    far = _by_recursion(select(small, _SERIES_BELOW, s))
-    first, *rest = (select(small, a, b) for a, b in zip(near, far, strict=True))
-    c1, c2, c3, c4, c5, c6 = rest
-    return first, c1, c2, c3, c4, c5, c6

@@ -6,7 +6,8 @@ same for grids too large for memory. `certify` proves of boxes of poses that the
 """
 
 from rps_pin.moved import moved_names
-from rps_pin.rps.workspace.certified import CertifiedBoxes, certify
+from rps_pin.numerics.boxes import CertifiedBoxes
+from rps_pin.rps.workspace.certified import certify
 from rps_pin.rps.workspace.compute import workspace
 from rps_pin.rps.workspace.evaluate import Fields
 from rps_pin.rps.workspace.geometry import (

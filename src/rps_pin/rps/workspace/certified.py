@@ -1,4 +1,4 @@
-"""Boxes of poses that are proven to be inside the workspace, or outside.
+"""Boxes of poses that are proven to be inside the workspace of a 3-RPS, or outside.
 
 A box (z, tilt_x, tilt_y) is inside if in all of its poses
 
@@ -7,26 +7,23 @@ A box (z, tilt_x, tilt_y) is inside if in all of its poses
   side; and no leg has length zero (type I).
 
 Each of these is a margin, a function of the kernels, which are evaluated on intervals with outward
-rounding and with slopes (`rps_pin.numerics.intervals`). Its bounds prove it, or its contrary; boxes
-of which neither is proven are cut into eight. A margin that is proven of a box is not asked again
-of its parts.
-
-The numbers of the robot are taken as they are stored; the directions of the legs are exact.
+rounding and with slopes (`rps_pin.numerics.intervals`). The numbers of the robot are taken as they
+are stored; the directions of the legs are exact.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array, Bools
+from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError
-from rps_pin.numerics.intervals import Enclosure, Interval
+from rps_pin.numerics.boxes import Bounds, CertifiedBoxes, Group, Progress, bounded, prove
+from rps_pin.numerics.intervals import Interval
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kernels import legs as kernels
 from rps_pin.rps.kernels import tips as ring
@@ -41,85 +38,14 @@ from rps_pin.validation import non_negative_number, real_vector, whole_number
 if TYPE_CHECKING:
     from rps_pin.rps.robot import RPSRobot
 
-Verdict = Literal["inside", "outside", "partly", "undecided"]
-#: Places of a box among those of its size: its level, and three counts from the least corner.
-Places = NDArray[np.int32]
 Number = Any
 
-#: Boxes worked on at a time: few enough for a processor's cache.
-_BLOCK = 4096
 #: Poses within this of a limit are neither proven inside nor outside; see `LIMIT_TOLERANCE`.
 _SLACK = 2 * LIMIT_TOLERANCE
-#: Largest tilt of a box, rad: the series of the tilt's functions end there.
+#: Largest tilt of a box along an axis, rad: the series of the tilt's functions end at 2 rad.
 LARGEST_TILT = 1.4
-_MOST_LEVELS = 30
 #: cos and sin of the sixth of a turn and their like are rounded: a number that holds the exact one.
 _ROUNDED = Interval(1.0 - 2.0**-50, 1.0 + 2.0**-50)
-#: The parts of a box, by halves of its edges.
-_HALVES = np.array(list(np.ndindex(2, 2, 2)), dtype=np.int32)
-
-
-@refuses_other_kinds
-@dataclass(frozen=True, eq=False)
-class CertifiedBoxes:
-    """A box of poses (z, tilt_x, tilt_y), cut into boxes that are proven inside or outside."""
-
-    parameters: RPSParameters
-    """The robot."""
-    lower: Array
-    """Least pose of the box, shape (3,), m and rad."""
-    upper: Array
-    """Greatest pose, shape (3,)."""
-    places: tuple[Places, Places, Places]
-    """Of the boxes inside, outside and undecided, shape (n, 4) each."""
-
-    parts: Array
-    """Shares of each undecided box that are proven inside and outside, by planes, shape (n, 2)."""
-
-    @property
-    def inside(self) -> Array:
-        """Boxes proven inside, shape (n, 2, 3): their least and greatest poses."""
-        return self._boxes(0)
-
-    @property
-    def outside(self) -> Array:
-        """Boxes proven outside, shape (n, 2, 3)."""
-        return self._boxes(1)
-
-    @property
-    def undecided(self) -> Array:
-        """Boxes of which neither is proven, shape (n, 2, 3)."""
-        return self._boxes(2)
-
-    @property
-    def volumes(self) -> tuple[float, float, float]:
-        """Volumes inside, outside and undecided, m rad^2; `parts` count as what they are."""
-        whole = float(np.prod(self.upper - self.lower))
-        inside, outside, cut = (whole * np.ldexp(1.0, -3 * one[:, 0]) for one in self.places)
-        sums = [float(one.sum()) for one in (inside, outside, *(cut * self.parts.T))]
-        return sums[0] + sums[2], sums[1] + sums[3], float(cut.sum()) - sums[2] - sums[3]
-
-    @property
-    def share_undecided(self) -> float:
-        """The undecided volume over that inside; infinite if nothing is inside."""
-        inside, _, undecided = self.volumes
-        return undecided / inside if inside else math.inf
-
-    @property
-    def verdict(self) -> Verdict:
-        """What is proven of the whole box.
-
-        ``"partly"``: parts are inside and parts are outside.
-        """
-        inside, outside, _ = (volume > 0.0 for volume in self.volumes)
-        if inside and outside:
-            return "partly"
-        if len(self.places[2]):
-            return "undecided"
-        return "inside" if inside else "outside"
-
-    def _boxes(self, which: int) -> Array:
-        return np.moveaxis(np.array(_ends(self.places[which], self.lower, self.upper)), 0, 1)
 
 
 @refuses_other_kinds
@@ -131,7 +57,7 @@ def certify(
     start: ArrayLike | None = None,
     undecided: float = 0.01,
     most_boxes: int = 2_000_000,
-    progress: Callable[[Iterable[int]], Iterable[int]] = iter,
+    progress: Progress = iter,
 ) -> CertifiedBoxes:
     """Prove of which poses of a box the robot reaches them, by interval arithmetic and bisection.
 
@@ -164,89 +90,35 @@ def certify(
     share = non_negative_number(undecided, "undecided")
     whole_number(most_boxes, "most_boxes", least=1)
     margins = Margins(parameters, _checked_start(parameters, ends, start))
-    decided: tuple[list[Places], list[Places]] = ([], [])
-    places, asked = np.zeros((1, 4), dtype=np.int32), margins.all[None]
-    while True:
-        left: list[tuple[Places, Bools, Array]] = []
-        for i in progress(range(0, len(places), _BLOCK)):
-            block, open_ = places[i : i + _BLOCK], asked[i : i + _BLOCK]
-            box = Interval(*(end.T for end in _ends(block, *ends)))
-            with np.errstate(invalid="ignore", over="ignore"):  # no bounds: NaN proves nothing
-                out, *shares = margins.prove(box, open_)
-            proven = ~open_.any(axis=1) & ~out
-            decided[0].append(block[proven])
-            decided[1].append(block[out])
-            rest = ~(proven | out)
-            left.append((block[rest], open_[rest], np.stack(shares, axis=-1)[rest]))
-        places, asked, parts = (np.concatenate(one) for one in zip(*left, strict=True))
-        inside, outside = (np.concatenate(one) for one in decided)
-        found = CertifiedBoxes(parameters, *ends, (inside, outside, places), parts)
-        deep = len(places) and places[0, 0] >= _MOST_LEVELS
-        if not len(places) or deep or found.share_undecided <= share or len(places) > most_boxes:
-            return found
-        cut = np.repeat(places, 8, axis=0)
-        cut[:, 0] += 1
-        cut[:, 1:] = 2 * cut[:, 1:] + np.tile(_HALVES, (len(places), 1))
-        places, asked = cut, np.repeat(asked, 8, axis=0)
+    return prove(margins.groups, *ends, undecided=share, most_boxes=most_boxes, progress=progress)
 
 
 class Margins:
-    """The margins of a robot: what must be positive for a pose to be inside.
-
-    Attributes
-    ----------
-    all
-        True for each margin, shape (margins,).
-    """
+    """The margins of a robot: what must be positive for a pose to be inside."""
 
     def __init__(self, parameters: RPSParameters, start: Array) -> None:
         self._p = parameters
         self._side = math.copysign(1.0, side_of_singularity(parameters, start))
+        endless = math.isinf(parameters.leg_length_limits[1])
         lower, upper = parameters.leg_angle_limits
-        self._groups: dict[str, Callable[[_Legs], list[Number]]] = {"length": self._lengths}
-        if upper - lower < 2 * math.pi:
-            self._groups["angle"] = self._angles
-        if parameters.spherical_cone_limit < math.pi:
-            self._groups["cone"] = self._cones
-        self._groups["determinant"] = self._determinant
-        sizes = {"length": 3 + 3 * math.isfinite(parameters.leg_length_limits[1]), "determinant": 1}
-        self._columns, count = {}, 0
-        for name in self._groups:
-            self._columns[name] = slice(count, count := count + sizes.get(name, 3))
-        self.all = np.ones(count, dtype=bool)
+        asked = {
+            self._lengths: 3 if endless else 6,
+            self._angles: 3 if upper - lower < 2 * math.pi else 0,
+            self._cones: 3 if parameters.spherical_cone_limit < math.pi else 0,
+            self._determinant: 1,
+        }
+        #: For `rps_pin.numerics.boxes.prove`.
+        self.groups: dict[str, tuple[int, Group]] = {
+            margins.__name__: (count, self._group(margins))
+            for margins, count in asked.items()
+            if count
+        }
 
-    def prove(self, box: Interval, asked: Bools) -> tuple[Bools, Array, Array]:
-        """Return which boxes are outside, and shares of each that are proven inside and outside.
+    def _group(self, margins: Callable[[_Legs], list[Number]]) -> Group:
+        def bounds(box: Interval) -> list[Bounds]:
+            return bounded(lambda *pose: margins(_Legs(self._p, pose)), box, _SLACK)
 
-        What is proven of a box is cleared in `asked`.
-
-        Parameters
-        ----------
-        box
-            Poses, shape (3, n).
-        asked
-            Which margins are not proven yet, shape (n, margins).
-        """
-        out = np.zeros(len(asked), dtype=bool)
-        inside, outside = np.ones(len(asked)), np.zeros(len(asked))
-        for name, columns in self._columns.items():
-            which = np.flatnonzero(asked[:, columns].any(axis=1) & ~out)
-            if not which.size:
-                continue
-            part = box[:, which]
-            middle = Interval((part.lower + part.upper) / 2)
-            offsets = part - middle
-            over = self._groups[name](_Legs(self._p, Enclosure.coordinates(part)))
-            at = self._groups[name](_Legs(self._p, (middle[0], middle[1], middle[2])))
-            for k, (margin, centre) in enumerate(zip(over, at, strict=True)):
-                bounds = margin.about(centre, offsets)
-                proven = bounds.lower > 0.0
-                asked[which, columns.start + k] &= ~proven
-                out[which] |= bounds.upper < -_SLACK
-                inside[which] -= np.where(proven, 0.0, 1.0 - margin.share_above(centre, offsets))
-                beyond = (-margin).share_above(-(centre + _SLACK), offsets)
-                outside[which] = np.maximum(outside[which], beyond)
-        return out, np.maximum(inside, 0.0), outside
+        return bounds
 
     def _lengths(self, legs: _Legs) -> list[Number]:
         shortest, longest = self._p.leg_length_limits
@@ -328,17 +200,6 @@ def _cosine(angle: float) -> Interval:
 
 def _sine(angle: float) -> Interval:
     return Interval(math.sin(angle)).widened(2.0**-50)
-
-
-def _ends(places: Places, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return the least and greatest poses of boxes, shape (n, 3) each; equal where they touch."""
-    parts = np.ldexp(1.0, -places[:, :1])
-    at = places[:, 1:].astype(np.float64)
-
-    def pose(share: Array) -> Array:
-        return np.where(share < 1.0, lower + (upper - lower) * share, upper)
-
-    return pose(at * parts), pose((at + 1.0) * parts)
 
 
 def _checked_start(
