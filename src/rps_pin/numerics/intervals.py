@@ -6,7 +6,7 @@ operations err at most. An `Enclosure` is a function over a box: an interval of 
 of each slope, so that f(x) lies in f(c) + slopes (x - c) too, the mean value form, which is sharp
 to the square of the box's size.
 
-Both are numbers of kernels (`rps_pin.numerics.elementary`): they have + - * / and sqrt. Arrays
+Both are numbers of kernels (``rps_pin.numerics.elementary``): they have + - * / and sqrt. Arrays
 hold many boxes. A bound that is not known is infinite or NaN, of which no comparison holds, so that
 nothing is proven by it. Libraries of intervals for Python compute one number a call; a workspace
 takes millions.
