@@ -114,9 +114,9 @@ class _Margins:
 
         def margins(*pose: Number) -> list[Number]:
             found = [_norm(along) for along, _ in _legs(self._legs, pose)]
-            above = [(d - least) * self._unit - _ROUNDED for d, least in zip(found, self._least, strict=True)]
-            below = [(most - d) * self._unit - _ROUNDED for d, most in zip(found, self._most, strict=True)]
-            return above + below
+            above = [d - least for d, least in zip(found, self._least, strict=True)]
+            below = [most - d for d, most in zip(found, self._most, strict=True)]
+            return [room * self._unit - _ROUNDED for room in above + below]
 
         return bounded(margins, box, _SLACK)
 
