@@ -23,8 +23,8 @@ from rps_pin.viewer.files.pictures import picture_style, take_pictures
 
 NOTEBOOKS = Path(__file__).resolve().parent.parent / "notebooks"
 FRAME = re.compile(r'<iframe .*? data-duration="(.*?)" .*? srcdoc="(.*)"></iframe>', re.DOTALL)
-STYLE = picture_style((560, 350), 1.0, "white", captions=True)
-MOMENTS, COLOURS = 20, 128
+STYLE = picture_style((760, 475), 0.75, "white", captions=True)
+MOMENTS, COLOURS = 16, 96
 
 
 def execute(path: Path) -> None:

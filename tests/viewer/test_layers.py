@@ -184,6 +184,16 @@ def test_arrows_of_a_motion_run_are_its_own_forces_with_its_wrench(robot, path, 
             assert reaction == pytest.approx(expected / 8.0, rel=1e-6)
 
 
+def test_forces_of_rest_are_said_to_be_and_known_ones_are_not(robot):
+    q = robot.configuration([0.4, 0.05, 0.0])[None]
+    for known, forces in ((False, None), (True, [[1.0, 2.0, 3.0]])):
+        motion = Motion(robot.mechanism.model, [0.0], q, forces=forces)
+        _, recorder = shown(robot, motion, layers=["forces", "reactions"])
+        own, of_closures = (entry["text"] for entry in legend(recorder))
+        assert (", at rest:" in own) is not known
+        assert ", at rest:" in of_closures
+
+
 def test_reactions_of_a_simulation_are_its_own_with_its_wrench():
     four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
     push = {"coupler": [3.0, 0.0, -5.0, 0.0, 0.0, 0.0]}

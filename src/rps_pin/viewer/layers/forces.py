@@ -198,7 +198,9 @@ def _arrows(
         lengths = ", ".join(
             _scale_text(unit, one, context.radius) for unit, one in per_metre.items()
         )
-        at_rest = ", at rest" if motion.at_rest else ""
+        first = motion.state_at(0.0)
+        known = first.tau if title.name == "forces" else first.constraint_forces
+        at_rest = ", at rest" if motion.at_rest and known is None else ""
         most = ", ".join(f"at most {greatest[unit]:.3g} {unit}" for unit in per_metre)
         text = f"{title.text}{at_rest}: {lengths}; {most}"
         legend = LegendEntry(title.name, text, title.colour)
