@@ -185,7 +185,7 @@ def test_arrows_of_a_motion_run_are_its_own_forces_with_its_wrench(robot, path, 
 
 
 def test_forces_of_rest_are_said_to_be_and_known_ones_are_not(robot):
-    q = robot.configuration([0.4, 0.05, 0.0])[None]
+    q = robot.state(POSE, np.zeros(3), np.zeros(3))[0][None]
     for known, forces in ((False, None), (True, [[1.0, 2.0, 3.0]])):
         motion = Motion(robot.mechanism.model, [0.0], q, forces=forces)
         _, recorder = shown(robot, motion, layers=["forces", "reactions"])
