@@ -445,7 +445,9 @@ def bars(recorder: Recorder) -> dict[str, np.ndarray]:
 def test_rods_of_distance_closures_are_drawn(name, with_shapes):
     """From frame to frame, as long as they are, in every pose and in the animation."""
     mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
-    shapes = visual_model(URDF / f"{name}.yaml", mechanism.model) if with_shapes else None
+    shapes = visual_model(URDF / f"{name}.yaml", mechanism.model)
+    if not with_shapes:
+        shapes = mechanism.file = None
     path = point_to_point(mechanism.task.home, mechanism.task.home + 0.02, duration=1.0)
     view, recorder = shown(mechanism, path, visual=shapes)
     for share in (0.0, 0.6, 1.0):
@@ -468,6 +470,10 @@ def test_a_skeleton_has_legs_as_long_as_their_joints_say():
     """Those of a Stewart platform, by the closed form; with its own shapes they are not drawn."""
     mechanism = ClosedLoopModel.load(URDF / "stewart.yaml")
     pose = mechanism.task.home + np.array([0.03, -0.02, 0.05, 0.1, 0.2, -0.1])
+    shapes = visual_model(URDF / "stewart.yaml", mechanism.model)
+    assert not bars(shown(mechanism, visual=shapes)[1])
+    assert not bars(shown(mechanism)[1])  # those of its file
+    mechanism.file = None
     view, recorder = shown(mechanism)
     view.display(mechanism.task.configuration(pose))
     turn, found = pin.exp3(pose[3:]), bars(recorder)
@@ -476,8 +482,6 @@ def test_a_skeleton_has_legs_as_long_as_their_joints_say():
         begin, end = found[f"leg_{i}_rod_joint"]
         np.testing.assert_allclose(begin, anchor, atol=1e-9)
         np.testing.assert_allclose(end, pose[:3] + turn @ ball, atol=1e-9)
-    shapes = visual_model(URDF / "stewart.yaml", mechanism.model)
-    assert not bars(shown(mechanism, visual=shapes)[1])
 
 
 def test_layers_are_switched_by_name(robot):

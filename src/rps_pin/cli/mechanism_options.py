@@ -154,6 +154,8 @@ def shapes_of(
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         shapes = visual_model(file, mechanism.model, package_path or ())
+    if shapes is None:
+        mechanism.file = None  # the viewer need not look again
     return shapes, [str(one.message) for one in told]
 
 

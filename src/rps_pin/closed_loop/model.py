@@ -53,6 +53,7 @@ from rps_pin.closed_loop.io.urdf import parts_from_urdf
 from rps_pin.closed_loop.io.write.files import write_mjcf, write_urdf
 from rps_pin.closed_loop.io.write.mjcf_inertia import Mending
 from rps_pin.closed_loop.io.write.source import Source
+from rps_pin.closed_loop.io.xml_file import absolute
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.simulate import simulate
 from rps_pin.closed_loop.summary import in_lines, in_one_line
@@ -116,10 +117,13 @@ class ClosedLoopModel:
     collision
         Collision shapes of the links, for `interference`: `CollisionShapes`, as another mechanism
         has them, or a `pin.GeometryModel` of this model. Readers of files give those of the file.
+    file
+        The description or URDF (or its text) that the mechanism was read from: the viewer draws its
+        shapes. Readers of files give it.
 
     Attributes
     ----------
-    model, closures, actuated, effects, name, max_condition, accuracy, notes
+    model, closures, actuated, effects, name, max_condition, accuracy, notes, file
         As given; `closures` and `actuated` as tuples.
     collision_shapes : CollisionShapes
         Collision shapes as they are stated, unbuilt; see `collision_model`.
@@ -151,6 +155,7 @@ class ClosedLoopModel:
         task: Mapping[str, Any] | None = None,
         notes: Sequence[str] = (),
         collision: CollisionShapes | pin.GeometryModel | None = None,
+        file: str | os.PathLike[str] | None = None,
     ) -> None:
         self.system = system = ConstraintSystem(
             model,
@@ -171,6 +176,7 @@ class ClosedLoopModel:
         self.effects = effects
         self.name: str = name or model.name
         self.notes = tuple(notes)
+        self.file = None if file is None else absolute(file)
         self._task = None if task is None else dict(task)
         self.collision_shapes = shapes_of(model, collision)
         self._home: Array | None = None
@@ -236,6 +242,7 @@ class ClosedLoopModel:
         own = tuple(closure for closure in parts.closures if closure not in given)
         options.setdefault("notes", parts.notes)
         options.setdefault("collision", parts.collision)
+        options.setdefault("file", path_or_xml)
         return cls(model, own + given, actuated, effects=with_effects(parts, effects), **options)
 
     @classmethod
@@ -268,7 +275,8 @@ class ClosedLoopModel:
             If the loops do not close from there; says by how much, and which.
         """
         parts = parts_from_yaml(path, within_limits)
-        return cls._from_parts(parts if accuracy is None else replace(parts, accuracy=accuracy))
+        parts = parts if accuracy is None else replace(parts, accuracy=accuracy)
+        return cls._from_parts(parts, path)
 
     @classmethod
     def from_gepetto(
@@ -296,7 +304,7 @@ class ClosedLoopModel:
         InputError, MechanismError, ClosureError
             As `load`.
         """
-        return cls._from_parts(parts_from_gepetto(path, root, within_limits))
+        return cls._from_parts(parts_from_gepetto(path, root, within_limits), path)
 
     @classmethod
     def from_mjcf(
@@ -344,7 +352,9 @@ class ClosedLoopModel:
         return cls._from_parts(replace(parts, accuracy=accuracy))
 
     @classmethod
-    def _from_parts(cls, parts: MechanismParts) -> ClosedLoopModel:
+    def _from_parts(
+        cls, parts: MechanismParts, file: str | os.PathLike[str] | None = None
+    ) -> ClosedLoopModel:
         mechanism = cls(
             parts.model,
             parts.closures,
@@ -357,6 +367,7 @@ class ClosedLoopModel:
             task=parts.task,
             notes=parts.notes,
             collision=parts.collision,
+            file=file,
         )
         if parts.home is None:
             mechanism._home = mechanism.home  # closed, or not to be built
@@ -392,6 +403,7 @@ class ClosedLoopModel:
             "task": self._task,
             "notes": self.notes,
             "collision": self.collision_shapes,
+            "file": self.file,
         }
 
     # Interference ---------------------------------------------------------------------------------

@@ -13,10 +13,11 @@ from pinocchio import coal
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.closures import LoopClosure
 from rps_pin.closed_loop.interference.meshes import mesh_file
-from rps_pin.closed_loop.io.gepetto import gepetto_urdf, is_gepetto
+from rps_pin.closed_loop.io.gepetto import FILE, gepetto_urdf, is_gepetto
 from rps_pin.closed_loop.io.mechanism_schema import Description
 from rps_pin.closed_loop.io.urdf.normal_form import Shapes, normal_form
 from rps_pin.closed_loop.io.urdf.tree import urdf_file
+from rps_pin.closed_loop.io.xml_file import is_text
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.config import read_yaml
 from rps_pin.errors import few, warn_caller
@@ -35,7 +36,7 @@ def visual_model(
     Parameters
     ----------
     path
-        The description, a YAML file; or a URDF.
+        The description, a YAML file; or a URDF, or its text.
     model
         What `ClosedLoopModel.load` made of it.
     package_path
@@ -52,27 +53,50 @@ def visual_model(
     InputError
         If the description or its URDF cannot be read.
     """
-    urdf = Path(path)
-    if urdf.suffix.lower() != ".urdf":
-        file = read_yaml(path, "mechanism file")
-        if is_gepetto(file):
-            urdf = gepetto_urdf(urdf)
-        else:
-            description = file.validated(Description, "a mechanism")
-            if description.urdf is None:
-                return None
-            urdf = urdf.parent / Path(description.urdf).expanduser()
+    urdf: str | Path | None = _urdf_of(path)
+    if urdf is None:
+        return None
     shapes, missing = urdf_shapes(urdf, model, package_path)
     if missing:
-        warn_caller(f"{urdf}: not drawn: {few(missing)}")
+        where = "the URDF text" if is_text(urdf) else urdf
+        warn_caller(f"{where}: not drawn: {few(missing)}")
     return shapes if shapes.ngeoms else None
 
 
+def own_shapes(mechanism: ClosedLoopModel) -> pin.GeometryModel | None:
+    """Return the shapes in the file that a mechanism was read from; None where it has none."""
+    if mechanism.file is None or not (is_text(mechanism.file) or Path(mechanism.file).exists()):
+        return None
+    return visual_model(mechanism.file, mechanism.model)
+
+
+def _urdf_of(path: str | os.PathLike[str]) -> str | Path | None:
+    """Return the URDF, or its text, of a description; None if it names a MuJoCo file."""
+    if is_text(path):
+        return os.fspath(path)
+    found = Path(path)
+    if found.is_dir():
+        found /= FILE
+    if found.suffix.lower() == ".urdf":
+        return found
+    file = read_yaml(found, "mechanism file")
+    if is_gepetto(file):
+        return gepetto_urdf(found)
+    description = file.validated(Description, "a mechanism")
+    if description.urdf is None:
+        return None
+    return found.parent / Path(description.urdf).expanduser()
+
+
 def urdf_shapes(
-    urdf: Path, model: pin.Model, package_path: PackagePath = ()
+    urdf: str | Path, model: pin.Model, package_path: PackagePath = ()
 ) -> tuple[pin.GeometryModel, list[str]]:
-    """Return the shapes of a URDF that can be drawn, and why the others cannot."""
+    """Return the shapes of a URDF, or its text, that can be drawn, and why the others cannot.
+
+    Files that a text names are looked for from the working directory.
+    """
     loader = coal.CachedMeshLoader()
+    beside = Path("text.urdf") if is_text(urdf) else Path(urdf)
 
     def mesh(attributes: dict[str, str]) -> str:
         name = attributes.get("filename", "")
@@ -80,7 +104,7 @@ def urdf_shapes(
             scale = np.array(attributes.get("scale", "1 1 1").split(), dtype=np.float64)
         except ValueError:
             scale = np.full(3, np.nan)
-        return mesh_file(name, urdf, package_path, scale, loader)[0]
+        return mesh_file(name, beside, package_path, scale, loader)[0]
 
     missing: list[str] = []
     links = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}

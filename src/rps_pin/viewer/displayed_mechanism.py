@@ -11,7 +11,7 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.simulation.result import Simulation
-from rps_pin.closed_loop.visuals import skeleton
+from rps_pin.closed_loop.visuals import own_shapes, skeleton
 from rps_pin.errors import InputError
 from rps_pin.rps.dynamics.motion_run import MotionRun
 from rps_pin.rps.robot import RPSRobot
@@ -57,7 +57,8 @@ def displayed(
     what
         A 3-RPS, or any mechanism.
     visual
-        Its geometry. Default: a robot's own; for a mechanism, bars between its joints.
+        Its geometry. Default: a robot's own; for a mechanism, the shapes in its file, or bars
+        between its joints where there are none. Meshes that are not found are told in a warning.
 
     Raises
     ------
@@ -68,8 +69,9 @@ def displayed(
         shapes = what.visual_model() if visual is None else visual
         return DisplayedMechanism(what.mechanism, shapes, what)
     if isinstance(what, ClosedLoopModel):
-        shapes = skeleton(what) if visual is None else visual
-        return DisplayedMechanism(what, shapes, None, visual is None)
+        shapes = own_shapes(what) if visual is None else visual
+        bars = shapes is None
+        return DisplayedMechanism(what, skeleton(what) if bars else shapes, None, bars)
     raise InputError(f"{type(what).__name__} cannot be shown: an RPSRobot or ClosedLoopModel can")
 
 

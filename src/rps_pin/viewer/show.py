@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.viewer.displayed_mechanism import displayed
+from rps_pin.viewer.displayed_mechanism import without_shapes
 from rps_pin.viewer.layers.base import Layer
 from rps_pin.viewer.server.local_viewer import LocalViewer
 from rps_pin.viewer.view import View
@@ -49,7 +49,7 @@ def show(
     ...     print(view.url)
     ...     view.play()
     """
-    with LocalViewer(port, title=title or displayed(what, visual).title) as viewer:
+    with LocalViewer(port, title=title or without_shapes(what).title) as viewer:
         yield LocalView(viewer, what, motion, visual=visual, layers=layers, hidden=hidden)
 
 

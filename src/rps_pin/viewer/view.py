@@ -60,7 +60,8 @@ class View:
         `MotionRun`, a `Simulation` or a `Motion`. Picture and scales of the layers are set for it.
         Default: a mechanism's home.
     visual
-        Geometry of the mechanism. Default: a 3-RPS's own; for others, bars between the joints.
+        Geometry of the mechanism. Default: a 3-RPS's own; for others the shapes in the file that it
+        was read from, or bars between the joints where there are none.
     layers, hidden
         Names (see `rps_pin.viewer.LAYERS`) or objects such as ``Trail(factor=100)``; those in
         `hidden` are there, but switched off; they are left out if they have nothing to show here.

@@ -9,6 +9,7 @@ from __future__ import annotations
 import codecs
 import os
 import re
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from lxml import etree
@@ -29,6 +30,17 @@ _MARKS = (
 )
 _ENCODING = re.compile(rb"<\?xml[^>]*encoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
 _SPACE = re.compile(r"\s*")
+
+
+def absolute(path_or_xml: str | os.PathLike[str]) -> str:
+    """Return an absolute path, or a text as it is."""
+    given = os.fspath(path_or_xml)
+    return given if is_text(given) else str(Path(given).absolute())
+
+
+def is_text(path_or_xml: str | os.PathLike[str]) -> bool:
+    """Return whether it is a text, which begins with ``<``, and no path."""
+    return os.fspath(path_or_xml).lstrip("\ufeff").lstrip().startswith("<")
 
 
 def xml_text(path_or_xml: str | os.PathLike[str], form: str) -> tuple[str, str]:

@@ -27,7 +27,11 @@ function keepRobotFree(viewer) {
     const camera = viewer.camera;
     const cameras = viewer.scene_tree.find(["Cameras"]).object;
     const [half, low, high] = cameras.userData.outline || [1, -1, 1];
-    camera.zoom = MARGIN * Math.min(free.width / free.height / half, 2 / (high - low));
+    const tall = (MARGIN * 2) / (high - low);
+    // No further to the right than the robot needs.
+    free.left = Math.max(0, Math.min(free.left, 2 * free.left + half * tall * free.height - width));
+    free.width = free.right - free.left;
+    camera.zoom = Math.min((MARGIN * free.width) / free.height / half, tall);
     const middle = (camera.zoom * free.height * (low + high)) / 4; // pixels above the camera's axis
     const top = -free.top - middle;
     camera.setViewOffset(free.width, free.height, -free.left, top, width, height);

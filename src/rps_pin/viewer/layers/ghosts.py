@@ -11,12 +11,13 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
-from rps_pin.viewer.layers.base import DrawnLayer, LayerContext
+from rps_pin.viewer.layers.bars import moving_bars
+from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, Moving
 from rps_pin.viewer.layers.colours import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION, css
-from rps_pin.viewer.motion import Motion, checked_configurations
+from rps_pin.viewer.motion import Motion, MotionState, checked_configurations
 from rps_pin.viewer.scene.legend import LegendEntry
 from rps_pin.viewer.scene.links import link_poses, links_of
-from rps_pin.viewer.scene.shapes import Material, Part
+from rps_pin.viewer.scene.shapes import Cylinder, Material, Part, translated
 
 _OPACITY = 0.28
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
@@ -24,7 +25,7 @@ _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 
 @dataclass(frozen=True)
 class Ghosts:
-    """Transparent copies of the robot's moving links, each in its own colour.
+    """Transparent copies of the robot's moving links and rods, each in its own colour.
 
     Parameters
     ----------
@@ -57,15 +58,35 @@ class Ghosts:
         subject = context.subject
         links = [link for link in links_of(subject.model, subject.visual) if link.moves]
         copies = self.configurations(subject, context.motion)
+        bars = moving_bars(subject)
         parts: list[Part] = []
         for copy, poses in enumerate(link_poses(subject.model, links, copies)):
             material = Material(_COLOURS[copy % len(_COLOURS)], _OPACITY)
+            node = f"{copy + 1}"
             for link, pose in zip(links, poses, strict=True):
                 for part in link.parts(material):
                     name, placement = f"{link.name}_{part.name}", pose @ part.placement
-                    parts.append(part._replace(node=f"{copy + 1}", name=name, placement=placement))
+                    parts.append(part._replace(node=node, name=name, placement=placement))
+            if bars is not None:
+                parts += _bars(bars, copies[copy], node, material)
         other = "other assembly modes of these leg lengths" if self.at is None else "other poses"
         return DrawnLayer(LegendEntry("ghosts", f"{len(copies)} {other}", css(_COLOURS[0])), parts)
+
+
+def _bars(bars: Moving, q: Array, node: str, material: Material) -> list[Part]:
+    """Return the bars that are no links, as parts of a node, at a configuration."""
+    states = bars.update(MotionState(q, np.zeros(0), np.zeros(0)))
+    parts = []
+    for part in bars.parts:
+        place = np.array(states[part.node].placement)
+        length = float(np.linalg.norm(place[:3, 2]))
+        place[:3, 2] /= length
+        shape = part.shape
+        assert isinstance(shape, Cylinder)
+        name, middle = f"bar_{part.node}", translated([0.0, 0.0, length / 2.0])
+        whole = Cylinder(length, shape.radius, shape.upper_radius)
+        parts.append(Part(node, name, whole, material, place @ middle))
+    return parts
 
 
 def mode_configurations(robot: RPSRobot, q: Array, *, above: bool = False) -> Array:

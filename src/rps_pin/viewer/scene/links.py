@@ -9,7 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array
-from rps_pin.viewer.scene.shapes import Material, Part, drawn_shapes, material_of
+from rps_pin.viewer.scene.mesh_colours import own_colours
+from rps_pin.viewer.scene.shapes import Material, Part, Shape, drawn_shapes, material_of
 
 UNIVERSE = 0
 """Pinocchio's index of the joint that never moves."""
@@ -42,11 +43,21 @@ class Link:
         parts: list[Part] = []
         for item in self.geometries:
             in_link = self.placement.actInv(item.placement).homogeneous
-            for shape, placement in drawn_shapes(item):
+            for shape, placement, own in _surfaces(item, material):
                 name = node_name(item.name, [part.name for part in parts])
-                own = material_of(item) if material is None else material
                 parts.append(Part(self.name, name, shape, own, in_link @ placement))
         return parts
+
+
+def _surfaces(
+    item: pin.GeometryObject, material: Material | None
+) -> list[tuple[Shape, Array, Material]]:
+    """Return the shapes of a geometry with their placements in its frame and their materials."""
+    coloured = own_colours(item) if material is None else []
+    if coloured:
+        return [(shape, np.eye(4), own) for shape, own in coloured]
+    one = material_of(item) if material is None else material
+    return [(shape, placement, one) for shape, placement in drawn_shapes(item)]
 
 
 def links_of(model: pin.Model, visual: pin.GeometryModel) -> list[Link]:

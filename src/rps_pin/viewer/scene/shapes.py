@@ -141,10 +141,15 @@ def drawn_shapes(item: pin.GeometryObject) -> list[tuple[Shape, Array]]:
 
 def material_of(item: pin.GeometryObject) -> Material:
     """Return a material with the geometry's colour and opacity (`meshColor`)."""
-    red, green, blue, opacity = (float(value) for value in np.clip(item.meshColor, 0.0, 1.0))
-    colour = (round(255 * red) << 16) | (round(255 * green) << 8) | round(255 * blue)
+    colour, opacity = colour_of(item.meshColor), float(np.clip(item.meshColor[3], 0.0, 1.0))
     # Faces of a mesh share their vertices: smooth shading would round off its edges.
     return Material(colour, opacity, flat=isinstance(item.geometry, coal.BVHModelBase))
+
+
+def colour_of(shares: Array) -> int:
+    """Return red, green and blue, 0 to 1, as 0xrrggbb."""
+    red, green, blue = (round(255 * float(share)) for share in np.clip(shares[:3], 0.0, 1.0))
+    return (red << 16) | (green << 8) | blue
 
 
 def translated(point: Array | list[float]) -> Array:
