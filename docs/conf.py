@@ -23,6 +23,7 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "docstrings",  # docs/docstrings.py
+    "figures",  # docs/figures.py
     "navigation",  # docs/navigation.py
     "scenes",  # docs/scenes.py
 ]

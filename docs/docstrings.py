@@ -18,6 +18,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("autodoc-process-docstring", default_of_field, priority=300)
     app.connect("autodoc-process-docstring", formulas, priority=400)
     app.connect("autodoc-process-docstring", whole_sentences, priority=600)
+    app.connect("autodoc-process-docstring", several_names, priority=600)
     app.connect("autodoc-process-signature", short_signature)
     app.connect("doctree-read", exact_names)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
@@ -81,7 +82,25 @@ def whole_sentences(
         lines[:] = [f"{which}: {lines[0]}", *lines[1 : kinds[0]]]
 
 
+def several_names(
+    app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
+) -> None:
+    """Keep attributes that share a description in one field.
+
+    Sphinx takes all but the last of the words "a, b, c" for a type; a zero-width space is no blank.
+    """
+    for number, line in enumerate(lines):
+        field = re.match(r":(ivar|vartype) (\w+(?:, \w+)+):", line)
+        if field:
+            lines[number] = line.replace(
+                field[2], field[2].replace(", ", ",\N{ZERO WIDTH SPACE}"), 1
+            )
+
+
 def exact_names(app: Sphinx, doctree: nodes.document) -> None:
-    """Resolve names in fields exactly, not as suffixes of other names."""
+    """Resolve names in fields exactly, not as suffixes of other names; call attributes so."""
     for reference in doctree.findall(addnodes.pending_xref):
         reference.attributes.pop("refspecific", None)
+    for field in doctree.findall(nodes.field_name):
+        if field.astext() == "Variables":
+            field[:] = [nodes.Text("Attributes")]

@@ -28,7 +28,7 @@ def main() -> None:
         layers=["trail", "forces"],
         title="3-RPS, tilt of 0.3 rad about a circle",
         size=(720, 450),
-        frame_rate=15.0,
+        frame_rate=20.0,
     )
     size = FILM.stat().st_size
     assert size <= LARGEST, f"{FILM.name} has {size} bytes, {LARGEST} are allowed"

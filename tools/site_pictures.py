@@ -36,7 +36,9 @@ _FAULTS = """(least) => {
     const size = parseFloat(getComputedStyle(parent).fontSize);
     if (text && seen && size < least) small.add(`${size} px: ${text.slice(0, 40)}`);
   }
-  return [document.documentElement.scrollWidth - window.innerWidth, [...small].slice(0, 5)];
+  const parts = [document.documentElement, document.querySelector(".content")];
+  const wider = Math.max(...parts.map((part) => part.scrollWidth - part.clientWidth));
+  return [wider, [...small].slice(0, 5)];
 }"""
 
 
@@ -60,6 +62,9 @@ def take_site_pictures(site: Path, folder: Path) -> list[str]:
                 tab.goto((site / f"{page}.html").resolve().as_uri())
                 tab.wait_for_timeout(2000)  # the scene draws
                 tab.screenshot(path=folder / f"{name}_{screen}.png")
+                for scene in tab.query_selector_all("iframe")[1:]:  # loaded when they are near
+                    scene.scroll_into_view_if_needed()
+                    tab.wait_for_timeout(1500)
                 tab.screenshot(path=folder / f"{name}_{screen}_whole.png", full_page=True)
                 wider, small = tab.evaluate(_FAULTS, SMALLEST)
                 if wider > 0:
