@@ -10,7 +10,7 @@
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-lowest fuzz docs bench wheel lint format setup setup-dev clean distclean
+.PHONY: help demo test test-lowest fuzz docs look bench wheel lint format setup setup-dev clean distclean
 
 # A sourced ROS or openrobots environment must not put its own pinocchio before ours.
 unexport PYTHONPATH
@@ -42,6 +42,9 @@ fuzz: setup-dev ## hostile files, options and calls for MINUTES=60; findings go 
 
 docs: setup-dev ## build the documentation into build/docs, warnings are errors
 	@sh tools/check docs
+
+look: setup-dev ## walk what a new user does, with pictures of it all: build/look/index.html
+	@RPS_PIN_CHROMIUM="$$(sh tools/find-browser)" .venv/bin/python -u tools/look.py
 
 bench: setup-dev ## measure the speed of the solvers, and of generated code against its peers
 	OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks --benchmark-only $(PYTEST_ARGS)
