@@ -91,10 +91,11 @@ def slider_crank() -> str:
 
     Its guide is a line along x at height 0.03.
     """
-    piston = shape("box", (0.06, 0.05, 0.04), "blue")
+    piston = shape("cylinder", (0.024, 0.056), "blue", (0.0, 0.0, 0.0), ALONG_Y)
+    rails = [shape("box", (0.34, 0.01, 0.03), "dark", (0.35, y, 0.03)) for y in (-0.034, 0.034)]
     return robot(
         "slider_crank",
-        link("base", shape("box", (0.5, 0.03, 0.01), "dark", (0.3, 0.0, -0.16))),
+        link("base", *rails),
         bar("crank", 0.1, 1.2, (0.03, 0.0, 0.01), (0.003, 0.008, 0.007), "red"),
         bar("coupler", 0.35, 0.9, (0.14, 0.0, -0.015), (0.002, 0.012, 0.011), "steel"),
         link("piston", piston, mass=0.6),

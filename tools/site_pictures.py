@@ -24,6 +24,7 @@ PAGES = {
     "gallery": "gallery",
 }
 SCREENS = {"phone": (390, 844), "desktop": (1280, 800)}
+TALLEST = 12_000  # pixels of a page that are shown
 SMALLEST = 10.0  # pixels of a letter
 #: Of a page: how far it is wider than the screen, and texts below a size, with their sizes.
 _FAULTS = """(least) => {
@@ -62,10 +63,10 @@ def take_site_pictures(site: Path, folder: Path) -> list[str]:
                 tab.goto((site / f"{page}.html").resolve().as_uri())
                 tab.wait_for_timeout(2000)  # the scene draws
                 tab.screenshot(path=folder / f"{name}_{screen}.png")
-                for scene in tab.query_selector_all("iframe")[1:]:  # loaded when they are near
-                    scene.scroll_into_view_if_needed()
-                    tab.wait_for_timeout(1500)
-                tab.screenshot(path=folder / f"{name}_{screen}_whole.png", full_page=True)
+                tall = min(TALLEST, tab.evaluate("document.documentElement.scrollHeight"))
+                tab.set_viewport_size({"width": width, "height": tall})  # loads all scenes
+                tab.wait_for_timeout(2500 * len(tab.frames))
+                tab.screenshot(path=folder / f"{name}_{screen}_whole.png")
                 wider, small = tab.evaluate(_FAULTS, SMALLEST)
                 if wider > 0:
                     ugly.append(f"{name} on a {screen}: {wider} px wider than the screen")
