@@ -53,6 +53,19 @@ def test_options_come_together_as_json(tmp_path: Path) -> None:
     assert "const float wrenches[6], const float parameters[3]" in header
 
 
+def test_without_masses_there_is_kinematics_alone(tmp_path: Path) -> None:
+    (tmp_path / "bare.yaml").write_text("name: bare\nbase_radius: 0.12\nplatform_radius: 0.1\n")
+    refused = rps_pin("export", "c", "bare.yaml", "-o", "c", folder=tmp_path)
+    assert refused.returncode == 1
+    assert "no mass moves with leg_1_prismatic, leg_2_prismatic, leg_3_pris" in refused.stderr
+    assert "forward dynamics needs the masses of the links" in refused.stderr
+    said = rps_pin("export", "c", "bare.yaml", "-o", "c", "--functions", "closed", folder=tmp_path)
+    assert said.stdout.startswith("bare: 1 functions in C99"), said.stderr
+    program("cc")
+    built = "cc -O1 -std=c99 bare.c bare_test.c -o bare_test -lm && ./bare_test"
+    assert "all functions agree" in output_of("sh", "-c", built, folder=tmp_path / "c")
+
+
 def test_a_3_rps_has_its_kinematics_and_computed_torque(tmp_path: Path) -> None:
     options = ["export", "c", "--robot", "micro", "-o", str(tmp_path)]
     run = rps_pin(*options, "--functions", "computed_torque", "--functions", "gravity_forces")

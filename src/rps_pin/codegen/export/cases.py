@@ -13,7 +13,7 @@ from rps_pin.codegen.export.evaluation import Evaluation
 from rps_pin.codegen.export.package import Case, conditions
 from rps_pin.codegen.export.vectors import vectors
 from rps_pin.codegen.expressions.functions import MechanismFunctions
-from rps_pin.errors import InputError
+from rps_pin.errors import InputError, MechanismError
 
 #: Functions of a mechanism that eliminate nothing.
 UNCHECKED = ("gaps", "jacobian", "generalised_force", "energy")
@@ -76,10 +76,13 @@ class Cases:
 
     def _growth(self, sample: Sample) -> float:
         """Return growth at a state; infinity if its loops are open."""
-        function = self._functions["forward_dynamics"]
+        name = "forward_dynamics"
+        try:
+            function = self._functions[name]
+        except MechanismError:  # no masses: kinematics alone
+            function = self._functions[name := "motion_basis"]
         inputs = [function.name_in(i) for i in range(function.n_in())]
-        given = self._given("forward_dynamics", inputs, sample)
-        opening, growth = self._evaluation("forward_dynamics", given)[-1]
+        opening, growth = self._evaluation(name, self._given(name, inputs, sample))[-1]
         return float(growth) if opening <= 1.0 else np.inf
 
     def _given(self, name: str, inputs: Sequence[str], sample: Sample) -> list[Array]:

@@ -24,6 +24,7 @@ import casadi as ca
 import numpy as np
 
 from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.column_names import column_names
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
 from rps_pin.codegen.expressions.closures import ClosureRows, closure_rows
@@ -32,7 +33,7 @@ from rps_pin.codegen.expressions.independent import Partition
 from rps_pin.codegen.expressions.joints import clean, rotation_of, turn_between
 from rps_pin.codegen.expressions.parameters import Parameters
 from rps_pin.codegen.expressions.tree import Tree
-from rps_pin.errors import MechanismError
+from rps_pin.errors import MechanismError, few
 
 #: A CasADi SX expression.
 Expression = Any
@@ -374,7 +375,22 @@ class MechanismExpressions:
 
     @cached_property
     def inertia(self) -> LDL:
-        """Factors of T' M T."""
+        """Factors of T' M T.
+
+        Raises
+        ------
+        MechanismError
+            If a motion moves no mass, whatever the configuration.
+        """
+        moved = self.mass_matrix.sparsity()
+        names = column_names(self.system.model)[1]
+        still = [names[i] for k, i in enumerate(self.independent) if not moved.has_nz(k, k)]
+        if still:
+            raise MechanismError(
+                f"no mass moves with {few(still)}: forward dynamics needs the masses of the links "
+                "(<inertial> elements, or those parameters of a 3-RPS); gaps, jacobian, closed, "
+                "motion_basis, velocity and acceleration need none"
+            )
         return LDL(self.mass_matrix)
 
     @cached_property
