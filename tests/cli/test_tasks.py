@@ -213,6 +213,64 @@ def test_a_mechanism_without_masses_has_no_forces(tmp_path: Path) -> None:
         assert "no link of five-bar has a mass: forces need the <inertial>" in ended.stderr
 
 
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A 3-RPS of one's own, and trajectories of it: a circle, as a task, and as a table."""
+    folder = tmp_path_factory.mktemp("own")
+    assert rps_pin("new", "3rps", "-o", ".", folder=folder).returncode == 0
+    (folder / "there.yaml").write_text(
+        "kind: point_to_point\nend: {z: 0.23, rx: 0.05}\nduration: 0.2\n"
+    )
+    (folder / "table.csv").write_text(
+        "time_s,z_m,tilt_x_deg,tilt_y_deg\n0,0.22,0,0\n0.1,0.22,1,0\n"
+    )
+    return folder
+
+
+def test_a_3_rps_as_a_mechanism_is_as_a_robot(own: Path) -> None:
+    given = ("dynamics", "path.yaml", "--rate", "50", "--json")
+    options = (("--robot", "mine.yaml", "-o", "a"), ("-m", "mine.yaml", "-o", "b"))
+    first, second = (json.loads(rps_pin(*given, *more, folder=own).stdout) for more in options)
+    for one, other in zip(first["sizing"]["actuators"], second["sizing"]["actuators"], strict=True):
+        for name in ("force_peak", "force_rms", "speed_peak", "stroke"):
+            assert one[name] == pytest.approx(other[name], rel=1e-9)
+    for path in ("path.yaml", "there.yaml", "table.csv"):
+        for words in (("check", path), ("view", path, "--html", "a.html", "--overwrite")):
+            done = rps_pin(*words, "-m", "mine.yaml", folder=own)
+            assert done.returncode == 0, done.stderr
+    assert rps_pin("view", "-m", "mine.yaml", "--html", "home.html", folder=own).returncode == 0
+    (own / "loop.yaml").write_text(
+        "mechanism: mine.yaml\ntrajectory: {kind: circle, tilt: 0.1}\ncontroller: {law: pd}\n"
+    )
+    told = rps_pin("control", "loop.yaml", folder=own)
+    assert "line 1: mine.yaml holds the parameters of a 3-RPS: write robot: mine" in told.stderr
+
+
+def test_gravity_and_power_of_a_mechanism(path: Path, tmp_path: Path) -> None:
+    words = ("dynamics", str(path), "-m", "stewart", "--rate", "20", "--json", "--overwrite")
+    words = (*words, "-o", str(tmp_path / "out"))
+    loads = []
+    for gravity in ((0.0, 0.0, -9.81), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81)):
+        given = ("--gravity", *map(str, gravity), "--power", "0.01")
+        sizing = json.loads(rps_pin(*words, *given).stdout)["sizing"]
+        broken = [m for one in sizing["actuators"] for m in one["margins"] if not m["kept"]]
+        assert {(one["quantity"], one["limit"]) for one in broken} == {("power", 0.01)}
+        table = np.genfromtxt(tmp_path / "out" / "dynamics.csv", delimiter=",", names=True)
+        loads.append([table[f"leg_{leg}_rod_joint_force_N"] for leg in range(1, 7)])
+    weight, motion, lifted = np.array(loads)
+    np.testing.assert_allclose(weight + lifted, 2 * motion, atol=1e-9)  # linear in gravity
+    assert np.abs(weight - motion).min() > 1.0
+
+
+def test_a_payload_of_a_3_rps_is_checked(own: Path) -> None:
+    given = ("check", "there.yaml", "-m", "mine.yaml", "--json")
+    given_robot = ("check", "table.csv", "-r", "mine.yaml", "--json")
+    for words in (given, given_robot):
+        assert json.loads(rps_pin(*words, "--payload", "1", folder=own).stdout)["ok"]
+        heavy = json.loads(rps_pin(*words, "--payload", "60", folder=own).stdout)
+        assert {one["quantity"] for one in heavy["limits"]} == {"force"}
+
+
 def test_a_singular_pose_is_told() -> None:
     # A Stewart platform that is turned by 90 degrees (Fichter).
     told = rps_pin("ik", "-m", "stewart", "--at", "rz=90", "--at", "z=0.62", "--degrees")

@@ -120,6 +120,14 @@ def test_mistakes_are_told_with_their_line(tmp_path: Path, line: str, words: str
         load_scenario(written(tmp_path, line + "\n"))
 
 
+def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
+    text = SMALLEST.replace("end:", "ende:").replace("duration: ", "duration: -")
+    with pytest.raises(InputError) as told:
+        load_scenario(written(tmp_path, "period: 0.0\n", text))
+    for words in ("line 4: period = 0", "line 2: unknown key 'ende'", "line 2: duration = -"):
+        assert words in str(told.value)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

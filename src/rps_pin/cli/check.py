@@ -21,6 +21,7 @@ from rps_pin.cli.given_options import refuse
 from rps_pin.errors import InputError
 from rps_pin.rps.motion.trajectory_file import load_trajectory
 from rps_pin.rps.singularity.path_check import check_path
+from rps_pin.task.path_check import check_path as check_task_path
 from rps_pin.task.paths.events import LimitEvent, PathCheck, pose_of_robot_in_words
 from rps_pin.task.paths.findings import GRAZE
 from rps_pin.task.paths.signals import pose_in_words
@@ -88,6 +89,8 @@ def check_command(
     payload_centre: motions.PayloadCentreOption = (0.0, 0.0, 0.0),
     wrench: motions.WrenchOption = None,
     mechanism: tasks.MechanismOption = None,
+    ignore_limits: options.IgnoreLimitsOption = False,
+    accuracy: options.AccuracyOption = None,
     degrees: DegreesOption = False,
     clearance: ClearanceOption = 0.0,
     ignore: IgnoreOption = None,
@@ -99,8 +102,8 @@ def check_command(
 
     That is a helix of a 3-RPS, or a trajectory file; with **--mechanism**, a trajectory of the
     coordinates of its task. Each event is located to a nanosecond, or to 1e-10 of the duration. Of
-    a mechanism, speeds and forces of the actuators are checked too, under payload and wrench, and
-    where its description has collision shapes, the interference of its links.
+    a mechanism, and of a 3-RPS with a payload or a wrench, speeds and forces of the actuators are
+    checked too; where a description has collision shapes, the interference of its links.
 
     Exit status: 0 the path is clear; 1 it is not; 2 wrong usage.
 
@@ -116,18 +119,18 @@ def check_command(
 
     - `rps-pin check stewart.csv -m stewart --clearance 0.005`
     """
+    load = motions.payload_of(payload, payload_centre, wrench)
+    loads: dict[str, Any] = {"payload": load, "wrench": wrench}
     if mechanism is not None:
         refuse(context, "it does not go with a mechanism", "robot", *_CURVE)
         if trajectory is None:
             told = "a mechanism has no helix: give a trajectory file"
             raise typer.BadParameter(told, param_hint="TRAJECTORY")
-        load = motions.payload_of(payload, payload_centre, wrench)
-        task = _task(mechanism, package_path)
+        task = _task(mechanism, package_path, ignore_limits, accuracy)
         choice = {Interference.YES: True, Interference.NO: False}.get(interference)
         pairs = _pairs(ignore or ())
         asked = {"interference": choice, "clearance": clearance, "ignore": pairs}
         asked |= {"threshold": threshold}
-        loads = {"payload": load, "wrench": wrench}
         _of_task(task, trajectory, asked, loads, fastest, degrees, as_json)
         return
     if trajectory is not None:
@@ -135,9 +138,7 @@ def check_command(
     if clearance or ignore or interference != Interference.AUTO or package_path:
         told = "interference is checked of a mechanism: give its file, --mechanism FILE"
         raise typer.BadParameter(told, param_hint="--interference")
-    if payload is not None or any(payload_centre) or wrench is not None:
-        told = "of a 3-RPS, positions alone are checked: these options need a --mechanism"
-        raise typer.BadParameter(told, param_hint="--payload, --payload-centre, --wrench")
+    refuse(context, "it is an option of a mechanism", "ignore_limits", "accuracy")
     machine = common.load_robot(robot)
     path: Trajectory
     if trajectory is None:
@@ -145,13 +146,24 @@ def check_command(
     else:
         path = load_trajectory(trajectory, machine)
     if fastest:
-        path = motions.fastest_of_robot(common.text_console(as_json), machine, path)
-    found = check_path(machine, path, threshold=threshold)
+        loaded = machine if load is None else machine.with_payload(load)
+        console = common.text_console(as_json)
+        path = motions.fastest_of_robot(console, loaded, path, wrench=wrench)
+    if load is None and wrench is None:
+        found = check_path(machine, path, threshold=threshold)
+    else:
+        machine.parameters.require_bodies()
+        found = check_task_path(machine.task, path, threshold=threshold, **loads)
     _tell(found, {"robot": machine.parameters.name}, machine.task, degrees, as_json)
 
 
-def _task(mechanism: Path, package_path: Sequence[Path] | None) -> Task:
-    task = tasks.load_task(mechanism)
+def _task(
+    mechanism: Path,
+    package_path: Sequence[Path] | None,
+    ignore_limits: bool,
+    accuracy: float | None,
+) -> Task:
+    task = tasks.load_task(mechanism, ignore_limits, accuracy)
     if not package_path:
         return task
     one = task.mechanism
@@ -176,10 +188,7 @@ def _of_task(
     degrees: bool,
     as_json: bool,
 ) -> None:
-    from rps_pin.task.path_check import check_path as check_task_path
-    from rps_pin.task.trajectory_file import load_task_trajectory
-
-    path = load_task_trajectory(trajectory, task, **loads)
+    path = tasks.load_path(trajectory, task, **loads)
     if fastest:
         path = motions.fastest_of_task(common.text_console(as_json), task, path, **loads)
     found = check_task_path(task, path, **asked, **loads)

@@ -18,7 +18,7 @@ from rps_pin.cli.given_options import refuse
 from rps_pin.cli.mechanism_options import AccuracyOption, IgnoreLimitsOption
 from rps_pin.cli.motion_report import motion_files, print_motion, write_motion
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
-from rps_pin.cli.task_dynamics import dynamics_of_task, refuse_options_of_robots
+from rps_pin.cli.task_dynamics import dynamics_of_task
 from rps_pin.files import write_text
 from rps_pin.rps.dynamics.force_causes import force_causes
 from rps_pin.rps.dynamics.motion_csv import COLUMNS
@@ -83,7 +83,6 @@ def dynamics_command(
     load = motions.payload_of(payload, payload_centre, wrench)
     if mechanism is not None:
         refuse(context, "it does not go with a mechanism", "robot")
-        refuse_options_of_robots(gravity, power)
         dynamics_of_task(
             mechanism,
             trajectory,
@@ -95,6 +94,8 @@ def dynamics_command(
             ignore_limits=ignore_limits,
             accuracy=accuracy,
             degrees=degrees,
+            gravity=gravity,
+            power=power,
             payload=load,
             wrench=wrench,
         )

@@ -3,35 +3,27 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import typer
 
 from rps_pin.arrays import Array
 from rps_pin.cli import console as common
 from rps_pin.cli.layer_options import write_page
-from rps_pin.cli.mechanism_options import load_mechanism, require_masses, shapes_of
+from rps_pin.cli.mechanism_options import require_masses, shapes_of
 from rps_pin.cli.motion_options import fastest_of_task
 from rps_pin.cli.outputs import check_outputs, figures_in
-from rps_pin.cli.task_options import units
+from rps_pin.cli.task_options import load_path, load_task_and_file, units
 from rps_pin.files import whole_file, write_text
 from rps_pin.plain_text import plain
 from rps_pin.task import run_motion
 from rps_pin.task.sizing.motion_run import TaskMotion
-from rps_pin.task.sizing.sizing import sheet_of
+from rps_pin.task.sizing.sizing import limits_of, sheet_of
 from rps_pin.task.task import Task
-from rps_pin.task.trajectory_file import load_task_trajectory
 from rps_pin.trajectories.csv_columns import table_in_degrees
-
-
-def refuse_options_of_robots(gravity: Any, power: float | None) -> None:
-    """Refuse options of `dynamics` that a mechanism does not have, if they are given."""
-    for option, given in (("--gravity", gravity), ("--power", power)):
-        if given is not None:
-            told = "it is an option of a 3-RPS, not of a mechanism"
-            raise typer.BadParameter(told, param_hint=option)
 
 
 def dynamics_of_task(
@@ -46,13 +38,18 @@ def dynamics_of_task(
     ignore_limits: bool,
     accuracy: float | None,
     degrees: bool,
+    gravity: Sequence[float] | None,
+    power: float | None,
     **loads: Any,
 ) -> None:
     """Compute, write and print the motion; see `rps_pin.cli.dynamics`."""
-    model, file = load_mechanism(mechanism, ignore_limits, accuracy)
-    task: Task = model.task
+    task, file = load_task_and_file(mechanism, ignore_limits, accuracy, gravity)
+    model = task.mechanism
     require_masses(model)
-    path = load_task_trajectory(trajectory, task, **loads)
+    limits = limits_of(task)
+    if power is not None:
+        limits = tuple(replace(one, power=power) for one in limits)
+    path = load_path(trajectory, task, **loads)
     folder = output or Path(f"{trajectory.stem}-dynamics")
     files = [folder / name for name in ("dynamics.csv", "sizing.json", "viewer.html")]
     files += figures_in(folder, "force_over_speed")
@@ -64,7 +61,7 @@ def dynamics_of_task(
     common.tell_size("dynamics.csv", path.duration * rate, len(names))
     progress = common.progress_bar(console, "inverse dynamics")
     run = run_motion(task, path, rate, progress=progress, **loads)
-    sheet = sheet_of(task, run)
+    sheet = sheet_of(task, run, limits)
     if degrees:
         sheet = sheet.in_degrees()
     folder.mkdir(parents=True, exist_ok=True)

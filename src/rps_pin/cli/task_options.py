@@ -14,13 +14,23 @@ from rps_pin.arrays import Array
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.completion import mechanism_names, names_or_files
+from rps_pin.config import read_yaml
 from rps_pin.errors import InputError
+from rps_pin.files import opened
 from rps_pin.plain_text import ROUNDING
+from rps_pin.rps.motion.trajectory_file import load_trajectory
+from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.robot_file import kind_of_file
+from rps_pin.rps.task import RPSTask
 from rps_pin.task.paths.findings import GRAZE
+from rps_pin.validation import real_vector
 
 if TYPE_CHECKING:
     from rps_pin.task import SingularityMeasures, Task
+    from rps_pin.trajectories.path import Trajectory
+
+#: Most bytes of a header.
+_HEADER = 10_000
 
 MechanismOption = Annotated[
     Path | None,
@@ -43,11 +53,55 @@ def load_task(file: Path, ignore_limits: bool = False, accuracy: float | None = 
     MechanismError
         If it has none.
     """
+    return load_task_and_file(file, ignore_limits, accuracy)[0]
+
+
+def load_task_and_file(
+    file: Path,
+    ignore_limits: bool = False,
+    accuracy: float | None = None,
+    gravity: Sequence[float] | None = None,
+) -> tuple[Task, Path]:
+    """Return such a task, and the file: that of the package, of a name.
+
+    With other gravity, m/s^2 in world axes, if it is given.
+    """
     if kind_of_file(file) == "parameters":
-        return options.robot_of_parameters(file, ignore_limits, accuracy).task
-    mechanism, _ = options.load_mechanism(file, ignore_limits, accuracy)
+        robot = options.robot_of_parameters(file, ignore_limits, accuracy)
+        if gravity is not None:
+            robot = RPSRobot(robot.parameters.replace(gravity=gravity))
+        return robot.task, file
+    mechanism, found = options.load_mechanism(file, ignore_limits, accuracy)
+    if gravity is not None:  # of this mechanism, which nobody else has
+        mechanism.model.gravity.linear = real_vector(gravity, 3, "gravity")
     task: Task = mechanism.task
-    return task
+    return task, found
+
+
+def load_path(trajectory: Path, task: Task, **loads: Any) -> Trajectory:
+    """Return the trajectory of a file, of the coordinates of a task.
+
+    Of a 3-RPS also its own kinds of trajectories, and columns ``tilt_x``, ``tilt_y``.
+
+    Raises
+    ------
+    InputError
+        As `load_task_trajectory`.
+    """
+    from rps_pin.task.trajectory_file import load_task_trajectory
+
+    if isinstance(task, RPSTask) and _is_of_robots(trajectory):
+        return load_trajectory(trajectory, task.robot)
+    return load_task_trajectory(trajectory, task, **loads)
+
+
+def _is_of_robots(trajectory: Path) -> bool:
+    """Return whether a trajectory is one that a 3-RPS alone has."""
+    if trajectory.suffix.lower() == ".csv":
+        with opened(trajectory, "trajectory file") as file:
+            return b"tilt_" in file.readline(_HEADER)
+    kind = read_yaml(trajectory, "trajectory file").values.get("kind")
+    return kind in ("helix", "circle", "lissajous")
 
 
 def given(

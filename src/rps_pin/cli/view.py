@@ -22,11 +22,13 @@ from rps_pin.cli.mechanism_options import (
     PackagePathOption,
     load_mechanism,
     print_notes,
+    robot_of_parameters,
     shapes_of,
 )
 from rps_pin.cli.motion_options import FastestOption, fastest_of_robot, fastest_of_task
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.printing import PlainConsole, say
+from rps_pin.cli.task_options import load_path
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.config import read_yaml
 from rps_pin.errors import InputError, few
@@ -151,9 +153,9 @@ def view_command(
     if fastest and (pose is not None or still_robot or at_home):
         raise typer.BadParameter("there is no trajectory", param_hint="--fastest")
     pose = None if pose is None else _in_radians(pose, degrees)
+    loaded = _loaded(context, robot, mechanism, ignore_limits, accuracy)
     if interactive:
-        of_file = None if mechanism is None else load_mechanism(mechanism, ignore_limits, accuracy)
-        shown = _panel(robot, pose, of_file, package_path, trajectory, fastest)
+        shown = _panel(loaded, pose, package_path, trajectory, fastest)
         _interact(*shown, port, layers, poses)
         return
     # Meshcat and its server are for this command only.
@@ -162,17 +164,16 @@ def view_command(
 
     machine: RPSRobot | ClosedLoopModel
     motion: Any
-    if mechanism is not None:
-        loaded = load_mechanism(mechanism, ignore_limits, accuracy)
+    if not isinstance(loaded, RPSRobot):
         machine, motion, drawn = _of_mechanism(loaded, package_path, trajectory, fastest)
     else:
-        machine, drawn = common.load_robot(robot), {}
-        still = pose
-        if still_robot and pose is None:
-            z, tilt_x, tilt_y = machine.task.home.tolist()
-            still = z, tilt_x, tilt_y
+        machine, drawn = loaded, {}
         curve = (radius, pitch, height, branch, duration)
-        motion = _of_robot(machine, trajectory, curve, fastest) if still is None else still
+        motion = pose
+        if still_robot or mechanism is not None:
+            motion = pose or _of_parameters(machine, trajectory, fastest)
+        elif pose is None:
+            motion = _of_robot(machine, trajectory, curve, fastest)
     inputs = [one for one in (file, mechanism) if one is not None]
     outputs = [one for one in (html, png, video) if one is not None]
     check_outputs(outputs, overwrite, inputs=inputs)
@@ -195,6 +196,22 @@ def _in_radians(pose: common.Three, degrees: bool) -> common.Three:
     """Return a pose in m and rad; what looks like another unit is told."""
     common.doubt_pose("--pose", pose, degrees)
     return (pose[0], math.radians(pose[1]), math.radians(pose[2])) if degrees else pose
+
+
+def _loaded(
+    context: typer.Context,
+    robot: str,
+    mechanism: Path | None,
+    ignore_limits: bool,
+    accuracy: float | None,
+) -> RPSRobot | tuple[ClosedLoopModel, Path]:
+    """Return a 3-RPS, which may be given as a mechanism, or a mechanism and its file."""
+    if mechanism is None:
+        return common.load_robot(robot)
+    if kind_of_file(mechanism) == "parameters":
+        refuse(context, "a 3-RPS has no meshes", "package_path")
+        return robot_of_parameters(mechanism, ignore_limits, accuracy)
+    return load_mechanism(mechanism, ignore_limits, accuracy)
 
 
 def _write_files(
@@ -291,12 +308,19 @@ def _of_mechanism(
     print_notes([*mechanism.notes, *missing])
     if trajectory is None:
         return mechanism, None, {"visual": shapes}
-    from rps_pin.task.trajectory_file import load_task_trajectory
-
-    motion = load_task_trajectory(trajectory, mechanism.task)
+    motion = load_path(trajectory, mechanism.task)
     if fastest:
         motion = fastest_of_task(PlainConsole(stderr=True), mechanism.task, motion)
     return mechanism, motion, {"visual": shapes}
+
+
+def _of_parameters(machine: RPSRobot, trajectory: Path | None, fastest: bool) -> Any:
+    """Return the motion of a 3-RPS that is given as a mechanism, or its home."""
+    if trajectory is None:
+        z, tilt_x, tilt_y = machine.task.home.tolist()
+        return z, tilt_x, tilt_y
+    motion = load_path(trajectory, machine.task)
+    return fastest_of_robot(PlainConsole(stderr=True), machine, motion) if fastest else motion
 
 
 def _of_robot(
@@ -312,9 +336,8 @@ def _of_robot(
 
 
 def _panel(
-    robot: str,
+    loaded: RPSRobot | tuple[ClosedLoopModel, Path],
     pose: common.Three | None,
-    loaded: tuple[ClosedLoopModel, Path] | None,
     package_path: list[Path] | None,
     trajectory: Path | None,
     fastest: bool,
@@ -324,9 +347,8 @@ def _panel(
 
     panel: Panel
     console = PlainConsole(stderr=True)
-    if loaded is None:
-        machine = common.load_robot(robot)
-        panel, title = RPSPanel(machine, pose), f"3-RPS {machine.parameters.name}"
+    if isinstance(loaded, RPSRobot):
+        panel, title = RPSPanel(loaded, pose), f"3-RPS {loaded.parameters.name}"
     else:
         mechanism, file = loaded
         shapes, missing = shapes_of(file, mechanism, package_path)
@@ -335,8 +357,8 @@ def _panel(
     if trajectory is None:
         return panel, title
     motion = panel.read(trajectory)
-    if fastest and loaded is None:
-        motion = fastest_of_robot(console, machine, motion)
+    if fastest and isinstance(loaded, RPSRobot):
+        motion = fastest_of_robot(console, loaded, motion)
     elif fastest:
         motion = fastest_of_task(console, mechanism.task, motion)
     panel.load(motion)

@@ -133,13 +133,7 @@ def described_task_trajectory(file: YamlFile, folder: Path, task: Task, **loads:
     RPSPinError
         As `load_task_trajectory`.
     """
-    kind = file.values.get("kind")
-    if not isinstance(kind, str) or kind not in _KINDS:
-        given = "is missing" if kind is None else f"{shown(kind)} is not one"
-        raise InputError(
-            f"{file.place(('kind',))}: kind: {given}; of a task there are: {', '.join(_KINDS)}"
-        )
-    described = file.validated(_KINDS[kind], f"a {kind} trajectory")
+    described = validated_task_trajectory(file)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             trajectory = _made(file, described, folder, task)
@@ -148,6 +142,23 @@ def described_task_trajectory(file: YamlFile, folder: Path, task: Task, **loads:
     if described.fastest is None:
         return trajectory
     return _fastest(file, task, trajectory, described.fastest, loads)
+
+
+def validated_task_trajectory(file: YamlFile) -> Any:
+    """Return what a YAML file, or a part of one, holds, as far as no task is needed.
+
+    Raises
+    ------
+    InputError
+        If the kind is unknown, a key is unknown or missing, or a value is none of its key.
+    """
+    kind = file.values.get("kind")
+    if not isinstance(kind, str) or kind not in _KINDS:
+        given = "is missing" if kind is None else f"{shown(kind)} is not one"
+        raise InputError(
+            f"{file.place(('kind',))}: kind: {given}; of a task there are: {', '.join(_KINDS)}"
+        )
+    return file.validated(_KINDS[kind], f"a {kind} trajectory")
 
 
 def _fastest(

@@ -39,6 +39,7 @@ from rps_pin.control.simulation.servo_drives import ServoDrives
 from rps_pin.control.simulation.task_scenario import (
     TaskScenarioEntry,
     changed,
+    refuse_parameters,
     task_of_file,
     task_trajectory,
 )
@@ -51,6 +52,7 @@ from rps_pin.rps.motion.trajectory_schema import validated
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.robot_file import load_robot
 from rps_pin.task import Task
+from rps_pin.task.trajectory_file import validated_task_trajectory
 from rps_pin.trajectories.path import Trajectory
 
 _OF_LAW = {"law", "bandwidth", "damping", "integral", "gains", "model", "speeds", "paced"}
@@ -232,7 +234,14 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
 
 def _of_mechanism(file: YamlFile, folder: Path) -> Scenario:
     """Return the scenario of a mechanism with a task."""
-    entry = file.validated(TaskScenarioEntry, "a scenario")
+    refuse_parameters(file, folder)
+    faults = Faults(file.origin)
+    with faults:
+        entry = file.validated(TaskScenarioEntry, "a scenario")
+    if isinstance(file.values.get("trajectory"), Mapping):
+        with faults:
+            validated_task_trajectory(file.part("trajectory"))
+    faults.tell()
     nominal = task_of_file(file, folder, entry.mechanism)
     _check_drives(file, entry)
     model = changed(nominal, entry.controller.model.masses)
@@ -241,8 +250,9 @@ def _of_mechanism(file: YamlFile, folder: Path) -> Scenario:
     actuators = nominal.mechanism.actuated_indices.size
     with file.at("controller"):
         gains = _gains(entry, model, trajectory).of(nominal.size)
-    faults = _faults(file, entry, actuators, nominal.size)
-    return Scenario(entry, model, machine, trajectory, gains, faults)
+    return Scenario(
+        entry, model, machine, trajectory, gains, _faults(file, entry, actuators, nominal.size)
+    )
 
 
 def _check_drives(file: YamlFile, entry: ScenarioEntry | TaskScenarioEntry) -> None:

@@ -27,6 +27,7 @@ from rps_pin.control.simulation.scenario_schema import (
 )
 from rps_pin.errors import InputError
 from rps_pin.files import is_there
+from rps_pin.rps.robot_file import kind_of_file
 from rps_pin.task import Task
 from rps_pin.task.trajectory_file import described_task_trajectory, load_task_trajectory
 from rps_pin.trajectories.path import Trajectory
@@ -107,6 +108,20 @@ def task_of_file(file: YamlFile, folder: Path, name: str) -> Task:
     with file.at("mechanism"):
         task: Task = ClosedLoopModel.load(path).task
     return task
+
+
+def refuse_parameters(file: YamlFile, folder: Path) -> None:
+    """Refuse the parameters of a 3-RPS as a scenario's mechanism: they are a robot.
+
+    Raises
+    ------
+    InputError
+        If they are; with the line.
+    """
+    name = file.values["mechanism"]
+    if isinstance(name, str) and kind_of_file(folder / name) == "parameters":
+        with file.at("mechanism"):
+            raise InputError(f"{name} holds the parameters of a 3-RPS: write robot: {name}")
 
 
 def changed(task: Task, masses: float | None) -> Task:

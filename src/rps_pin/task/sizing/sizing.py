@@ -25,6 +25,9 @@ from rps_pin.task.sizing.sizing_sheet import ActuatorLimits, DriveLimits, Sizing
 from rps_pin.task.task import Task
 from rps_pin.trajectories.path import Trajectory
 
+#: Loads of this share of the largest are rounding errors.
+_ROUNDING = 1e-12
+
 
 class JointLoad(NamedTuple):
     """The largest loads of a joint, or of a closure, in a motion."""
@@ -84,8 +87,10 @@ class TaskSizing(SizingSheet):
         """Return the loads of the joints as a table for a terminal."""
         headings = "peak force (N)", "at (s)", "peak moment (N m)", "at (s)"
         table = _table("Joint loads", *headings)
-        for one in self.joints:
-            table.add_row(one.name, *(f"{value:.4g}" for value in one[2:]))
+        numbers = np.array([one[2:] for one in self.joints], dtype=np.float64).reshape(-1, 4)
+        numbers[numbers < _ROUNDING * numbers.max(axis=0, initial=0.0)] = 0.0
+        for one, row in zip(self.joints, numbers.tolist(), strict=True):
+            table.add_row(one.name, *(f"{value:.4g}" for value in row))
         return table
 
     def _units(self) -> tuple[str, ...]:
