@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rps_pin.errors import CompileError
+from rps_pin.task import Task
 from rps_pin.task.motion import task_dynamics
 from tests.cli.commands import rps_pin
 
@@ -84,7 +86,24 @@ def test_a_file_asks_for_it_under_the_loads(folder: Path) -> None:
 def test_the_time_is_told(folder: Path) -> None:
     told = rps_pin("check", "line.yaml", "-m", "slide.yaml", "--fastest", folder=folder).stdout
     assert f"shortest time {shortest():.4f}"[:20] in told
-    assert "(as given: 1.5 s)" in told
+    assert "(as given: 1.5 s), computed in generated code" in told
+
+
+def test_the_engine_is_told(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise CompileError("there is no C compiler", "cc")
+
+    monkeypatch.setattr(Task, "compile", refused)
+    words = "check", "line.yaml", "-m", "slide.yaml", "--fastest"
+    done = rps_pin(*words, folder=folder, COLUMNS="300")
+    told = done.stdout
+    assert done.returncode == 0, done.stderr
+    assert f"shortest time {shortest():.4f}"[:20] in told
+    assert "computed by the Pinocchio engine, ten times as long as in generated code" in told
+    assert "there is no C compiler" in told
+    of_file = rps_pin("check", "fast.yaml", "-m", "slide.yaml", "--json", folder=folder)
+    assert json.loads(of_file.stdout)["duration"] == pytest.approx(shortest(MASS, 2, 2), rel=1e-4)
+    assert "fast.yaml: its shortest time is computed by the Pinocchio engine" in of_file.stderr
 
 
 def test_view_shows_it(folder: Path) -> None:
@@ -108,7 +127,7 @@ def test_control_follows_it(folder: Path) -> None:
     [
         (("view", "--fastest", "-m", "slide.yaml"), "there is no trajectory"),
         (("view", "--fastest", "-i", "-m", "slide.yaml"), "there is no trajectory"),
-        (("check", "--payload", "1"), "these options need a --mechanism"),
+        (("check", "--ignore-limits"), "it is an option of a mechanism"),
         (("check", "line.yaml", "-m", "slide.yaml", "--payload", "-1"), "must be positive"),
         (
             ("check", "line.yaml", "-m", "slide.yaml", "--payload-centre", "1", "0", "0"),

@@ -240,16 +240,20 @@ def test_another_program_is_no_faster(name: str) -> None:
     assert free.duration == pytest.approx(expected, rel=2e-3)
 
 
+@cache
+def without_closed_forms() -> Task:
+    plain = Task(RPSRobot.from_preset("sokolov").mechanism, "platform", ["z", "rx", "ry"])
+    return plain.compile(functions=("kinematics", "closing", "dynamics"))
+
+
 @pytest.mark.parametrize("force", [20.0, 100.0])
 def test_the_3_rps_without_its_closed_forms(force: float) -> None:
     robot = RPSRobot.from_preset("sokolov")
     line = LineCurve([0.40, 0.05, 0.0], [0.45, -0.05, 0.1])
-    expected = rps_time_optimal(robot, line, limits=ActuatorLimits(force, 0.5))
+    expected = rps_time_optimal(robot, line, limits=ActuatorLimits(force, 0.5), intervals=20)
     limits = MotionLimits(force=force, speed=0.5)
-    plain = Task(robot.mechanism, "platform", ["z", "rx", "ry"])
-    plain = plain.compile(functions=("kinematics", "closing", "dynamics"))
-    for task in (plain, robots.compiled("sokolov")):
-        found = time_optimal(task, line, limits=limits)
+    for task in (without_closed_forms(), robots.compiled("sokolov")):
+        found = time_optimal(task, line, limits=limits, intervals=20)
         assert found.duration == pytest.approx(expected.duration, rel=1e-6)
         t = np.linspace(0, found.duration, 200)
         np.testing.assert_allclose(found.sample(t).pose, expected.sample(t).pose, atol=1e-6)

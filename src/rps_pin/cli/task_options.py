@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +14,8 @@ from rps_pin.arrays import Array
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.completion import mechanism_names, names_or_files
+from rps_pin.cli.motion_options import in_generated_code
+from rps_pin.cli.printing import say
 from rps_pin.config import read_yaml
 from rps_pin.errors import InputError
 from rps_pin.files import opened
@@ -92,6 +94,9 @@ def load_path(trajectory: Path, task: Task, **loads: Any) -> Trajectory:
 
     if isinstance(task, RPSTask) and _is_of_robots(trajectory):
         return load_trajectory(trajectory, task.robot)
+    if _keys(trajectory).get("fastest") is not None:
+        task, engine = in_generated_code(task)
+        say(f"note: {trajectory}: its shortest time is computed {engine}", err=True)
     return load_task_trajectory(trajectory, task, **loads)
 
 
@@ -100,8 +105,14 @@ def _is_of_robots(trajectory: Path) -> bool:
     if trajectory.suffix.lower() == ".csv":
         with opened(trajectory, "trajectory file") as file:
             return b"tilt_" in file.readline(_HEADER)
-    kind = read_yaml(trajectory, "trajectory file").values.get("kind")
-    return kind in ("helix", "circle", "lissajous")
+    return _keys(trajectory).get("kind") in ("helix", "circle", "lissajous")
+
+
+def _keys(trajectory: Path) -> Mapping[str, Any]:
+    """Return the values of a YAML file; of others none."""
+    if trajectory.suffix.lower() not in (".yaml", ".yml"):
+        return {}
+    return read_yaml(trajectory, "trajectory file").values
 
 
 def given(
