@@ -280,6 +280,8 @@ def main() -> int:
     parser.add_argument("--only", default="", help="commands with these words, as installed")
     only = parser.parse_args().only
     begin = time.monotonic()
+    # Ctrl-C ends what is started here, also where a shell without job control ignores it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     if not only:
         shutil.rmtree(PLACE, ignore_errors=True)
     PLACE.mkdir(parents=True, exist_ok=True)

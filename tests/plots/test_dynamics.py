@@ -112,6 +112,13 @@ def test_limits_that_there_are_not_are_not_drawn(robot: RPSRobot, limits: Actuat
     assert ("limits" in labels) == (limits != ActuatorLimits())
 
 
+def test_a_limit_that_is_far_is_told_beside_one_that_is_near(robot: RPSRobot) -> None:
+    path = helix(robot, radius=20e-3, pitch=50e-3, height=0.4, duration=1.0)
+    limits = ActuatorLimits(force=9e3, speed=0.2)
+    axes = plot_sizing(size_trajectory(robot, path, 50.0, limits=limits)).axes[0]
+    assert axes.get_legend_handles_labels()[1][-2:] == ["limits", "limits not shown: ±9000 N"]
+
+
 def test_sizing_of_a_mechanism_has_its_joints_and_their_units() -> None:
     for name, unit in (("delta", "torque (N m)"), ("stewart", "force (N)")):
         task = ClosedLoopModel.load(f"urdf/{name}.yaml").task

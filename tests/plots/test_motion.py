@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from rps_pin import RPSRobot, helix
 from rps_pin.plots import plot_forces, plot_lengths, plot_path, save_figure
 from rps_pin.rps.dynamics.motion_run import MotionRun, run_motion
-from rps_pin.trajectories import circle
+from rps_pin.trajectories import SampledPath, circle, point_to_point
+from tests.plots.overlaps import faults
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +57,40 @@ def test_forces_jump_upright_where_accelerations_do(run: MotionRun) -> None:
     assert len(plot_forces(smooth).axes[0].get_lines()[0].get_xdata()) == len(smooth.time)
 
 
+def test_a_robot_at_rest_is_a_point_among_round_numbers() -> None:
+    robot = RPSRobot.from_preset("micro")
+    still = SampledPath(np.linspace(0.0, 1.0, 6), np.tile([0.223, 0.05, 0.02], (6, 1)))
+    figure = plot_path(run_motion(robot, still, 20.0))
+    assert not faults(figure)
+    names = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert names == ["at rest"]
+    (axes,) = figure.axes
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        ticks = [tick.get_text() for tick in axis.get_ticklabels()]
+        assert max(map(len, ticks)) <= len("-0.2"), ticks
+
+
+def test_a_path_that_returns_has_one_point_for_both_ends() -> None:
+    robot = RPSRobot.from_preset("micro")
+    for path, wanted in (
+        (circle(height=0.223, tilt=0.1, duration=1.0), ["start and end"]),
+        (point_to_point([0.22, 0.0, 0.0], [0.23, 0.1, 0.0], duration=1.0), ["start", "end"]),
+    ):
+        figure = plot_path(run_motion(robot, path, 20.0))
+        names = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+        assert names == wanted
+        assert not faults(figure)
+
+
+def test_a_path_that_only_rises_has_room_for_its_ticks() -> None:
+    robot = RPSRobot.from_preset("micro")
+    rise = point_to_point([0.21, 0.0, 0.0], [0.235, 0.0, 0.0], duration=1.0)
+    figure = plot_path(run_motion(robot, rise, 20.0))
+    assert not faults(figure)
+    (axes,) = figure.axes
+    assert len(axes.get_xticks()) == len(axes.get_yticks()) == 1  # they would meet at the corner
+
+
 def test_the_path_in_space_is_the_helix(run: MotionRun) -> None:
     (axes,) = plot_path(run).axes
     x, y, z = axes.get_lines()[0].get_data_3d()
@@ -63,7 +98,7 @@ def test_the_path_in_space_is_the_helix(run: MotionRun) -> None:
     assert np.isclose(z[-1] - z[0], 0.5)
     for label in (axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel()):
         assert "(mm)" in label
-    assert "400 mm" in axes.get_zlabel()
+    assert axes.get_zlabel() == "$p_z - 400$ (mm)"
 
 
 def test_a_figure_is_saved_as_png_and_as_repeatable_svg(run: MotionRun, tmp_path: Path) -> None:

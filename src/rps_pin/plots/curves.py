@@ -24,6 +24,8 @@ _JUMP, _SEEN = 8.0, 0.01
 _NEAR = 1.5
 #: Letters of a name.
 _LONGEST = 26
+#: Shares of a figure's width: more than that of one panel of two, and of a lone one at least.
+_ALONE, _LAID_OUT = 0.6, 0.84
 #: Of an entry of a legend, beside its label.
 _PARTS = ("handlelength", "handletextpad", "columnspacing")
 
@@ -90,7 +92,10 @@ def legend_above(axes: Axes) -> None:
     if not handles:
         return
     figure = figure_of(axes)
-    width = 72 * axes.get_position().width * figure.get_figwidth()
+    share = axes.get_position().width  # before the layout, which gives a lone panel more
+    if share > _ALONE and figure.get_layout_engine() is not None:
+        share = max(share, _LAID_OUT)
+    width = 72 * share * figure.get_figwidth()
     look: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
     columns = legend_columns(labels, width)
     axes.legend(handles, labels, ncols=columns, **look)

@@ -165,7 +165,8 @@ def _limit_box(axes: Axes, sheet: SizingSheet, units: tuple[str, str]) -> None:
                 line(limit, label="limits", **look)
                 line(-limit, **look)
     if far:
-        axes.plot([], [], " ", label=f"limits: {', '.join(far)}")
+        which = "limits not shown" if np.isfinite(drawn).any() else "limits"
+        axes.plot([], [], " ", label=f"{which}: {', '.join(far)}")
     _power_limit(axes, sheet, limits)
 
 

@@ -18,6 +18,11 @@ from rps_pin.rps.dynamics.motion_run import MotionRun
 
 _LEGS = ("leg 1", "leg 2", "leg 3")
 _HEIGHT = 2.2
+#: Shares of the largest coordinate: motions that are none, sides of a box about them, and the least
+#: side of others.
+_NO_MOTION, _BOX_OF_REST, _LEAST_BOX = 1e-9, 1e-2, 1e-5
+#: Share of a path's size within which its ends are one point.
+_SAME_POINT = 1e-3
 
 
 @style.styled
@@ -32,12 +37,17 @@ def plot_path(run: MotionRun, figure: Figure | None = None) -> Figure:
     points = points - [0.0, 0.0, base]
     x, y, z = points.T
     axes.plot(x, y, z, color=style.BLUE)
-    ends = {"depthshade": False, "s": 16, "zorder": 5}
-    axes.scatter(x[:1], y[:1], z[:1], color="black", label="start", **ends)
-    axes.scatter(x[-1:], y[-1:], z[-1:], color=style.VERMILION, marker="s", label="end", **ends)
-    up = f"$p_z$ - {base:.6g} mm (mm)"
+    largest, size = 1e3 * float(np.abs(run.position).max()), float(np.ptp(points, axis=0).max())
+    rests = size <= _NO_MOTION * largest
+    returns = float(np.abs(points[-1] - points[0]).max()) <= _SAME_POINT * size
+    first = "at rest" if rests else "start and end" if returns else "start"
+    dot = {"depthshade": False, "s": 16, "zorder": 5}
+    axes.scatter(x[:1], y[:1], z[:1], color="black", label=first, **dot)
+    if not (rests or returns):
+        axes.scatter(x[-1:], y[-1:], z[-1:], color=style.VERMILION, marker="s", label="end", **dot)
+    up = f"$p_z - {base:.6g}$ (mm)"
     ends_of_box = points.min(axis=0), points.max(axis=0)
-    least = 1e-5 * float(np.abs(run.position).max()) * 1e3  # so that rest is a point
+    least = (_BOX_OF_REST if rests else _LEAST_BOX) * largest
     scales = frame_space(axes, *ends_of_box, (*POSITION[:2], up), least=least)
     return finish_space(axes, figure, scales)
 

@@ -70,7 +70,8 @@ def frame_space(
         if upright or side > _NARROW:
             axis.set_major_locator(MaxNLocator(max(1, round(ticks * side)), steps=steps))
         else:  # at the ends, x and y would meet
-            axis.set_major_locator(MaxNLocator(2, steps=steps, prune="both"))
+            locator = MaxNLocator(2, steps=steps, prune="both", min_n_ticks=1)
+            axis.set_major_locator(locator)
         axis.set_tick_params(pad=2 if upright else -1)
         axis.labelpad = 4 if upright else -1
         axis.pane.set_facecolor("white")
