@@ -35,6 +35,8 @@ _RIGHT, _LEFT = 350, 310
 """Widths of the columns, pixels."""
 _BACK = 1.15
 """The camera is so much farther away than in the exported page, which has no columns."""
+_HANDLE = 0.38
+"""Length of the handle's arrows, in radii of the robot."""
 _NO_POSE = "(none)"
 
 
@@ -144,21 +146,28 @@ class BrowserPanel:
         gui.main_panel.set_width(_RIGHT)
         gui.add_html(texts.STYLE)
         self._heading = gui.add_html(texts.heading(title))
-        self._sliders = {
-            group: [
-                (one, self._slider(group, one, value))
+        self._sliders: dict[str, list[tuple[Slider, Any]]] = {}
+        for group, sliders in panel.groups.items():
+            units = {one.unit for one in sliders}
+            gui.add_html(texts.group(group, units))
+            self._sliders[group] = [
+                (one, self._slider(group, one, value, short=len(units) == 1))
                 for one, value in zip(sliders, panel.values(group).tolist(), strict=True)
             ]
-            for group, sliders in panel.groups.items()
-        }
         self._buttons("go to", {"Home": self._go_home, "Reset": self._reset})
         self._state = gui.add_html("")  # below the sliders, which it must not move
         self._remarks = gui.add_html("")
         with gui.add_folder("layers"):
-            self.view = self._view(layers, hidden)
-            self._gizmo = self._handle()
             shadows = gui.add_checkbox("shadows", True, hint="off: faster where there is no GPU")
             shadows.on_update(lambda event: self._writer.set_shadows(event.target.value))
+            if panel.handle is not None:
+                tick = gui.add_checkbox("handle", True, hint="arrows and rings that drag the frame")
+                tick.on_update(lambda event: self._gizmo.set_visible(event.target.value))
+            self.view = self._view(layers, hidden)
+        self._gizmo: Any = None
+        if panel.handle is not None:
+            size = _HANDLE * self.view.scene.box.radius
+            self._gizmo = Gizmo(self._server.scene, panel.handle, size, self._dragged)
         if self._poses is not None:
             self._add_poses()
         beside = gui.add_panel()
@@ -173,6 +182,7 @@ class BrowserPanel:
         camera = self._server.initial_camera  # for the space between the columns, which is narrow
         middle = np.asarray(camera.look_at)
         camera.position = middle + _BACK * (np.asarray(camera.position) - middle)
+        self._server.on_client_connect(self._check_frame)
 
     def _view(self, layers: Sequence[str | Layer], hidden: Sequence[str | Layer]) -> View:
         panel = self._panel
@@ -185,29 +195,19 @@ class BrowserPanel:
             hidden=hidden,
         )
 
-    def _handle(self) -> Gizmo | None:
-        """Return the handle of the task's frame, with its switch."""
-        if self._panel.handle is None:
-            return None
-        size = 0.38 * self.view.scene.box.radius
-        gizmo = Gizmo(self._server.scene, self._panel.handle, size, self._dragged)
-        tick = self._server.gui.add_checkbox(
-            "handle", True, hint="arrows and rings that drag the task's frame"
-        )
-        tick.on_update(lambda event: gizmo.set_visible(event.target.value))
-        return gizmo
-
-    def _slider(self, group: str, one: Slider, value: float) -> Any:
+    def _slider(self, group: str, one: Slider, value: float, *, short: bool) -> Any:
         now = _shown(one, value)
         marks = [end for end in one.limits if one.low <= end <= one.high]
         handle = self._server.gui.add_slider(
-            _label(one),
+            plain(one.label if short else f"{one.label}, {texts.UNITS[one.unit]}"),
             min=min(one.low, now),
             max=max(one.high, now),
             step=one.step,
             initial_value=now,
             marks=[(end, f"{end:.6g}") for end in marks or (one.low, one.high)],
-            hint=f"limits: {one.limits[0]:.6g} to {one.limits[1]:.6g}" if marks else None,
+            hint=f"limits: {one.limits[0]:.6g} to {one.limits[1]:.6g} {one.unit}"
+            if marks
+            else None,
         )
         handle.precision = len(f"{one.step:.6f}".rstrip("0").partition(".")[2])
         handle.on_update(
@@ -228,7 +228,7 @@ class BrowserPanel:
             "trajectory", {"Play": lambda: self._play(True), "Pause": lambda: self._play(False)}
         )
         self._scrub = gui.add_slider(
-            "time (s)",
+            "time, s",
             min=0.0,
             max=player.duration,
             step=player.duration / 1000,
@@ -330,6 +330,12 @@ class BrowserPanel:
         for client in self._server.get_clients().values():
             self._frame(client)
         self._refresh()
+
+    def _check_frame(self, client: Any) -> None:
+        """Put a page's camera at its beginning, where viser on a busy machine may not have it."""
+        wanted = np.asarray(self._server.initial_camera.position)
+        if not np.allclose(client.camera.position, wanted, rtol=0.01):
+            self._frame(client)
 
     def _frame(self, client: Any) -> None:
         """Put a page's camera where it was at the beginning, or farther in a narrow window."""
@@ -488,11 +494,6 @@ def _shown(one: Slider, value: float) -> float:
     """Return a value in the unit shown; rounding errors about zero are zero."""
     shown = one.scale * value
     return 0.0 if abs(shown) < 1e-6 * one.step else shown
-
-
-def _label(one: Slider) -> str:
-    """Return a slider's name with a short unit: a line of the page is short."""
-    return plain(one.name).replace(" (degrees)", ", °").replace(" (mm)", ", mm")
 
 
 def _is_cut(handle: Any, typed: float) -> bool:

@@ -333,7 +333,7 @@ class Panel(ABC):
         asked = np.ravel(values) if np.ndim(values) == 1 else np.empty(0)
         if group in self.groups and len(asked) == len(self.groups[group]):
             moved = [
-                f"{one.name.partition(' (')[0]} {quantity(new, one.scale, _unit(one))}"
+                f"{one.label} {quantity(new, one.scale, one.unit)}"
                 for one, new, old in zip(self.groups[group], asked, self.values(group), strict=True)
                 if abs(one.scale * (new - old)) > 1e-6 * one.step
                 and "beyond its slider" not in said
@@ -341,7 +341,3 @@ class Panel(ABC):
             said = f"{', '.join(moved)}: {said}" if moved else said
         self.refuse(said)
         return False
-
-
-def _unit(one: Slider) -> str:
-    return one.name.rpartition("(")[2].rstrip(")")

@@ -28,6 +28,16 @@ class Slider(NamedTuple):
     limits: tuple[float, float] = (-math.inf, math.inf)
     """Beyond which the robot must not be, in the unit shown."""
 
+    @property
+    def label(self) -> str:
+        """The name without the unit."""
+        return self.name.rpartition(" (")[0]
+
+    @property
+    def unit(self) -> str:
+        """The unit that is shown."""
+        return self.name.rpartition(" (")[2].rstrip(")")
+
 
 def slider(
     name: str, turns: bool, low: float, high: float, limits: tuple[float, float] | None = None

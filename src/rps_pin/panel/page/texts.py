@@ -10,12 +10,14 @@ from rps_pin.panel.panel import Panel
 from rps_pin.plain_text import plain
 
 _TEXT = "font-size: 85%; line-height: 1.35; margin: 0 0.8em 0.5em"
+UNITS = {"mm": "mm", "degrees": "°"}
+"""As labels have them: a line of the page is short."""
 #: Number boxes are as wide as their numbers; names are not cut into letters; the canvas has the
 #: background of the exported page; and a mark is drawn over viser's plots.
 STYLE = """<style>
 .mantine-NumberInput-root {width: 4.6rem !important}
 .mantine-NumberInput-input {text-align: right; letter-spacing: 0 !important}
-div:has(> .mantine-Text-root > label) {width: 8.2em !important}
+div:has(> .mantine-Text-root > label) {width: 8.2em !important; padding-right: 0.3em}
 canvas[data-engine] {background: linear-gradient(#DBE6F0, #FCFCFF)}
 .uplot .u-title {font-size: 12px; font-weight: 500; text-align: left; padding-left: 46px}
 .u-over::after {content: ""; position: absolute; top: 0; bottom: 0; left: var(--now, 100%);
@@ -39,6 +41,12 @@ def escaped(text: str) -> str:
 def heading(title: str) -> str:
     """Return the page's title."""
     return f'<h2 style="{_TEXT}; font-size: 105%; margin-top: 0.5em">{escaped(title)}</h2>'
+
+
+def group(name: str, units: set[str]) -> str:
+    """Return the heading of a group of sliders, with their unit if they have one."""
+    unit = f", {UNITS[next(iter(units))]}" if len(units) == 1 else ""
+    return f'<div style="{_TEXT}; margin-bottom: 0.3em; font-weight: 500">{name}{unit}</div>'
 
 
 def state(panel: Panel, notice: str = "") -> str:
