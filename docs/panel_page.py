@@ -22,7 +22,6 @@ def main() -> None:
     text = replaced(PAGE.read_text("utf-8"), "rate", block(measured()))
     PAGE.write_text(text, "utf-8")
     with opened(1000) as (_, page):
-        page.locator(".mantine-Notification-closeButton").first.click()  # there is no GPU
         page.wait_for_timeout(1000)
         page.screenshot(path=HERE / "images" / "panel.png")
 

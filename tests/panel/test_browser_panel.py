@@ -5,17 +5,23 @@ from __future__ import annotations
 import io
 import os
 import socket
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
 from urllib.request import urlopen
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from PIL import Image
 
-from rps_pin import InputError, RPSPinError, RPSRobot
-from rps_pin.panel import BrowserPanel, NotebookPanel, RPSPanel
+from rps_pin import InputError, RPSPinError, RPSRobot, helix
+from rps_pin.panel import BrowserPanel, NotebookPanel, PoseFile, RPSPanel
+from rps_pin.panel.page.worker import Worker
 from rps_pin.viewer.files.browser import ARGUMENTS
 
 MICRO = RPSRobot.from_preset("micro")
@@ -96,30 +102,165 @@ def test_the_page_is_for_this_machine_only(served: BrowserPanel) -> None:
     assert served._server.request_share_url() is None  # viser's tunnel to its makers' site
 
 
-def test_sliders_in_the_page(served: BrowserPanel) -> None:
-    if not BROWSER:
-        pytest.skip("there is no browser")
+def test_beyond_its_limits_the_robot_is_red_and_within_them_as_before(served: BrowserPanel) -> None:
+    scene, rods = served.view.scene, [f"leg_{leg}_rod" for leg in (1, 2, 3)]
+    painted: dict[str, tuple[float, ...]] = {}
+    paint = scene.writer.set_colour
+    scene.writer.set_colour = lambda path, colour, opacity: (
+        painted.__setitem__(path, tuple(colour)),
+        paint(path, colour, opacity),
+    )
+    served.move("lengths", [255.0, 225.0, 225.0])
+    assert moved(
+        lambda: "leg 1: length would be 255 mm; its limits are 200 to 250 mm" in served.text
+    )
+    red = {path for path, (r, g, b) in painted.items() if r > 0.8 and max(g, b) < 0.2}
+    assert red
+    assert {path.split("/")[-2] for path in red} <= set(scene.paths)
+    assert all(rods[0] in path for path in red)
+    served.move("lengths", [245.0, 225.0, 225.0])
+    assert moved(lambda: "within all limits" in served.text)
+    assert not {path for path, (r, g, b) in painted.items() if r > 0.8 and max(g, b) < 0.2}
+
+
+def test_what_is_beyond_a_slider_is_told_and_the_slider_goes_back(served: BrowserPanel) -> None:
+    (slider, handle), *_ = served._sliders["pose"]
+    served._refused(handle, 999.0)
+    assert moved(lambda: "not followed: height (mm): 999 is beyond its slider" in served.text)
+    handle.value = handle.max  # as the page makes of 999 when its box is left
+    assert moved(lambda: handle.value == slider.scale * served._panel.pose[0])
+    assert "999 is beyond its slider" in served.text
+    served._refused(handle, 26.0)
+    handle.value = 260.0  # typed digit by digit
+    assert moved(lambda: served._panel.pose[0] == 0.26)
+
+
+def test_a_trajectory_is_played_paused_and_scrubbed() -> None:
+    panel = RPSPanel(MICRO)
+    recording = panel.load(helix(MICRO, radius=4e-5, pitch=0.01, height=0.225))
+    with BrowserPanel(panel) as face:
+        assert face.player is not None
+        face._worker.submit("play", lambda: face._play(True))
+        assert moved(lambda: face._scrub.value > 0.05)
+        assert moved(lambda: face.shown("pose")[0] == pytest.approx(1e3 * panel.pose[0]))
+        face._worker.submit("pause", lambda: face._play(False))
+        assert moved(lambda: not face.player.playing)
+        face._scrub.value = 0.5 * recording.duration
+        assert moved(lambda: panel.pose[0] == pytest.approx(0.23, abs=1e-6))
+        assert moved(lambda: f"t = {0.5 * recording.duration:.2f} s" in face._clock.content)
+        assert moved(lambda: "--now: 50.00%" in face._mark.content)
+        np.testing.assert_array_equal(face._charts.data[0][0], recording.time)
+        face.move("pose", [222.0, 0.0, 0.0])  # by hand: the last seconds
+        assert moved(lambda: len(face._charts.data[0][0]) < 50)
+        assert "none" in face._mark.content
+
+
+def test_poses_are_saved_and_gone_to(tmp_path: Path) -> None:
+    panel = RPSPanel(MICRO)
+    with BrowserPanel(panel, poses=PoseFile(tmp_path / "poses.yaml", panel)) as face:
+        face.move("pose", [231.0, 2.0, 0.0])
+        assert moved(lambda: panel.pose[0] == pytest.approx(0.231))
+        save, go = (partial(face._worker.submit, "pose", job) for job in
+                    (face._save_pose, face._go_to_pose))  # fmt: skip
+        save()
+        assert moved(lambda: "a pose has a name" in face.text)
+        face._name.value = "tool change"
+        save()
+        assert moved(lambda: face._saved.value == "tool change")
+        face._worker.submit("home", face._go_home)
+        assert moved(lambda: panel.pose[0] == pytest.approx(0.225))
+        save()
+        assert moved(lambda: "press &#x27;Save as&#x27; again to replace it" in face.text)
+        go()
+        assert moved(lambda: panel.pose[0] == pytest.approx(0.231))
+        assert PoseFile(face._poses.path, panel).poses["tool change"][0] == pytest.approx(0.231)
+
+
+def test_only_the_last_of_what_is_asked_repeatedly_is_done() -> None:
+    begun, go, done = threading.Event(), threading.Event(), []
+    worker = Worker(lambda: None)
+    worker.submit("first", lambda: (begun.set(), go.wait(10.0)))
+    worker.start()
+    assert begun.wait(10.0)
+    for k in range(100):
+        worker.submit("drag", lambda k=k: done.append(k))
+    worker.submit("ended", lambda: done.append("ended"))
+    go.set()
+    assert moved(lambda: done == [99, "ended"])
+    worker.end()
+
+
+@pytest.mark.skipif(not BROWSER, reason="there is no browser")
+def test_the_robot_is_moved_in_the_page() -> None:
+    """By the mouse at its handle, by numbers, by buttons: in Chromium."""
     playwright = pytest.importorskip("playwright.sync_api")
-    said = []
-    with playwright.sync_playwright() as engine:
+    said: list[str] = []
+    panel = RPSPanel(MICRO)
+    panel.load(helix(MICRO, radius=4e-5, pitch=0.01, height=0.225))
+    with (
+        BrowserPanel(panel, title="micro") as served,
+        playwright.sync_playwright() as engine,
+    ):
+        served._writer.set_shadows(False)  # the processor draws
         browser = engine.chromium.launch(executable_path=_path(), args=list(ARGUMENTS))
-        page = browser.new_page(viewport={"width": 900, "height": 400})
+        page = browser.new_page(viewport={"width": 1000, "height": 460})
         page.on("console", lambda one: said.append(one.text) if one.type == "error" else None)
         page.goto(served.url)
         page.get_by_text("within all limits").wait_for(timeout=60_000)
         before = _settled(page)
-        # The first number box is the height's: as someone at the keyboard would.
-        box = page.locator("input[type=text], input[type=number]").first
+        # The arrow of the height, 10 mm up and then far beyond the slider.
+        x, y = _pixel(served, panel.handle.placement(panel.configuration)[:3, 3], page)
+        length = _pixel(served, [0.0, 0.0, panel.pose[0] + 0.01], page)[1] - y
+        page.mouse.move(x, y + 4.0 * length)
+        page.mouse.down()
+        page.mouse.move(x, y + 4.5 * length)
+        page.mouse.move(x, y + 5.0 * length)
+        page.mouse.up()
+        assert moved(lambda: panel.pose[0] > 0.23)
+        assert panel.pose[0] == pytest.approx(0.235, abs=1e-3)
+        np.testing.assert_array_equal(panel.pose[1:], 0.0)
+        # A number, as someone at the keyboard would; then one beyond the slider.
+        box = page.locator(f"[id='{served._sliders['pose'][0][1]._impl.uuid}']")
+        box = box.locator("xpath=..").locator("input[inputmode]").first
         box.fill("255")
         box.press("Enter")
         page.get_by_text("255.000 mm").first.wait_for(timeout=30_000)
         page.get_by_text("its limits are 200 to 250 mm").first.wait_for(timeout=30_000)
         after = _settled(page)
+        box.fill("300")
+        box.press("Tab")
+        page.get_by_text("height (mm): 300 is beyond its slider").wait_for(timeout=30_000)
+        page.wait_for_function("box => box.value == '255'", arg=box.element_handle())
+        assert panel.pose[0] == pytest.approx(0.255)
+        # The trajectory.
+        page.get_by_role("button", name="Play").click()
+        page.wait_for_function("document.body.textContent.match(/t = [1-9]/)", timeout=30_000)
+        page.get_by_role("button", name="Pause").click()
+        assert moved(lambda: not served.player.playing)
+        elapsed = served.player.time
+        page.get_by_text(f"t = {elapsed:.2f} s").wait_for(timeout=30_000)
+        x, *_ = panel._trajectory.sample([elapsed])
+        assert panel.pose == pytest.approx(x[0])
+        page.get_by_role("button", name="Home").click()
+        assert moved(lambda: panel.pose[0] == pytest.approx(0.225))
         browser.close()
-    assert served._panel.pose[0] == pytest.approx(0.255)  # type: ignore[attr-defined]
-    robot = (slice(None), slice(0, 550))  # left of the sliders
+    robot = (slice(None), slice(330, 630))  # between the columns
     assert np.abs(after[robot] - before[robot]).mean() > 0.5
     assert said == []
+
+
+def _pixel(served: BrowserPanel, point: Any, page: Any) -> tuple[float, float]:
+    """Return where a point of the world is on the page."""
+    canvas = page.locator("canvas[data-engine]").bounding_box()
+    (client,) = served._server.get_clients().values()
+    camera = client.camera
+    w, x, y, z = camera.wxyz
+    right, down, ahead = pin.Quaternion(w, x, y, z).matrix().T @ (np.array(point) - camera.position)
+    scale = canvas["height"] / 2.0 / np.tan(camera.fov / 2.0) / ahead
+    return (
+        canvas["x"] + canvas["width"] / 2.0 + scale * right,
+        canvas["y"] + canvas["height"] / 2.0 + scale * down,
+    )
 
 
 def test_without_the_packages_it_says_how_to_get_them(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -88,6 +88,7 @@ class BrowserPanel:
     ) -> None:
         self._panel, self._poses, self._history = panel, poses, History()
         self._shown: dict[str, list[float]] = {}
+        self._asked: dict[str, dict[int, float]] = {}
         self._beyond: dict[str, float] = {}
         self._red: frozenset[str] = frozenset()
         self._notice, self._replace = "", ""
@@ -97,7 +98,7 @@ class BrowserPanel:
         self._worker = Worker(self._due)
         self._server: Any
         self._server, self.url = guarded_server(port, self._refused)
-        self._writer = ViserWriter(self._server)
+        self._writer = ViserWriter(self._server, self._switched)
         try:
             self._build(title, layers, hidden)
             self._refresh()
@@ -151,8 +152,8 @@ class BrowserPanel:
             units = {one.unit for one in sliders}
             gui.add_html(texts.group(group, units))
             self._sliders[group] = [
-                (one, self._slider(group, one, value, short=len(units) == 1))
-                for one, value in zip(sliders, panel.values(group).tolist(), strict=True)
+                (one, self._slider(group, k, value, short=len(units) == 1))
+                for k, (one, value) in enumerate(zip(sliders, panel.values(group), strict=True))
             ]
         self._buttons("go to", {"Home": self._go_home, "Reset": self._reset})
         self._state = gui.add_html("")  # below the sliders, which it must not move
@@ -164,6 +165,7 @@ class BrowserPanel:
                 tick = gui.add_checkbox("handle", True, hint="arrows and rings that drag the frame")
                 tick.on_update(lambda event: self._gizmo.set_visible(event.target.value))
             self.view = self._view(layers, hidden)
+            self.view.updates_hidden = False
         self._gizmo: Any = None
         if panel.handle is not None:
             size = _HANDLE * self.view.scene.box.radius
@@ -195,8 +197,9 @@ class BrowserPanel:
             hidden=hidden,
         )
 
-    def _slider(self, group: str, one: Slider, value: float, *, short: bool) -> Any:
-        now = _shown(one, value)
+    def _slider(self, group: str, number: int, value: float, *, short: bool) -> Any:
+        one = self._panel.groups[group][number]
+        now = _shown(one, float(value))
         marks = [end for end in one.limits if one.low <= end <= one.high]
         handle = self._server.gui.add_slider(
             plain(one.label if short else f"{one.label}, {texts.UNITS[one.unit]}"),
@@ -210,9 +213,7 @@ class BrowserPanel:
             else None,
         )
         handle.precision = len(f"{one.step:.6f}".rstrip("0").partition(".")[2])
-        handle.on_update(
-            lambda _: self._worker.submit(("move", group), lambda: self._follow(group))
-        )
+        handle.on_update(lambda event: self._ask(group, number, float(event.target.value)))
         return handle
 
     def _buttons(self, label: str, jobs: dict[str, Callable[[], object]]) -> Any:
@@ -237,7 +238,7 @@ class BrowserPanel:
         )
         self._scrub.precision = 3
         self._scrub_shown = 0.0
-        self._scrub.on_update(lambda _: self._worker.submit("time", self._seek))
+        self._scrub.on_update(lambda event: self._ask_time(float(event.target.value)))
         speed = gui.add_dropdown("speed", [f"{one:g}" for one in SPEEDS], initial_value="1")
 
         def set_speed() -> None:
@@ -258,24 +259,26 @@ class BrowserPanel:
 
     # What a user does -----------------------------------------------------------------------------
 
+    def _ask(self, group: str, number: int, shown: float) -> None:
+        """Note where a slider is put, and follow it soon; not where it is put here."""
+        if shown != self._shown[group][number]:
+            self._asked.setdefault(group, {})[number] = shown
+            self._worker.submit(("move", group), lambda: self._follow(group))
+
     def _follow(self, group: str) -> None:
         """Follow the sliders of a group."""
         values, sliders = self._panel.values(group), self._sliders[group]
-        changed = [
-            k for k, (_, handle) in enumerate(sliders) if handle.value != self._shown[group][k]
-        ]
-        if not changed:  # set here, not by a user
-            return
-        for k in changed:
-            one, handle = sliders[k]
+        asked = self._asked.pop(group, {})
+        for number, shown in asked.items():
+            one, handle = sliders[number]
             typed = self._beyond.pop(handle._impl.uuid, None)
-            if typed is not None and _is_cut(handle, typed):  # by the page, when the box is left
+            if typed is not None and _is_cut(handle, shown, typed):
                 self._settle()
                 return
-            values[k] = handle.value / one.scale
+            values[number] = shown / one.scale
+            self._shown[group][number] = shown
         self._by_hand()
         followed = self._panel.move(group, values)
-        self._shown[group] = [float(handle.value) for _, handle in sliders]
         self._refresh(but=group)
         if followed:
             self._due_at.pop("settle", None)
@@ -312,6 +315,15 @@ class BrowserPanel:
     def _place_handle(self) -> None:
         if self._gizmo is not None:
             self._gizmo.place(self._panel.configuration)
+
+    def _switched(self, name: str, visible: bool) -> None:
+        """Show or hide a layer: told by viser's thread."""
+
+        def switch() -> None:
+            self.view.set_visible(name, visible)
+            self._draw()
+
+        self._worker.submit(("layer", name), switch)
 
     def _go_home(self) -> None:
         self._by_hand()
@@ -387,12 +399,15 @@ class BrowserPanel:
         self.player.play(playing)
         self._show_moment()
 
-    def _seek(self) -> None:
+    def _ask_time(self, elapsed: float) -> None:
+        """Go to a time soon; not where the clock is put here."""
+        if elapsed != self._scrub_shown:
+            self._worker.submit("time", lambda: self._seek(elapsed))
+
+    def _seek(self, elapsed: float) -> None:
         assert self.player is not None
-        if self._scrub.value == self._scrub_shown:
-            return
         self.player.play(False)
-        self.player.time = self._scrub_shown = float(self._scrub.value)
+        self.player.time = elapsed
         self._plot_recording()
         self._show_moment()
 
@@ -496,7 +511,7 @@ def _shown(one: Slider, value: float) -> float:
     return 0.0 if abs(shown) < 1e-6 * one.step else shown
 
 
-def _is_cut(handle: Any, typed: float) -> bool:
+def _is_cut(handle: Any, now: float, typed: float) -> bool:
     """Return whether a slider's value is what its page makes of a number beyond it."""
     end = handle.max if typed > handle.max else handle.min
-    return bool(handle.value == end and not f"{end:g}".startswith(f"{typed:g}"))
+    return bool(now == end and not f"{end:g}".startswith(f"{typed:g}"))

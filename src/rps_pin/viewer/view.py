@@ -76,6 +76,8 @@ class View:
         The robot on its stage.
     drawings : dict of str to DrawnLayer
         The layers, by the name of their node below ``/world/layers``.
+    updates_hidden : bool
+        Whether layers that are switched off follow the robot too, which a page may show by itself.
 
     Raises
     ------
@@ -94,7 +96,7 @@ class View:
         layers: Sequence[str | Layer] = (),
         hidden: Sequence[str | Layer] = (),
     ) -> None:
-        self.window = window
+        self.window, self.updates_hidden = window, True
         self.subject = displayed(what, visual)
         self.motion = motion_of(self.subject, motion)
         on, off = self._with_contents(layers_of(layers), layers_of(hidden))
@@ -235,6 +237,9 @@ class View:
         self.scene.display(state.q)
         self._update_layers(state, elapsed)
 
+    def _is_updated(self, name: str) -> bool:
+        return self.updates_hidden or self._visible.get(name, True)
+
     def _send_legend(self) -> None:
         entries = [drawn.legend for drawn in self.drawings.values()]
         self._writer.set_legend(entries, list(self._visible.values()))
@@ -243,11 +248,13 @@ class View:
         readings = {
             name: drawn.reading(state)
             for name, drawn in self.drawings.items()
-            if drawn.reading is not None
+            if drawn.reading is not None and self._is_updated(name)
         }
         if readings or elapsed is not None:
             self._writer.set_readings(elapsed, readings)
         for path, drawn in self._moving.items():
+            if not self._is_updated(path.rpartition("/")[2]):
+                continue
             for node, now in (drawn.update(state) if drawn.update else {}).items():
                 self._writer.place(f"{path}/{node}", now.placement)
                 if now.colour is not None:

@@ -55,6 +55,11 @@ class Charts:
             )
             self._charts.append(chart)
 
+    @property
+    def data(self) -> list[tuple[Array, ...]]:
+        """Times and curves of the three plots, as shown."""
+        return [chart.data for chart in self._charts]
+
     def show_recording(self, recording: Recording) -> None:
         """Plot a trajectory."""
         self._show(recording.time, recording.position, recording.force, recording.conditioning)

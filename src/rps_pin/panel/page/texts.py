@@ -13,11 +13,13 @@ _TEXT = "font-size: 85%; line-height: 1.35; margin: 0 0.8em 0.5em"
 UNITS = {"mm": "mm", "degrees": "°"}
 """As labels have them: a line of the page is short."""
 #: Number boxes are as wide as their numbers; names are not cut into letters; the canvas has the
-#: background of the exported page; and a mark is drawn over viser's plots.
+#: background of the exported page; a mark is drawn over viser's plots; and viser's note that there
+#: is no GPU, which covers the robot, is not shown.
 STYLE = """<style>
 .mantine-NumberInput-root {width: 4.6rem !important}
 .mantine-NumberInput-input {text-align: right; letter-spacing: 0 !important}
 div:has(> .mantine-Text-root > label) {width: 8.2em !important; padding-right: 0.3em}
+#webgl-software-rendering {display: none}
 canvas[data-engine] {background: linear-gradient(#DBE6F0, #FCFCFF)}
 .uplot .u-title {font-size: 12px; font-weight: 500; text-align: left; padding-left: 46px}
 .u-over::after {content: ""; position: absolute; top: 0; bottom: 0; left: var(--now, 100%);

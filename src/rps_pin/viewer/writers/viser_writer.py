@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -36,10 +37,13 @@ class ViserWriter:
     ----------
     server
         A ``viser.ViserServer``.
+    switched
+        Called, in a thread of viser's, with a layer's name and whether the page switches it on.
+        Default: it is shown or hidden, no more.
     """
 
-    def __init__(self, server: Any) -> None:
-        self._server = server
+    def __init__(self, server: Any, switched: Callable[[str, bool], object] | None = None) -> None:
+        self._server, self._switched = server, switched or self._switch
         self._nodes: dict[str, Any] = {}
         self._parts: dict[str, list[tuple[Any, Array]]] = {}
         self._scales: dict[str, Array] = {}
@@ -173,8 +177,7 @@ class ViserWriter:
         for entry, shown in zip(entries, visible, strict=True):
             if entry.name not in self._ticks:
                 tick = gui.add_checkbox(entry.name, shown, hint=entry.text)
-                path = f"{WORLD}/layers/{entry.name}"
-                tick.on_update(lambda event, path=path: self._switch(path, event.target.value))
+                tick.on_update(partial(self._ticked, entry.name))
                 self._ticks[entry.name] = tick
             self._ticks[entry.name].value = shown
         if self._legend is None:
@@ -187,8 +190,12 @@ class ViserWriter:
         self._readings = dict(readings)
         self._show_legend()
 
-    def _switch(self, path: str, visible: bool) -> None:
-        self.set_visible(path, visible)
+    def _ticked(self, name: str, event: Any) -> None:
+        if event.client is not None:  # by a page, not here
+            self._switched(name, event.target.value)
+
+    def _switch(self, name: str, visible: bool) -> None:
+        self.set_visible(f"{WORLD}/layers/{name}", visible)
         self._show_legend()
 
     def _show_legend(self) -> None:
