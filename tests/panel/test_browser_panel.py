@@ -103,7 +103,7 @@ def test_the_page_is_for_this_machine_only(served: BrowserPanel) -> None:
 
 
 def test_beyond_its_limits_the_robot_is_red_and_within_them_as_before(served: BrowserPanel) -> None:
-    scene, rods = served.view.scene, [f"leg_{leg}_rod" for leg in (1, 2, 3)]
+    scene = served.view.scene
     painted: dict[str, tuple[float, ...]] = {}
     paint = scene.writer.set_colour
     scene.writer.set_colour = lambda path, colour, opacity: (
@@ -115,9 +115,7 @@ def test_beyond_its_limits_the_robot_is_red_and_within_them_as_before(served: Br
         lambda: "leg 1: length would be 255 mm; its limits are 200 to 250 mm" in served.text
     )
     red = {path for path, (r, g, b) in painted.items() if r > 0.8 and max(g, b) < 0.2}
-    assert red
-    assert {path.split("/")[-2] for path in red} <= set(scene.paths)
-    assert all(rods[0] in path for path in red)
+    assert {path.split("/")[-2] for path in red} == {"leg_1_cylinder", "leg_1_rod"}
     served.move("lengths", [245.0, 225.0, 225.0])
     assert moved(lambda: "within all limits" in served.text)
     assert not {path for path, (r, g, b) in painted.items() if r > 0.8 and max(g, b) < 0.2}

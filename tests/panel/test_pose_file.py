@@ -29,17 +29,18 @@ def panel() -> RPSPanel:
     return RPSPanel(RPSRobot.from_preset("micro"))
 
 
-def test_poses_are_saved_and_come_back_exactly(panel: RPSPanel, tmp_path: Path) -> None:
+def test_poses_are_saved_and_come_back(panel: RPSPanel, tmp_path: Path) -> None:
     file = PoseFile(tmp_path / "poses.yaml", panel)
     assert file.poses == {}
     rng, names = np.random.default_rng(4), ["a b", "yes", "12", "ä: {x}", '"quoted" \\ #', "-", "y"]
-    saved = {name: rng.uniform(-1, 1, 3) for name in names}
+    saved = {name: rng.uniform(-1, 1, 3) * 10.0 ** rng.integers(-7, 1, 3) for name in names}
+    saved["small"] = np.array([1e-5, -1e-17, 0.22500000000000003])
     for name, values in saved.items():
         file.save(name, values)
     found = PoseFile(tmp_path / "poses.yaml", panel).poses
-    assert list(found) == names
-    for name, values in saved.items():
-        np.testing.assert_array_equal(found[name], values)
+    assert list(found) == [*names, "small"]
+    assert worst([found[name] - values for name, values in saved.items()]) < 1e-12
+    assert "small: {z: 1e-05, rx: 0.0, ry: 0.225}" in (tmp_path / "poses.yaml").read_text("utf-8")
 
 
 def test_what_was_written_by_hand_stays(panel: RPSPanel, tmp_path: Path) -> None:
@@ -105,4 +106,4 @@ def test_without_a_task_they_are_of_the_actuators(tmp_path: Path) -> None:
     panel = MechanismPanel(ClosedLoopModel.load(URDF / "gripper.yaml"))
     file = PoseFile(tmp_path / "poses.yaml", panel)
     file.save("open", panel.values(file.group))
-    np.testing.assert_array_equal(file.poses["open"], panel.values("joints"))
+    assert worst(file.poses["open"] - panel.values("joints")) < 1e-12

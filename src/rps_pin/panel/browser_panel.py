@@ -455,11 +455,18 @@ class BrowserPanel:
         """Show the robot."""
         panel = self._panel
         self.view.display(panel.configuration, panel.velocity, panel.acceleration)
-        for joint in panel.outside ^ self._red:
-            self.view.scene.set_joint_colour(joint, _RED if joint in panel.outside else None)
-        self._red = panel.outside
+        red = frozenset(one for joint in panel.outside for one in self._beside(joint))
+        for joint in red ^ self._red:
+            self.view.scene.set_joint_colour(joint, _RED if joint in red else None)
+        self._red = red
         if self._gizmo is not None:
             self._gizmo.place(panel.configuration)
+
+    def _beside(self, joint: str) -> list[str]:
+        """Return the joints that carry the links on both sides of a joint."""
+        model = self._panel.mechanism.model
+        index = model.getJointId(joint)
+        return [model.names[one] for one in (index, model.parents[index]) if one > 0]
 
     def _write(self) -> None:
         """Show the readings."""

@@ -25,6 +25,8 @@ from rps_pin.plain_text import plain
 from rps_pin.validation import real_vector
 
 LONGEST_NAME = 60
+_LEAST = 1e-12
+"""Rounding errors are zero in the file, m and rad."""
 _POSE: TypeAdapter[dict[str, float]] = TypeAdapter(dict[str, Finite])
 
 
@@ -101,9 +103,9 @@ class PoseFile:
         lines = self.path.read_text("utf-8").splitlines() if self.path.exists() else [_HEADING]
         if name in self.poses:
             lines = self._without(name, lines)
+        rounded = [0.0 if abs(value) < _LEAST else float(f"{value:.12g}") for value in row.tolist()]
         numbers = ", ".join(
-            f"{_quoted(one)}: {value!r}"
-            for one, value in zip(self._names, row.tolist(), strict=True)
+            f"{_quoted(one)}: {value!r}" for one, value in zip(self._names, rounded, strict=True)
         )
         lines.append(f"{_quoted(name)}: {{{numbers}}}")
         try:
