@@ -27,7 +27,7 @@ WATCH = """() => {
     let last = "";
     window.shown = 0;
     new MutationObserver(() => {
-        const found = document.body.textContent.match(/leg 1\\s*([0-9.]{7}) mm/);
+        const found = document.body.textContent.match(/leg 1\\s*([0-9.]{7})/);
         if (found && found[1] != last) { last = found[1]; window.shown += 1; }
     }).observe(document.body, {subtree: true, childList: true, characterData: true});
 }"""

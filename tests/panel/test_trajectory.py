@@ -10,6 +10,7 @@ import pytest
 from rps_pin import ClosedLoopModel, InputError, RPSPinError, RPSRobot, helix
 from rps_pin.panel import MechanismPanel, RPSPanel
 from rps_pin.panel.history import WINDOW, History
+from rps_pin.panel.page.charts import nice_range
 from rps_pin.panel.recording import Player
 from rps_pin.trajectories.point_to_point import point_to_point
 from tests.worst import worst
@@ -124,3 +125,20 @@ def test_the_history_keeps_the_last_seconds_and_draws_pauses_as_steps() -> None:
     assert (np.diff(time) > 0).all()
     assert rows[-2, 0] == 299.0
     assert time[-2] == pytest.approx(-0.02)
+
+
+@pytest.mark.parametrize(
+    ("values", "ends"),
+    [
+        ([213.0, 244.0], (210.0, 250.0)),
+        ([4.905, 4.905], (4.84, 4.96)),
+        ([0.0, 0.0], (-1.0, 1.0)),
+        ([np.nan, np.nan], (0.0, 1.0)),
+        ([-3.0, np.nan, 7.0], (-5.0, 10.0)),
+    ],
+)
+def test_axes_have_round_ends_around_what_is_plotted(values, ends) -> None:
+    low, high = nice_range(np.array(values))
+    assert (low, high) == pytest.approx(ends)
+    known = np.array(values)[np.isfinite(values)]
+    assert ((low <= known) & (known <= high)).all()

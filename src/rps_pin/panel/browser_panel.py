@@ -15,7 +15,7 @@ from rps_pin.errors import RPSPinError
 from rps_pin.panel.guarded_server import guarded_server, stop
 from rps_pin.panel.history import History
 from rps_pin.panel.page import texts
-from rps_pin.panel.page.charts import Charts
+from rps_pin.panel.page.charts import UNITS, Charts
 from rps_pin.panel.page.gizmo import Gizmo
 from rps_pin.panel.page.worker import Worker
 from rps_pin.panel.panel import Panel
@@ -202,12 +202,12 @@ class BrowserPanel:
         now = _shown(one, float(value))
         marks = [end for end in one.limits if one.low <= end <= one.high]
         handle = self._server.gui.add_slider(
-            plain(one.label if short else f"{one.label}, {texts.UNITS[one.unit]}"),
+            plain(one.label if short else f"{one.label}, {UNITS[one.unit]}"),
             min=min(one.low, now),
             max=max(one.high, now),
             step=one.step,
             initial_value=now,
-            marks=[(end, f"{end:.6g}") for end in marks or (one.low, one.high)],
+            marks=[(end, f"{end:.4g}") for end in marks or (one.low, one.high)],
             hint=f"limits: {one.limits[0]:.6g} to {one.limits[1]:.6g} {one.unit}"
             if marks
             else None,

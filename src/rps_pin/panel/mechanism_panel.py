@@ -125,20 +125,27 @@ class MechanismPanel(Panel):
 
     def _task_slider(self, number: int) -> Slider:
         assert self.task is not None and self._x is not None
-        here, turns = float(self._x[number]), self.task.angular[number]
+        name, turns = self.task.coordinates[number], self.task.angular[number]
+        if self.task.frame is None:
+            model = self.mechanism.model
+            return self._joint_slider(name, turns, model.joints[model.getJointId(name)].idx_q)
+        here = float(self._x[number])
         reach = _TURN if turns else self.task.characteristic_length
-        return slider(self.task.coordinates[number], turns, here - reach, here + reach)
+        return slider(name, turns, here - reach, here + reach)
 
     def _slider(self, number: int) -> Slider:
-        one, model = self.actuators[number], self.mechanism.model
-        index, turns = self._actuated[number], one.unit == "degrees"
-        here = float(self._q[index])
+        one = self.actuators[number]
+        return self._joint_slider(one.name, one.unit == "degrees", self._actuated[number])
+
+    def _joint_slider(self, name: str, turns: bool, index: int) -> Slider:
+        """Return the slider of a joint's coordinate in q."""
+        model, here = self.mechanism.model, float(self._q[index])
         low, high = float(model.lowerPositionLimit[index]), float(model.upperPositionLimit[index])
         if not high - low < _WIDEST:  # no limits
             ends = (-math.pi, math.pi) if turns else (here - 1.0, here + 1.0)
-            return slider(one.name, turns, *ends)
+            return slider(name, turns, *ends)
         room = _ROOM * (high - low)
-        return slider(one.name, turns, low - room, high + room, (low, high))
+        return slider(name, turns, low - room, high + room, (low, high))
 
     def _read(self, path: str | os.PathLike[str]) -> Trajectory:
         from rps_pin.task.trajectory_file import load_task_trajectory  # noqa: PLC0415

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,12 @@ from rps_pin.arrays import Array
 from rps_pin.panel.history import WINDOW, History
 from rps_pin.panel.panel import Panel
 from rps_pin.panel.recording import Recording
+from rps_pin.viewer.scene.stage import round_number
 
 COLOURS = ("#D55E00", "#009E73", "#0072B2", "#CC79A7", "#E69F00", "#56B4E9", "#777777", "#000000")
 """Of the actuators, in order, repeated; of a 3-RPS those that its legs have."""
+UNITS = {"mm": "mm", "degrees": "°"}
+"""As labels have them: a line of the page is short."""
 _HEIGHT = 120
 _FONT = "11px sans-serif"
 
@@ -30,7 +34,7 @@ class Charts:
 
     def __init__(self, gui: Any, panel: Panel) -> None:
         self._scales = np.array([one.scale for one in panel.actuators])
-        positions = {one.unit: None for one in panel.actuators}
+        positions = {UNITS.get(one.unit, one.unit): None for one in panel.actuators}
         forces = {one.force_unit: None for one in panel.actuators}
         colours = [COLOURS[k % len(COLOURS)] for k in range(len(panel.actuators))]
         nothing = np.array([-WINDOW, 0.0])
@@ -46,7 +50,7 @@ class Charts:
                 (nothing, *[np.full(2, np.nan)] * count),
                 ({}, *(series if not last else [_line("#333333")])),
                 title=title,
-                scales={"x": {"time": False}},
+                scales=_scales(0.0, 1.0),
                 cursor={"drag": {"x": False, "y": False}},
                 axes=(_axis(28) if last else {"show": False}, _axis(46)),
                 legend={"show": False},
@@ -72,10 +76,37 @@ class Charts:
         self._show(time, rows[:, :actuators], rows[:, actuators:-1], rows[:, -1])
 
     def _show(self, time: Array, position: Array, force: Array, conditioning: Array) -> None:
+        *both, _ = self._charts  # the conditioning is always from 0 to 1
+        for chart, rows in zip(both, (position * self._scales, force), strict=True):
+            scales = _scales(*nice_range(rows))
+            if chart.scales != scales:
+                chart.scales = scales
         for chart, rows in zip(
             self._charts, (position * self._scales, force, conditioning[:, None]), strict=True
         ):
             chart.data = (time.copy(), *(np.ascontiguousarray(column) for column in rows.T))
+
+
+def nice_range(values: Array) -> tuple[float, float]:
+    """Return round ends of an axis for numbers, some of which may be NaN.
+
+    At least a fiftieth of the numbers wide, so that rounding errors are not all that is seen.
+    """
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return 0.0, 1.0
+    low, high = float(known.min()), float(known.max())
+    span = max(high - low, 0.02 * max(abs(low), abs(high))) or 1.0
+    step, middle = round_number(span / 2.0), (low + high) / 2.0
+    return (
+        round(step * math.floor((middle - 0.55 * span) / step), 12),
+        round(step * math.ceil((middle + 0.55 * span) / step), 12),
+    )
+
+
+def _scales(low: float, high: float) -> dict[str, Any]:
+    """Return the scales of a plot's axes."""
+    return {"x": {"time": False}, "y": {"range": (low, high)}}
 
 
 def _line(colour: str) -> dict[str, Any]:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import html
 import math
 
-from rps_pin.panel.page.charts import COLOURS
+from rps_pin.panel.page.charts import COLOURS, UNITS
 from rps_pin.panel.panel import Panel
 from rps_pin.plain_text import plain
 
 _TEXT = "font-size: 85%; line-height: 1.35; margin: 0 0.8em 0.5em"
-UNITS = {"mm": "mm", "degrees": "°"}
-"""As labels have them: a line of the page is short."""
 #: Number boxes are as wide as their numbers; names are not cut into letters; the canvas has the
 #: background of the exported page; a mark is drawn over viser's plots; and viser's note that there
 #: is no GPU, which covers the robot, is not shown.
@@ -31,6 +29,8 @@ canvas[data-engine] {background: linear-gradient(#DBE6F0, #FCFCFF)}
 .rps-table th {font-weight: 500; color: #666666}
 .rps-remarks {font-size: 92%}
 .rps-remarks td:last-child {text-align: left}
+.rps-table td {white-space: nowrap}
+.rps-remarks td {white-space: normal}
 .rps-swatch {display: inline-block; width: 0.7em; height: 0.7em; margin-right: 0.5em}
 </style>"""
 
@@ -61,19 +61,33 @@ def state(panel: Panel, notice: str = "") -> str:
 
 def actuators(panel: Panel) -> str:
     """Return a table of positions and forces, with the colours of the plots."""
+    units = [UNITS.get(one.unit, one.unit) for one in panel.actuators]
+    forces = [one.force_unit for one in panel.actuators]
     rows = []
     for k, one in enumerate(panel.actuators):
         colour = COLOURS[k % len(COLOURS)]
-        position = f"{one.scale * panel.position[k] + 0.0:.3f} {one.unit}"
+        position = f"{one.scale * panel.position[k] + 0.0:.3f}{_beside(units, k)}"
         force = panel.forces[k]
-        held = f"{force + 0.0:.3f} {one.force_unit}" if math.isfinite(force) else "-"
+        held = f"{force + 0.0:.3f}{_beside(forces, k)}" if math.isfinite(force) else "-"
         red = ' style="color: #B00000"' if panel.mechanism.actuated[k] in panel.outside else ""
         rows.append(
             f'<tr{red}><td><span class="rps-swatch" style="background: {colour}"></span>'
             f"{escaped(one.name)}</td><td>{position}</td><td>{held}</td></tr>"
         )
-    head = "<tr><th>actuator</th><th>position</th><th>force</th></tr>"
-    return f'<div style="{_TEXT}"><table class="rps-table">{head}{"".join(rows)}</table></div>'
+    heads = ["actuator", f"position{_above(units)}", f"force{_above(forces)}"]
+    head = "".join(f"<th>{one}</th>" for one in heads)
+    table = f'<table class="rps-table"><tr>{head}</tr>{"".join(rows)}</table>'
+    return f'<div style="{_TEXT}">{table}</div>'
+
+
+def _above(units: list[str]) -> str:
+    """Return the unit of all numbers of a column, for its head."""
+    return f", {units[0]}" if len(set(units)) == 1 else ""
+
+
+def _beside(units: list[str], k: int) -> str:
+    """Return the unit of one number of a column where they differ."""
+    return "" if len(set(units)) == 1 else f" {units[k]}"
 
 
 def remarks(panel: Panel) -> str:

@@ -141,12 +141,18 @@ class Scene:
     def set_joint_colour(self, joint: str, colour: Sequence[float] | None) -> None:
         """Colour all links that a joint carries (red, green, blue, 0 to 1); None: as they were."""
         index = self.model.getJointId(joint)
-        for link in (one for one in self._links if one.joint == index):
-            for part in link.parts():
-                own, opacity = part.material.colour, part.material.opacity
-                shares = [((own >> shift) & 0xFF) / 255 for shift in (16, 8, 0)]
-                path = f"{ROBOT}/{part.node}/{part.name}"
-                self.writer.set_colour(path, shares if colour is None else colour, opacity)
+        for part in (part for link in self._links if link.joint == index for part in link.parts()):
+            path, own = f"{ROBOT}/{part.node}/{part.name}", part.material
+            shares = colour or [((own.colour >> shift) & 0xFF) / 255 for shift in (16, 8, 0)]
+            if getattr(part.shape, "colours", None) is None:
+                self.writer.set_colour(path, shares, own.opacity)
+            elif colour is None:
+                self.writer.add_part(path, part)
+            else:  # of its vertices, which have colours of their own
+                red, green, blue = (round(255 * share) for share in shares)
+                plain = own._replace(colour=red << 16 | green << 8 | blue)
+                shape = part.shape._replace(colours=None)  # type: ignore[call-arg]
+                self.writer.add_part(path, part._replace(shape=shape, material=plain))
 
     def _place(self, q: Array, links: Sequence[Link]) -> None:
         pin.forwardKinematics(self.model, self._data, q)
