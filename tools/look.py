@@ -101,6 +101,7 @@ class Walk:
         self.steps.append(step)
         ended = "FAILED" if step.failed else "ok"
         number = f"[{len(self.steps)}]"
+        write_page(self._place, self.steps, [], [])  # what is there if the walk is ended
         print(f"{number:5}{ended:7}{step.seconds:6.1f} s  {len(step.pictures):2} pictures  {line}")
         return step
 
