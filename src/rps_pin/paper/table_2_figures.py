@@ -23,7 +23,7 @@ def plot_approach(found: Approach) -> Figure:
     axes = _axes(_DISTANCE, _FORCE)
     axes.loglog(found.distance, found.force, ".", color=LEG_COLOURS[0], label="computed")
     line = found.force[-1] * found.distance[-1] / found.distance
-    axes.loglog(found.distance, line, "--", color=BLACK, lw=1, label="slope -1")
+    axes.loglog(found.distance, line, "--", color=BLACK, lw=1, label="slope $-1$")
     return _with_legend(axes)
 
 

@@ -59,7 +59,8 @@ def plot_assembly_modes(
         axes = axes_in_space(figure, place=(rows, columns, k + 1))
         _draw_robot(axes, base, tips[k])
         degrees = ", ".join(f"{angle:.0f}" for angle in np.rad2deg(modes.angle[k]))
-        axes.set_title(f"{k + 1}: $\\phi_i$ = {degrees}°")
+        minus = degrees.replace("-", "\N{MINUS SIGN}")
+        axes.set_title(f"{k + 1}: $\\phi_i$ = {minus}°")
         middle = (ends[k].min(axis=0) + ends[k].max(axis=0)) / 2
         low, high = middle - span / 2, middle + span / 2
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
