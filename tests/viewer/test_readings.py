@@ -168,6 +168,7 @@ def test_long_arrows_widen_the_picture_not_the_robot(robot):
         ("open", "reactions", "the mechanism has no loop closures"),
         ("open", "singularity", "the mechanism has no closures"),
         ("open", "trail", r"it needs a frame: Trail\(frame=...\)"),
+        ("undriven", "singularity", "the conditioning needs an actuator for each motion: 0 of 1"),
         ("undriven", "forces", "no joint is actuated"),
         ("weightless", "forces", "no link has a mass"),
         ("weightless", "reactions", "no link has a mass"),

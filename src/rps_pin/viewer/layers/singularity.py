@@ -34,8 +34,16 @@ class Singularity(RobotSizedLayer):
     worst: float = 1e-3
 
     def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
-        """Return whether there are no closures; see `Layer`."""
-        return "" if subject.mechanism.closures else "the mechanism has no closures"
+        """Return whether there are no closures, or too few actuators; see `Layer`."""
+        mechanism = subject.mechanism
+        if not mechanism.closures:
+            return "the mechanism has no closures"
+        found = mechanism.describe(motion.configurations[0])
+        motions = found.mobility - sum(one.size for one in found.idle)
+        if found.actuated_velocities < motions:
+            driven = found.actuated_velocities
+            return f"the conditioning needs an actuator for each motion: {driven} of {motions}"
+        return ""
 
     def draw(self, context: LayerContext) -> DrawnLayer:
         """Return the ring; see `Layer`."""
