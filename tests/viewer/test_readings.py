@@ -160,14 +160,14 @@ def test_long_arrows_widen_the_picture_not_the_robot(robot):
 @pytest.mark.parametrize(
     ("name", "layer", "missing"),
     [
-        ("stewart", "trail", "the robot is at rest: the path of 'platform' needs a motion"),
+        ("stewart", "trail", "the robot is at rest: a path needs a motion"),
         ("stewart", "workspace", "only a 3-RPS has one"),
         ("stewart", "ghosts", r"give the configurations, Ghosts\(at=configurations\)"),
         ("four_bar", "limits", "no joint has position limits"),
         ("open", "closures", "the mechanism has no closures"),
         ("open", "reactions", "the mechanism has no loop closures"),
         ("open", "singularity", "the mechanism has no closures"),
-        ("open", "trail", r"it needs a frame: Trail\(frame=...\)"),
+        ("open", "trail", "the robot is at rest: a path needs a motion"),
         ("undriven", "singularity", "the conditioning needs an actuator for each motion: 0 of 1"),
         ("undriven", "forces", "no joint is actuated"),
         ("weightless", "forces", "no link has a mass"),
@@ -200,6 +200,9 @@ def test_a_trail_is_offered_for_what_moves_alone(robot, path):
     assert "trail" not in fitting_layers(robot)
     with pytest.raises(InputError, match="the origin of 'base' does not move"):
         shown(robot, path, layers=[Trail(frame="base")])
+    arm = ClosedLoopModel.load(URDF / "four_bar.yaml").without_closures(["knee"])
+    with pytest.raises(InputError, match=r"it needs a frame: Trail\(frame=...\)"):
+        shown(arm, Motion(arm.model, [0.0, 1.0], [arm.home, arm.home]), layers=["trail"])
     at = robot.state([0.4, 0.0, 0.0], np.zeros(3), np.zeros(3))[0]
     view = View(Recorder(), robot, path, layers=[Ghosts(at=at)])
     assert list(view.drawings) == ["ghosts"]

@@ -94,6 +94,13 @@ function watchLayers(viewer) {
     if (value.readings) showReadings(value.readings);
     if (value.time !== null && value.time !== undefined) showClock(value.time);
   };
+  const setObject = viewer.set_object.bind(viewer);
+  viewer.set_object = (path, object) => {
+    const material = object.material;
+    // Drawn where something else is in front of it: three.js's GreaterDepth.
+    if (material && material.userData.through) material.depthFunc = 6;
+    setObject(path, object);
+  };
   const render = viewer.render.bind(viewer);
   viewer.render = () => {
     const { duration, actions } = viewer.animator;

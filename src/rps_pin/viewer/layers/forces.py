@@ -38,6 +38,8 @@ _UNSEEN_GAP = 1e-2
 _LONGEST = 0.7
 """Length of the longest arrow, at most, in radii of the picture."""
 _MOST_STATES = 50
+_STOUT = 1.7
+"""Thickness of reactions: they are seen around an actuator's force along the same line."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +130,8 @@ class Reactions(RobotSizedLayer):
 
         units = {node_name(one.name): "N" for one in closures}
         title = LegendEntry("reactions", "forces in the closed joints", css(BLACK))
-        return _arrows(title, BLACK, context, units, vectors, {"N": self.newtons_per_metre})
+        scales = {"N": self.newtons_per_metre}
+        return _arrows(title, BLACK, context, units, vectors, scales, _STOUT)
 
 
 def _without_masses(subject: DisplayedMechanism, known: Array | None) -> str:
@@ -144,6 +147,7 @@ def _arrows(
     units: Mapping[str, str],
     vectors_in: Callable[[MotionState], Vectors],
     scales: Mapping[str, float | None],
+    stout: float = 1.0,
 ) -> DrawnLayer:
     """Return a layer of arrows.
 
@@ -160,6 +164,8 @@ def _arrows(
         raises an error of forces that are not determined.
     scales
         By unit, the force or moment of an arrow of 1 m; None for a round number.
+    stout
+        Thickness of the arrows, in that of others.
     """
     motion = context.motion
     for given in scales.values():
@@ -178,7 +184,7 @@ def _arrows(
             greatest[units[node]] = max(greatest[units[node]], float(np.linalg.norm(vector)))
     parts: list[Part] = []
     for node, unit in units.items():
-        parts += (arrow if unit == "N" else double_arrow)(node, colour)
+        parts += (arrow if unit == "N" else double_arrow)(node, colour, stout)
     hidden = translated(context.box.centre)
     hidden[:3, :3] *= SMALLEST
 

@@ -12,25 +12,47 @@ SMALLEST = 1e-6
 
 _SHAFT, _HEAD, _HEAD_LENGTH = 0.028, 0.07, 0.22
 """Radii of an arrow's shaft and head, and the head's length, of an arrow of length 1."""
+_FAINT = 0.25
+"""Opacity of what is seen through the robot."""
 
 
-def arrow(node: str, colour: int) -> list[Part]:
-    """Return an arrow from the node's origin to (0, 0, 1)."""
-    length = 1.0 - _HEAD_LENGTH
-    shaft = Cylinder(length, _SHAFT, _SHAFT)
-    return [
-        Part(node, "shaft", shaft, Material(colour), _above(length / 2)),
-        _head(node, "head", colour, 1.0 - _HEAD_LENGTH / 2),
-    ]
+def arrow(node: str, colour: int, stout: float = 1.0) -> list[Part]:
+    """Return an arrow from the node's origin to (0, 0, 1); it shows faintly through what hides it.
+
+    Arrows of joints often begin within the links. Of two arrows along one line the stouter one is
+    around the other.
+    """
+    length, radius = 1.0 - _HEAD_LENGTH, stout * _SHAFT
+    shaft = Cylinder(length, radius, radius)
+    return _also_through(
+        [
+            Part(node, "shaft", shaft, Material(colour), _above(length / 2)),
+            _head(node, "head", colour, 1.0 - _HEAD_LENGTH / 2, stout),
+        ]
+    )
 
 
-def double_arrow(node: str, colour: int) -> list[Part]:
+def double_arrow(node: str, colour: int, stout: float = 1.0) -> list[Part]:
     """Return an arrow with two heads, as moments are drawn."""
-    return [*arrow(node, colour), _head(node, "second_head", colour, 1.0 - 1.3 * _HEAD_LENGTH)]
+    second = _head(node, "second_head", colour, 1.0 - 1.3 * _HEAD_LENGTH, stout)
+    return [*arrow(node, colour, stout), *_also_through([second])]
 
 
-def _head(node: str, name: str, colour: int, height: float) -> Part:
-    return Part(node, name, Cylinder(_HEAD_LENGTH, _HEAD, 0.0), Material(colour), _above(height))
+def _head(node: str, name: str, colour: int, height: float, stout: float) -> Part:
+    cone = Cylinder(_HEAD_LENGTH, stout * _HEAD, 0.0)
+    return Part(node, name, cone, Material(colour), _above(height))
+
+
+def _also_through(parts: list[Part]) -> list[Part]:
+    """Return parts, and faint copies of them that are drawn where something hides them."""
+    faint = [
+        part._replace(
+            name=f"{part.name}_through",
+            material=part.material._replace(opacity=_FAINT, through=True),
+        )
+        for part in parts
+    ]
+    return [*parts, *faint]
 
 
 def axes(node: str, length: float) -> list[Part]:

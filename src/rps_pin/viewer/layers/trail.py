@@ -53,11 +53,11 @@ class Trail(RobotSizedLayer):
         """Return whether the frame is unknown or stands still; see `Layer`."""
         base.check_magnification(self.factor, "trail")
         name = self.frame or _default_frame(subject)
-        if name is None:
-            return "it needs a frame: Trail(frame=...)"
-        position = _position(subject.model, name)
+        position = None if name is None else _position(subject.model, name)
         if motion.duration == 0.0:
-            return f"the robot is at rest: the path of {name!r} needs a motion"
+            return "the robot is at rest: a path needs a motion"
+        if position is None:
+            return "it needs a frame: Trail(frame=...)"
         size = float(np.linalg.norm(np.ptp(_points(position, motion), axis=0)))
         length = subject.mechanism.characteristic_length
         return "" if size > _STILL * length else f"the origin of {name!r} does not move"

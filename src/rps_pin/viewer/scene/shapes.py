@@ -77,6 +77,8 @@ class Material(NamedTuple):
     """Whether each triangle has one shade; else the surface looks rounded."""
     on_top: bool = False
     """Whether it is drawn over everything else, where the front end can."""
+    through: bool = False
+    """Whether it is drawn only where something else hides it, where the front end can."""
 
 
 class Part(NamedTuple):

@@ -189,6 +189,8 @@ def _object(part: Part) -> Any:
     options: dict[str, Any] = {"depthWrite": False} if see_through else {}
     if material.on_top:
         options["depthTest"] = False
+    if material.through:
+        options["userData"] = {"through": True}  # for the page: three.js does not load depthFunc
     surface = mg.MeshPhongMaterial(
         color=material.colour,
         opacity=material.opacity,

@@ -1,8 +1,8 @@
 """viser as a front end: a scene in viser's page.
 
 Three parts of the description are left to Meshcat: reflections, and shadows of the robot on itself;
-the background's colours, which the page has; and drawing over everything else (`Material.on_top`),
-which viser has not. Motions are played by `View.play`.
+the background's colours, which the page has; and drawing over everything else, or through it
+(`Material.on_top`, `Material.through`), which viser has not. Motions are played by `View.play`.
 """
 
 from __future__ import annotations
