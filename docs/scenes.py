@@ -20,7 +20,6 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from rps_pin import ClosedLoopModel, RPSRobot
-from rps_pin.closed_loop.visuals import visual_model
 from rps_pin.trajectories import circle, spline
 from rps_pin.viewer import Motion, save_html
 
@@ -100,15 +99,15 @@ def micro(page: Path) -> None:
 
 def tour(name: str, page: Path) -> None:
     """Write a robot on its way through the poses of its tour."""
-    mechanism, visual = loaded(name)
+    mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
     home = mechanism.task.home
     path = spline([home, *TOURS[name], home], duration=SECONDS)
-    save_html(page, mechanism, path, visual=visual, layers=["trail"], frame_rate=FRAME_RATE)
+    save_html(page, mechanism, path, layers=["trail"], frame_rate=FRAME_RATE)
 
 
 def stroke(name: str, page: Path) -> None:
     """Write a mechanism one joint of which moves there and back, or once around."""
-    mechanism, visual = loaded(name)
+    mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
     joint, stroke = STROKES[name]
     times = np.linspace(0.0, SECONDS, 81)
     back = 0.5 - 0.5 * np.cos(2.0 * np.pi * times / SECONDS)
@@ -118,13 +117,7 @@ def stroke(name: str, page: Path) -> None:
     for part in share[1:]:
         q.append(mechanism.complete({joint: start + stroke * part}, q[-1]))
     motion = Motion(mechanism.model, times, np.array(q))
-    save_html(page, mechanism, motion, visual=visual, frame_rate=FRAME_RATE)
-
-
-def loaded(name: str) -> tuple[ClosedLoopModel, Any]:
-    """Return a mechanism of the package with its shapes."""
-    mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
-    return mechanism, visual_model(URDF / f"{name}.yaml", mechanism.model)
+    save_html(page, mechanism, motion, frame_rate=FRAME_RATE)
 
 
 SCENES: dict[str, Callable[[Path], None]] = {
