@@ -22,6 +22,8 @@ from rps_pin.rps import ActuatorLimits, Payload, force_causes, size_trajectory, 
 from rps_pin.rps.dynamics.motion_run import run_motion
 from rps_pin.rps.workspace import leg_grid, pose_grid, workspace
 from rps_pin.task import size_trajectory as size_of_task
+from rps_pin.task.workspace import task_grid
+from rps_pin.task.workspace import workspace as workspace_of_task
 from rps_pin.trajectories import circle, point_to_point
 
 sokolov = RPSRobot.from_preset("sokolov")
@@ -141,6 +143,21 @@ def _plot_reasons() -> Figure:
 @shown("Extent of the workspace over the base radius, with the paper's value")
 def _plot_comparison() -> Figure:
     return plots.plot_comparison(paper_comparison(points=11))
+
+
+@shown("A Delta's workspace in a plane: conditioning, and what puts other points out")
+def _plot_map() -> Figure:
+    delta = ClosedLoopModel.load("urdf/delta.yaml").task.compile()
+    over = {"x": np.linspace(-0.5, 0.5, 101), "z": np.linspace(-0.85, -0.2, 66)}
+    return plots.plot_map(workspace_of_task(delta, task_grid(delta, over)))
+
+
+@shown("Slices of a Stewart platform's workspace at one orientation")
+def _plot_slices() -> Figure:
+    stewart = ClosedLoopModel.load("urdf/stewart.yaml").task.compile()
+    sides = np.linspace(-0.45, 0.45, 46)
+    over = {"x": sides, "y": sides, "z": np.linspace(0.3, 0.95, 40)}
+    return plots.plot_slices(workspace_of_task(stewart, task_grid(stewart, over)))
 
 
 @shown("Distance to a singularity over the tilt")

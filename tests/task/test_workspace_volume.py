@@ -10,21 +10,11 @@ import pytest
 
 from rps_pin import InputError
 from rps_pin.arrays import Array
-from rps_pin.task.workspace import TaskFields, TaskGrid, TaskWorkspace, task_grid, volume, workspace
+from rps_pin.task.workspace import task_grid, volume, workspace
 from tests.task.robots import compiled
-from tests.task.workspaces import conditioning, delta_arms, five_bar, stewart_legs
+from tests.task.workspaces import conditioning, delta_arms, five_bar, of_body, stewart_legs
 
 COUNT = 100_000
-
-
-def of_body(axes: tuple[Array, ...], inside) -> TaskWorkspace:
-    """A workspace whose points inside are those of a body."""
-    names = ("x", "y", "z", "rx")[: len(axes)]
-    angular = tuple(name == "rx" for name in names)
-    grid = TaskGrid(names, angular, names, axes, np.full(len(axes), np.nan))
-    flags = (~inside(grid.points())).astype(np.uint64)
-    fields = TaskFields(flags, *(np.zeros(grid.shape) for _ in range(6)))
-    return TaskWorkspace("body", (), grid, np.zeros(len(axes)), 0.0, ("outside",), fields)
 
 
 def random_axis(rng: np.random.Generator, count: int) -> Array:

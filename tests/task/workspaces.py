@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rps_pin.arrays import Array, Bools
+from rps_pin.task.workspace import TaskFields, TaskGrid, TaskWorkspace
 from tests.reference import delta, stewart
 
 #: The five-bar: bases, arms and forearms.
@@ -94,3 +95,13 @@ def conditioning(gain: Array, length: float, angular: bool = True) -> tuple[Arra
     values = np.linalg.svd(scaled, compute_uv=False)
     with np.errstate(invalid="ignore"):
         return values[:, -1] / values[:, 0], np.sign(np.linalg.det(scaled))
+
+
+def of_body(axes: tuple[Array, ...], inside) -> TaskWorkspace:
+    """A workspace whose points inside are those of a body."""
+    names = ("x", "y", "z", "rx")[: len(axes)]
+    angular = tuple(name == "rx" for name in names)
+    grid = TaskGrid(names, angular, names, axes, np.full(len(axes), np.nan))
+    flags = (~inside(grid.points())).astype(np.uint64)
+    fields = TaskFields(flags, *(np.zeros(grid.shape) for _ in range(6)))
+    return TaskWorkspace("body", (), grid, np.zeros(len(axes)), 0.0, ("outside",), fields)

@@ -1,4 +1,4 @@
-"""``rps-pin workspace``: the workspace of a 3-RPS, as in the paper's Section 3."""
+"""``rps-pin workspace``: that of a 3-RPS, as in the paper's Section 3, or of any task."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ import typer
 from rich.table import Table
 
 from rps_pin.cli import console as common
+from rps_pin.cli import task_workspace as of_tasks
 from rps_pin.cli.degrees import DegreesOption
+from rps_pin.cli.given_options import refuse
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
-from rps_pin.cli.task_options import in_unit, unit_of, units
+from rps_pin.cli.task_options import MechanismOption, in_unit, unit_of, units
 from rps_pin.errors import InputError
 from rps_pin.paper import PaperComparison, paper_comparison
 from rps_pin.rps import workspace as space
 from rps_pin.rps.robot import RPSRobot
+from rps_pin.task.workspace.evaluate import MIN_CONDITIONING
 
 #: Lengths per leg of the surfaces in the figures.
 _DRAWN_POINTS = 18
@@ -31,16 +34,22 @@ _FIGURES = (
 
 
 def workspace_command(
+    context: typer.Context,
     robot: common.RobotOption = "micro",
     points: Annotated[
         int, typer.Option(help="Lengths per leg; 51 are the paper's 1 mm steps over 50 mm.")
     ] = 51,
     degrees: DegreesOption = False,
+    mechanism: MechanismOption = None,
+    over: of_tasks.OverOption = None,
+    held: of_tasks.HeldOption = None,
+    min_conditioning: of_tasks.MinConditioningOption = MIN_CONDITIONING,
+    holding: of_tasks.HoldingOption = False,
     output: common.FolderOption = Path("workspace"),
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
-    """Compute the workspace of a 3-RPS by discretised leg lengths, as the paper does.
+    """Compute the workspace of a 3-RPS by discretised leg lengths, or of a mechanism's task.
 
     Every triple of leg lengths on the grid is solved by direct kinematics, in the assembly mode
     above the base, and checked against the robot's limits. Output: the points with their fields
@@ -48,10 +57,35 @@ def workspace_command(
     6. For the paper's robot, **micro**, the paper's statements are compared with the results for
     several base radii g, which the paper does not give.
 
+    With **--mechanism**, the workspace of a mechanism's task over a grid of its coordinates, in the
+    assembly mode of home: how many points each limit, singularity or end of the mode puts out, its
+    volume with an estimate of the error, **workspace.h5**, a map or slices, and over three
+    coordinates the boundary as a mesh (**boundary.stl**).
+
     Exit status: 0 done; 1 an error; 2 wrong usage.
 
-    Example: `rps-pin workspace --points 101 -o results`
+    Examples:
+
+    - `rps-pin workspace --points 101 -o results`
+
+    - `rps-pin workspace -m delta --over x=-0.5:0.5:41 --over z=-0.8:-0.2:41 -o map`
     """
+    if mechanism is not None:
+        refuse(context, "it does not go with a mechanism", "robot", "points")
+        of_tasks.workspace_of_task(
+            mechanism,
+            over or (),
+            held or (),
+            min_conditioning,
+            holding,
+            degrees,
+            output,
+            overwrite,
+            as_json,
+        )
+        return
+    names = "over", "held", "min_conditioning", "holding"
+    refuse(context, "this option needs a --mechanism", *names)
     machine = common.load_robot(robot)
     parameters = machine.parameters
     drawn = _FIGURES + ("base_radius",) * (parameters.name == "micro")

@@ -20,6 +20,7 @@ from rps_pin.plots.style import (
     save_figure,
     styled,
 )
+from rps_pin.plots.task_workspace import plot_map, plot_slices
 from rps_pin.plots.volumes import plot_effective, plot_space, plot_theoretical
 from rps_pin.plots.workspace import plot_comparison, plot_reasons, plot_views
 
@@ -39,10 +40,12 @@ __all__ = [
     "plot_length_phase",
     "plot_lengths",
     "plot_loop_forces",
+    "plot_map",
     "plot_path",
     "plot_reasons",
     "plot_simulation",
     "plot_sizing",
+    "plot_slices",
     "plot_space",
     "plot_theoretical",
     "plot_tilt_conditioning",

@@ -13,7 +13,6 @@ from rps_pin.rps.workspace.evaluate import Fields
 from rps_pin.rps.workspace.geometry import (
     Volume,
     boundary,
-    save_mesh,
     theoretical_cylinder,
     volume,
 )
@@ -23,6 +22,7 @@ from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
 from rps_pin.rps.workspace.scale import WorkspaceCounts, workspace_to_file
 from rps_pin.rps.workspace.storage import load_workspace, save_workspace
+from rps_pin.task.workspace.boundary import save_mesh
 
 __getattr__ = moved_names(
     __name__, {"PaperComparison": "rps_pin.paper", "paper_comparison": "rps_pin.paper"}

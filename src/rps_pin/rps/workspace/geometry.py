@@ -8,20 +8,18 @@ boundary of a workspace, drawn in positions, passes through itself. In poses it 
 from __future__ import annotations
 
 import math
-import os
-from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 import trimesh
 
-from rps_pin.arrays import Array, Bools, Indices
+from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError
-from rps_pin.files import whole_file
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
 from rps_pin.rps.workspace.result import Workspace
+from rps_pin.task.workspace.boundary import surface
 from rps_pin.task.workspace.grids import shares
 from rps_pin.task.workspace.volume import refuse_slices
 from rps_pin.validation import choice, whole_number
@@ -29,7 +27,6 @@ from rps_pin.validation import choice, whole_number
 Space = Literal["position", "pose"]
 #: Of coordinates, over the largest of their axis.
 _ROUNDING = 1e-12
-MESH_FORMATS = (".stl", ".ply", ".obj")
 
 
 class Volume(NamedTuple):
@@ -98,17 +95,7 @@ def boundary(workspace: Workspace, space: Space = "position") -> trimesh.Trimesh
     """
     choice(space, "space", ("position", "pose"))
     refuse_slices(workspace.grid.shape)
-    quads = _outer_faces(workspace.inside)
-    if not len(quads):
-        raise InputError("no cell of the grid is inside the workspace: it has no boundary")
-    points = (workspace.position if space == "position" else workspace.pose).reshape(-1, 3)
-    used, corners = np.unique(quads, return_inverse=True)
-    corners = corners.reshape(-1, 4)
-    faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
-    mesh = trimesh.Trimesh(points[used], faces, process=False)
-    if mesh.volume < 0:  # the map from the grid turns the orientation round
-        mesh.faces = mesh.faces[:, ::-1]
-    return mesh
+    return surface(workspace.inside, workspace.position if space == "position" else workspace.pose)
 
 
 @refuses_other_kinds
@@ -152,27 +139,6 @@ def theoretical_cylinder(
     return cylinder
 
 
-@refuses_other_kinds
-def save_mesh(
-    mesh: trimesh.Trimesh, path: str | os.PathLike[str], *, overwrite: bool = False
-) -> None:
-    """Write a mesh as STL, PLY or OBJ, by the file's suffix, whole or not at all; lengths in m.
-
-    Raises
-    ------
-    InputError
-        If the suffix is another one, or the file exists and `overwrite` is false.
-    """
-    target = Path(path)
-    suffix = target.suffix.lower()
-    if suffix not in MESH_FORMATS:
-        raise InputError(f"{target.name}: a mesh is written as one of {', '.join(MESH_FORMATS)}")
-    if target.exists() and not overwrite:
-        raise InputError(f"{target} exists; overwrite=True replaces it")
-    with whole_file(target) as scratch:
-        mesh.export(scratch, file_type=suffix[1:])
-
-
 def _opposite_inside(workspace: Workspace, pose: Array) -> Bools:
     """Return whether (z, -tilt) is in the workspace too, and within its grid, shape (n,)."""
     opposite = pose * [1.0, -1.0, -1.0]
@@ -186,27 +152,3 @@ def _opposite_inside(workspace: Workspace, pose: Array) -> Bools:
         slack = _ROUNDING * float(np.abs(axis).max())
         inside &= (coordinates[:, i] >= axis[0] - slack) & (coordinates[:, i] <= axis[-1] + slack)
     return np.asarray(inside)
-
-
-def _outer_faces(inside: Bools) -> Indices:
-    """Return the outer faces of the inside cells, shape (n, 4): flat indices of grid points.
-
-    Their order is anticlockwise seen from outside in the grid's own coordinates.
-    """
-    cell = np.ones(tuple(n - 1 for n in inside.shape), dtype=bool)
-    for corner in np.ndindex(2, 2, 2):
-        cell &= inside[tuple(slice(c, c + n) for c, n in zip(corner, cell.shape, strict=True))]
-    index = np.arange(inside.size).reshape(inside.shape)
-    quads = []
-    for axis in range(3):
-        padded = np.pad(np.moveaxis(cell, axis, 0), [(1, 1), (0, 0), (0, 0)])
-        before, after = padded[:-1], padded[1:]
-        layer = np.moveaxis(index, axis, 0)  # axes (axis, axis + 1, axis + 2), or mirrored for 1
-        square = np.stack(
-            [layer[:, :-1, :-1], layer[:, 1:, :-1], layer[:, 1:, 1:], layer[:, :-1, 1:]], axis=-1
-        )
-        upwards, downwards = square[before & ~after], square[after & ~before]
-        if axis == 1:  # moveaxis leaves (1, 0, 2), a left-handed order
-            upwards, downwards = upwards[:, ::-1], downwards[:, ::-1]
-        quads += [upwards, downwards[:, ::-1]]
-    return np.concatenate(quads)

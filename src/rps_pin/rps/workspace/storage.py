@@ -35,9 +35,9 @@ from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import GridJob
 from rps_pin.rps.workspace.evaluate import Fields, evaluate
 from rps_pin.rps.workspace.grids import AXES, WHOLE, Block, Grid, checked_grid
-from rps_pin.rps.workspace.lasting_file import LastingFile, new_hdf5_file
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
+from rps_pin.task.workspace.hdf5 import LastingFile, new_hdf5_file, own_dataset
 from rps_pin.validation import choice, non_negative_number, real_array, real_vector
 
 FORMAT = "rps_pin workspace 1"
@@ -247,15 +247,8 @@ def _refuse_misspelt(file: h5py.File) -> None:
 
 
 def _dataset(file: h5py.File, name: str, grid: tuple[int, ...] | None) -> h5py.Dataset:
-    """Return a field over a grid, or an axis if there is none; its data are in the file itself.
-
-    A link, and storage elsewhere, would read any file that the file names.
-    """
-    link, item = file.get(name, getlink=True), None
-    if isinstance(link, h5py.HardLink):
-        item = file[name]
-    if not isinstance(item, h5py.Dataset) or item.external or item.is_virtual:
-        raise InputError(f"{name} must be a dataset of the file itself, not a link or elsewhere")
+    """Return a field over a grid, or an axis if there is none."""
+    item = own_dataset(file, name)
     if name == "reason":
         right, wanted = item.dtype.newbyteorder("=") == np.uint16, "uint16"
     else:

@@ -16,9 +16,20 @@ from rps_pin.task.workspace.reasons import Flags, bit_of
 INSIDE = "inside"
 
 
+class Region:
+    """Points of a grid of which some are inside."""
+
+    grid: TaskGrid
+
+    @property
+    def inside(self) -> Bools:
+        """Whether a point is inside, of the grid's shape."""
+        raise NotImplementedError
+
+
 @refuses_other_kinds
 @dataclass(frozen=True, eq=False)
-class TaskWorkspace:
+class TaskWorkspace(Region):
     """Fields over the points of a grid, of its shape (n_1, n_2, ...), SI units.
 
     Nothing is NaN: where no configuration is reached, the fields are zero.

@@ -20,7 +20,7 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.workspace.grids import shares
-from rps_pin.task.workspace.result import TaskWorkspace
+from rps_pin.task.workspace.result import Region
 
 
 class TaskVolume(NamedTuple):
@@ -47,7 +47,7 @@ class TaskVolume(NamedTuple):
 
 
 @refuses_other_kinds
-def volume(workspace: TaskWorkspace) -> TaskVolume:
+def volume(workspace: Region) -> TaskVolume:
     """Return the volume of a workspace within its grid (an area, of two axes).
 
     Raises
@@ -109,7 +109,7 @@ def _unit(units: tuple[str, ...]) -> str:
     return " ".join(parts)
 
 
-def _cut(workspace: TaskWorkspace) -> tuple[str, ...]:
+def _cut(workspace: Region) -> tuple[str, ...]:
     found = []
     for k, name in enumerate(workspace.grid.over):
         layer = np.moveaxis(workspace.inside, k, 0)

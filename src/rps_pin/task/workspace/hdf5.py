@@ -1,4 +1,6 @@
-"""An HDF5 file that can always be closed: the first write that fails is kept and raised afterwards.
+"""HDF5 files that can always be closed, and data that are in the file itself.
+
+The first write that fails is kept and raised when the file was closed.
 
 HDF5 writes its tables when a file is closed. Where it cannot, on a full disk, it keeps the file
 open, and its library crashes at the end of the process. So HDF5 writes through a Python object that
@@ -13,6 +15,7 @@ from pathlib import Path
 
 import h5py
 
+from rps_pin.errors import InputError
 from rps_pin.interruption import interruptions_wait
 
 
@@ -77,3 +80,21 @@ def new_hdf5_file(path: Path) -> Iterator[tuple[h5py.File, LastingFile]]:
     finally:
         disk.close()
     disk.check()
+
+
+def own_dataset(file: h5py.File, name: str) -> h5py.Dataset:
+    """Return a dataset of a file that is in the file itself.
+
+    A link, and storage elsewhere, would read any file that the file names.
+
+    Raises
+    ------
+    InputError
+        If it is not there, or not so.
+    """
+    link, item = file.get(name, getlink=True), None
+    if isinstance(link, h5py.HardLink):
+        item = file[name]
+    if not isinstance(item, h5py.Dataset) or item.external or item.is_virtual:
+        raise InputError(f"{name} must be a dataset of the file itself, not a link or elsewhere")
+    return item

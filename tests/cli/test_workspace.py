@@ -1,0 +1,89 @@
+"""``rps-pin workspace --mechanism``: files, figures, numbers, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from rps_pin.task.workspace import load_workspace, volume
+from tests.cli.commands import rps_pin
+
+FIVE_BAR = ("workspace", "-m", "five_bar", "--over", "x=-0.8:0.9:25", "--over", "z=-0.8:0.9:22")
+STEWART = ("workspace", "-m", "stewart", "--degrees", "--over", "z=0.5:0.8:5")
+
+
+def test_two_axes_make_a_file_and_a_map(tmp_path: Path) -> None:
+    run = rps_pin(*FIVE_BAR, "--json", "-o", str(tmp_path))
+    assert run.returncode == 0, run.stderr
+    told = json.loads(run.stdout)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "map.png",
+        "map.svg",
+        "workspace.h5",
+    ]
+    found = load_workspace(tmp_path / "workspace.h5")
+    assert told["inside"] == np.count_nonzero(found.inside) > 0
+    assert told["volume"] == pytest.approx(volume(found).value)
+    assert told["out"] == {k: n for k, n in found.counts().items() if n and k != "inside"}
+    assert found.grid.over == ("x", "z")
+    again = rps_pin(*FIVE_BAR, "-o", str(tmp_path))
+    assert (again.returncode, "exist" in again.stderr) == (1, True)
+    text = rps_pin(*FIVE_BAR, "--overwrite", "-o", str(tmp_path)).stdout
+    assert "of which inside" in text
+    assert "beyond the end of the assembly mode" in text
+
+
+def test_three_axes_in_degrees_make_slices_and_a_mesh(tmp_path: Path) -> None:
+    more = ("--over", "rx=-30:30:6", "--over", "ry=-30:30:7", "--held", "rz=10", "--holding")
+    run = rps_pin(*STEWART, *more, "--json", "-o", str(tmp_path))
+    assert run.returncode == 0, run.stderr
+    told, found = json.loads(run.stdout), load_workspace(tmp_path / "workspace.h5")
+    assert told["volume_unit"] == "m deg^2"
+    assert told["volume"] == pytest.approx(volume(found).value * math.degrees(1.0) ** 2)
+    assert told["held"]["rz"] == pytest.approx(10.0)
+    assert found.grid.held["rz"] == pytest.approx(math.radians(10.0))
+    assert found.holding.shape == (5, 6, 7, 6)
+    mesh = trimesh.load(tmp_path / "boundary.stl", force="mesh")
+    assert mesh.volume == pytest.approx(volume(found).least, rel=1e-5)
+    assert (tmp_path / "slices.png").exists()
+    box = told["largest_box"]
+    assert box["rx"][1] - box["rx"][0] <= 60.0
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("workspace", "-m", "five_bar", "--over", "x=0:1:5"), "2 to 6"),
+        (("workspace", "-m", "five_bar", "--over", "x=0:1"), "NAME=FROM:TO:POINTS"),
+        (("workspace", "-m", "five_bar", "--over", "x=1:0:5"), "FROM must be below TO"),
+        (("workspace", "-m", "five_bar", "--over", "x=0:nan:5"), "both finite"),
+        (("workspace", "-m", "five_bar", "--over", "x=0:1:99999999"), "at most 1000000"),
+        (("workspace", "-m", "five_bar", "--over", "x=0:1:5", "--over", "x=0:1:5"), "twice"),
+        (("workspace", "-m", "five_bar", "--over", "x=0:1:5", "--over", "w=0:1:5"), "'w'"),
+        (("workspace", "-m", "five_bar", "--points", "5"), "does not go with a mechanism"),
+        (("workspace", "--over", "x=0:1:5"), "needs a --mechanism"),
+        (("workspace", "-m", "rps", "--over", "z=0:1:5", "--over", "w=0:1:5"), "'w'"),
+    ],
+)
+def test_what_is_no_grid_is_refused(words, told: str, tmp_path: Path) -> None:
+    run = rps_pin(*words, "-o", str(tmp_path / "out"), folder=tmp_path)
+    assert run.returncode in (1, 2)
+    assert told in " ".join(run.stderr.replace("│", " ").split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_3_rps_keeps_its_own_and_nothing_inside_is_an_error(tmp_path: Path) -> None:
+    assert rps_pin("new", "3rps", "-o", str(tmp_path)).returncode == 0
+    (robot,) = [path for path in tmp_path.glob("*.yaml") if path.name != "path.yaml"]
+    over = ("--over", "z=0.2:0.25:3", "--over", "rx=-0.1:0.1:3")
+    run = rps_pin("workspace", "-m", str(robot), *over, folder=tmp_path)
+    assert "a workspace of its own: --robot" in run.stderr
+    most = ("--min-conditioning", "1")
+    run = rps_pin(*FIVE_BAR, *most, "-o", str(tmp_path / "none"))
+    assert "no point of the grid is inside the workspace" in run.stderr
+    assert "singular" in run.stderr
