@@ -14,7 +14,7 @@ from PIL import Image, ImageSequence
 
 from rps_pin import ClosedLoopModel, RPSRobot, helix
 from rps_pin.errors import InputError, RPSPinError
-from rps_pin.viewer import save_html, save_png, save_video
+from rps_pin.viewer import Recorder, View, save_html, save_png, save_video
 from rps_pin.viewer.files.browser import find_browser
 from rps_pin.viewer.files.film import write_film
 from rps_pin.viewer.files.pictures import pixels_of
@@ -42,6 +42,35 @@ def path(robot):
 def chromium(monkeypatch):
     if find_browser() is None:
         pytest.skip("no Chromium found")
+
+
+SEEN = """(points) => {
+    const pane = document.getElementById('meshcat-pane').getBoundingClientRect();
+    const world = viewer.scene_tree.find(['world']).object;
+    viewer.scene.updateMatrixWorld(true);
+    viewer.camera.updateMatrixWorld();
+    return points.map((point) => {
+        const at = viewer.camera.position.clone().set(...point);
+        at.applyMatrix4(world.matrixWorld).project(viewer.camera);
+        return [pane.width * (1 + at.x) / 2, pane.height * (1 - at.y) / 2];
+    });
+}"""
+"""Where points of the world are seen, in pixels of the pane."""
+
+
+def check_picture(watched: Watched, size: tuple[int, int], points: np.ndarray) -> None:
+    """Check that robot, arrows and ring are in the picture, and clear of the legend and the bar."""
+    width, height = size
+    watched.page.set_viewport_size({"width": width, "height": height})
+    watched.page.evaluate("document.getElementById('legend').open = true")
+    watched.page.evaluate("viewer.set_3d_pane_size()")
+    seen = np.array(watched.page.evaluate(SEEN, points.tolist()))
+    free = watched.page.evaluate("freePart(document.getElementById('meshcat-pane'))")
+    assert (seen >= [free["left"], free["top"]]).all(), size
+    assert (seen <= [free["right"], free["bottom"]]).all(), size
+    assert 0.6 < (np.ptp(seen, axis=0) / [free["width"], free["height"]]).max() <= 0.95, size
+    if width < height:  # a phone: the robot first, over the whole width
+        assert free["width"] == width and free["height"] > 0.4 * height
 
 
 def blocks(picture: np.ndarray) -> np.ndarray:
@@ -116,6 +145,9 @@ def test_a_page_with_layers_holds_them_moves_them_and_ticks_them_off(
         blue, yellow = np.array([0x00, 0x72, 0xB2]) / 255, np.array([0xF0, 0xE4, 0x42]) / 255
         np.testing.assert_allclose(found[-1], blue + 2 * share * (yellow - blue), atol=4e-4)
     assert np.abs(np.subtract(*found)).max() > 8e-4
+    view = View(Recorder(), robot, path, layers=["trail", "singularity"], hidden=["forces"])
+    for size in ((700, 500), (390, 700)):
+        check_picture(watched, size, view.scene.frame.points)
     assert watched.complaints == []
     assert watched.requests == [page.as_uri()]
 

@@ -29,7 +29,8 @@ function keepRobotFree(viewer) {
     const [half, low, high] = cameras.userData.outline || [1, -1, 1];
     const tall = (MARGIN * 2) / (high - low);
     // No further to the right than the robot needs.
-    free.left = Math.max(0, Math.min(free.left, 2 * free.left + half * tall * free.height - width));
+    const wide = (half * tall * free.height) / MARGIN;
+    free.left = Math.max(0, Math.min(free.left, 2 * free.left + wide - width));
     free.width = free.right - free.left;
     camera.zoom = Math.min((MARGIN * free.width) / free.height / half, tall);
     const middle = (camera.zoom * free.height * (low + high)) / 4; // pixels above the camera's axis
