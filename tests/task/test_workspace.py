@@ -13,8 +13,9 @@ from rps_pin import errors as of
 from rps_pin.rps import workspace as of_rps
 from rps_pin.task import Cone, Task
 from rps_pin.task.workspace import TaskWorkspace, task_grid, workspace
-from rps_pin.task.workspace.reasons import SINGULAR, UNREACHABLE, reason_names
+from rps_pin.task.workspace.reasons import INTERFERENCE, SINGULAR, UNREACHABLE, reason_names
 from tests.task.robots import compiled, task
+from tests.task.test_interference import OFFSET, OTHER, R, balls
 from tests.task.workspaces import Closed, conditioning, delta_arms, five_bar, stewart_legs
 from tests.worst import worst
 
@@ -217,7 +218,23 @@ def test_planes_counts_and_extents_are_those_of_the_points() -> None:
     assert (low, high) == (inside.min(), inside.max())
 
 
-def test_cones_and_links_put_points_out_by_name() -> None:
+@pytest.mark.parametrize("make", [lambda one: one, Task.compile], ids=["pinocchio", "generated"])
+def test_links_that_are_too_near_put_points_out(make) -> None:
+    """Two balls on slides, without any loop: by the distance of their centres."""
+    one, axis = make(balls()), np.linspace(-0.4, 0.42, 15)
+    grid = task_grid(one, {"xa": axis, "xb": axis})
+    xa, xb = np.moveaxis(grid.points(), -1, 0)
+    apart = np.hypot(xa - xb, OFFSET) - R - OTHER
+    for least in (0.0, 0.1):
+        found = workspace(one, grid, clearance=least)
+        assert np.array_equal(found.mask(INTERFERENCE), apart < least)
+        assert np.array_equal(found.inside, apart >= least)
+        assert 0.1 < found.inside.mean() < 0.95
+    ignored = workspace(one, grid, clearance=0.1, ignore=[("a", "b")])
+    assert ignored.inside.all()
+
+
+def test_cones_put_points_out_by_name() -> None:
     """A cone between the platform and the base of a Stewart: the tilt's angle."""
     one = compiled("stewart")
     over = {"rx": np.linspace(-0.5, 0.5, 11), "ry": np.linspace(-0.5, 0.5, 11)}

@@ -136,6 +136,8 @@ class Continuation:
     def _same_sign(self, first: Array, second: Array) -> Bools:
         """Return whether no singularity lies between configurations of the extended mechanism."""
         count, sign = self._mode
+        if not count:
+            return np.ones(len(first), dtype=bool)
         B = self._by_others(second)
         if sign:
             return np.asarray(np.sign(np.linalg.det(B)) == sign)
@@ -151,6 +153,8 @@ class Continuation:
     def _mode(self) -> tuple[int, float]:
         """The rank of A, and the sign of its determinant; 0 if it is not square and regular."""
         A = self._by_others(self._start)
+        if not A.size:  # nothing but the task's own joints moves
+            return 0, 0.0
         values = singular_values(A[0])
         count = rank(values / max(float(values[0]), 1e-300), _ZERO)
         square = A.shape[-2] == A.shape[-1] == count
