@@ -27,10 +27,9 @@ def bench_a_slider_of_the_panel(benchmark: Any, group: str, layers: tuple[str, .
         lengths = itertools.cycle([[218.0 + k, 223.0, 223.0] for k in range(12)])
 
         def move() -> None:
-            """Set the first slider, and wait until the readings say so."""
-            before = face.text
+            """Set the first slider, and follow it: here, not in the page's own thread."""
             face.move(group, next(heights if group == "pose" else lengths))
-            while face.text == before:
-                pass
+            face._follow(group)
 
+        face._worker.end()
         benchmark(move)

@@ -7,6 +7,7 @@ import math
 import socket
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -123,6 +124,56 @@ def test_unsound_numbers_do_not_arrive(served: BrowserPanel) -> None:
         assert not handle._impl.removed
         assert handle.min > 0
     assert np.isfinite(served._panel.configuration).all()
+
+
+def test_a_handle_is_dragged_to_sound_places_only(served: BrowserPanel) -> None:
+    gizmo, before = served._gizmo, served._panel.configuration.copy()
+    name, upright = gizmo.controls[0].name, [1.0, 0.0, 0.0, 0.0]
+    nan, far = math.nan, 1e9
+
+    def send(connection: Any, kind: str, **message: Any) -> None:
+        whole = {"type": f"TransformControls{kind}Message", "name": name, "owner": ""} | message
+        connection.send(msgspec.msgpack.encode(whole))
+
+    with connected(served, origin=f"http://127.0.0.1:{urlsplit(served.url).port}") as page:
+        assert len(page.recv(timeout=10)) > 100
+        for wxyz, position in (
+            (upright, [0.0, 0.0, nan]),
+            (upright, [0.0, 0.0, far]),
+            ([0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.23]),
+            ([2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.23]),
+            ([nan, 0.0, 0.0, 0.0], [0.0, 0.0, 0.23]),
+        ):
+            send(page, "Update", wxyz=wxyz, position=position)
+        send(page, "Update", name="/world", wxyz=upright, position=[0.0, 0.0, 0.23])
+        send(page, "DragStart", name="/world")
+        time.sleep(0.3)
+        np.testing.assert_array_equal(served._panel.configuration, before)
+        send(page, "DragStart")
+        send(page, "Update", wxyz=upright, position=[0.0, 0.0, 0.233])
+        deadline = time.monotonic() + 10
+        while served._panel.pose[0] != 0.233 and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert served._panel.pose[0] == pytest.approx(0.233)
+        send(page, "DragEnd")
+
+
+def test_a_placement_is_seven_numbers() -> None:
+    sound, upright = guarded_server._is_placement, (1.0, 0.0, 0.0, 0.0)
+    assert sound(upright, (0.0, 1, -2.0))
+    for position in ((0.0, 0.0), (0.0, 0.0, "1"), (0.0, 0.0, True), None, (0.0, 0.0, math.inf)):
+        assert not sound(upright, position)
+    assert not sound((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def test_texts_and_choices_are_short_and_known() -> None:
+    sound = guarded_server._is_sound
+    text = SimpleNamespace(value="")
+    choice = SimpleNamespace(value="a", options=("a", "b"))
+    assert sound(text, {"value": "upper"})
+    assert sound(choice, {"value": "b"})
+    for handle, value in ((text, "x" * 201), (text, 1.0), (text, None), (choice, "c"), (choice, 1)):
+        assert not sound(handle, {"value": value})
 
 
 def test_names_are_text_in_the_page(served: BrowserPanel) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from rps_pin.panel.browser_panel import BrowserPanel
 
-_WIDTH, _HEIGHT = 1000, 560
+_WIDTH, _HEIGHT = 1000, 700
 
 
 class NotebookPanel(BrowserPanel):

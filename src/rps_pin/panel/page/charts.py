@@ -17,7 +17,7 @@ COLOURS = ("#D55E00", "#009E73", "#0072B2", "#CC79A7", "#E69F00", "#56B4E9", "#7
 """Of the actuators, in order, repeated; of a 3-RPS those that its legs have."""
 UNITS = {"mm": "mm", "degrees": "°"}
 """As labels have them: a line of the page is short."""
-_HEIGHT = 120
+_HEIGHT = 112
 _FONT = "11px sans-serif"
 
 
