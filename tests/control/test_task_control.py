@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
 import struct
 from collections.abc import Callable
 from functools import cache
@@ -233,7 +234,12 @@ def test_limited_forces_are_the_nearest_in_effect(name: str) -> None:
     others = [np.clip(limited.forces + s * rng.normal(size=size), -limit, limit)
               for s in limit * np.geomspace(1e-4, 1, 400)]  # fmt: skip
     assert min(map(cost, others)) >= cost(limited.forces) * (1 - 1e-8)
-    assert "an actuator is at its limit" in limited.status_text
+    turning = mechanism.angular_velocities[mechanism.actuated_indices]
+    unit = "N m" if turning.all() else "N"  # of these robots, all turn or none
+    said = re.search(
+        r"an actuator is at its limit: .* are \([^)]+\) ([N m,]+)", limited.status_text
+    )
+    assert said and said[1] == unit
 
 
 @pytest.mark.parametrize("name", NAMES)

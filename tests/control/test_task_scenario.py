@@ -52,6 +52,7 @@ def test_a_run_of_a_task_is_recorded_and_written(tmp_path: Path) -> None:
     errors = run.pose - run.target
     assert summary.names == ("cross_joint", "foot_joint")
     assert summary.units == ("rad", "rad")
+    assert summary.force_unit == "N m"
     np.testing.assert_allclose(summary.largest, np.abs(errors).max(axis=0))
     np.testing.assert_allclose(summary.rms, np.sqrt((errors**2).mean(axis=0)))
     assert summary.statuses["bad input"] == 1

@@ -246,6 +246,10 @@ def test_motions_that_cannot_be_followed_say_when() -> None:
         size_trajectory(one, uniform(one.home, [0.21, 0.1], 2.0), 100.0)
     with pytest.raises(SingularityError, match="assembly mode ends in a type I singularity"):
         run_motion(one, uniform(one.home, one.home + 0.3, 2.0), 100.0)
+    stewart = compiled("stewart")  # singular at a quarter turn, and out of its legs' reach later
+    turn = uniform(stewart.home, [0.0, 0.0, stewart.home[2], 0.0, 0.0, 1.8], 1.0)
+    with pytest.raises(SingularityError, match=r"crosses a type II .* rz = 1\.5708 rad"):
+        size_trajectory(stewart, turn, 100.0)
     short = lift(leg_length_limits=(0.28, 0.34))
     with pytest.raises(UnreachableError, match=r"'leg_1_prismatic' leaves its upper .* in all"):
         size_trajectory(short, UP, 100.0)

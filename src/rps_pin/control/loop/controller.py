@@ -50,6 +50,7 @@ from rps_pin.copies import DeepCopied
 from rps_pin.errors import InputError, SingularityError, shown
 from rps_pin.one_thread import guarded, one_thread
 from rps_pin.other_kinds import refuses_other_kinds
+from rps_pin.plain_text import listed
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.task import RPSTask
 from rps_pin.task import Task
@@ -382,7 +383,7 @@ class Controller(DeepCopied, ABC):
         if self.status & Status.SATURATED:
             messages.append(
                 "an actuator is at its limit: the forces of the law are "
-                f"({', '.join(f'{f:.6g}' for f in self._wanted)}) {self._force_unit}"
+                f"{listed(self._wanted, self._force_units)}"
             )
         if self.status & Status.STOPPED:
             messages.append(f"stopped: {self._stop_reason}; reset to continue")
@@ -516,8 +517,12 @@ class Controller(DeepCopied, ABC):
             out[i] = one
 
     @property
-    def _force_unit(self) -> str:
-        return "N" if self._quiet else "N or N m"
+    def _force_units(self) -> list[str]:
+        if isinstance(self.robot, RPSRobot):
+            return ["N"] * 3
+        mechanism = task_of(self.robot).mechanism
+        turning = mechanism.angular_velocities[mechanism.actuated_indices]
+        return ["N m" if one else "N" for one in turning]
 
 
 def model_of(robot: Robot, near: ArrayLike, compiled: Compiled, **settings: Any) -> ControlModel:

@@ -177,9 +177,11 @@ class TaskSummary:
     rms, largest, at_end
         Of the errors of these, actual less target, in these units.
     force_peak, force_rms
-        Of the actuators, largest of all, N or N m.
+        Of the actuators, largest of all, in `force_unit`.
     saturated, minimum_type_ii, gap, ticks, statuses, first
         As of `LoopSummary`; `minimum_type_ii` is the least `SingularityMeasures.distance`.
+    force_unit
+        ``"N"``, ``"N m"``, or ``"N or N m"`` where some actuators slide and some turn.
     """
 
     names: tuple[str, ...]
@@ -195,6 +197,7 @@ class TaskSummary:
     ticks: int
     statuses: dict[str, int]
     first: dict[str, float]
+    force_unit: str = "N or N m"
 
     @classmethod
     def of(cls, run: LoopRun, *, begin: float = 0.0, end: float = np.inf) -> TaskSummary:
@@ -214,6 +217,7 @@ class TaskSummary:
             largest=tuple(np.abs(errors).max(axis=0).tolist()),
             at_end=tuple(np.abs(errors[-1]).tolist()),
             **_common(run, here),
+            force_unit=" or ".join(sorted({unit for *_, unit in run.of_actuators})),
         )
 
     def in_degrees(self) -> Self:
@@ -248,7 +252,7 @@ class TaskSummary:
             for name, unit, *values in errors
         ]
         force = f"{self.force_rms:.4g}", f"{self.force_peak:.4g}"
-        return [*rows, ["force of an actuator", *force, "", "N or N m"]]
+        return [*rows, ["force of an actuator", *force, "", self.force_unit]]
 
     def table(self) -> Table:
         """Return the figures for a terminal."""

@@ -27,6 +27,7 @@ def require_clear(
         If it leaves a limit of a joint's position: says when, and which.
     SingularityError
         If it crosses a singularity or stays in one, or the assembly mode ends: says when and where.
+        The error is that of what comes first.
     """
     found = check_path(
         task,
@@ -37,10 +38,10 @@ def require_clear(
         interference=False,
     )
     outside = [event for event in found.limits if event.kind != "returns"]
-    if outside:
+    singular = [event for event in found.singularities if event.kind != "grazes"]
+    if outside and not (singular and singular[0].time < outside[0].time):
         more = f"; limits are left {len(outside)} times in all" if outside[1:] else ""
         raise UnreachableError(f"the trajectory cannot be followed: at {outside[0]}{more}")
-    singular = [event for event in found.singularities if event.kind != "grazes"]
     if singular:
         again = ", ".join(f"{event.time:.6g} s" for event in singular[1:])
         raise SingularityError(
