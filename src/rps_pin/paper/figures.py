@@ -66,7 +66,7 @@ def plot_branches(found: Reproduction, plot: Callable[..., Figure]) -> Figure:
     axes = figure.subplots(1, 2, sharey=True)
     for one, (branch, run) in zip(axes, found.runs.items(), strict=True):
         plot(run, one)
-        one.set_xlabel(f"time (s), branch {branch}")
+        one.set_xlabel(f"time (s), branch ${branch}$")
     axes[1].get_legend().remove()
     axes[1].set_ylabel("")
     return figure

@@ -33,7 +33,7 @@ def plot_probes(probes: list[Probe]) -> Figure:
     axes = _axes("smallest distance to a singularity (1)", _FORCE)
     for branch, colour, mark in zip("+-", LEG_COLOURS, "os", strict=False):
         kept = [(p.nearest, p.forces.largest) for p in probes if p.branch == branch and p.forces]
-        axes.loglog(*np.transpose(kept), mark, color=colour, label=f"branch {branch}")
+        axes.loglog(*np.transpose(kept), mark, color=colour, label=f"branch ${branch}$")
     axes.axhline(paper.THIS_STUDY.largest, color=BLACK, lw=1, ls=":", label="Table 2's largest")
     return _with_legend(axes)
 
