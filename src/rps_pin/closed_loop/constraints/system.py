@@ -141,6 +141,23 @@ class ConstraintSystem:
         self.data, self.guard = self.equations.data, Guard()
 
     @cached_property
+    def arcs(self) -> Array:
+        """What a unit of each coordinate of q counts for as a length, shape (nq,), m.
+
+        Lengths 1, angles the characteristic length, parts of a quaternion, a cosine or a sine twice
+        as much.
+        """
+        equations = self.equations
+        found = np.full(self.model.nq, 2 * equations.length)
+        for joint in list(self.model.joints)[1:]:
+            turns = equations.angular_velocities[joint.idx_v : joint.idx_v + joint.nv]
+            if joint.nq == joint.nv:
+                found[joint.idx_q : joint.idx_q + joint.nq] = np.where(turns, equations.length, 1.0)
+            else:
+                found[joint.idx_q : joint.idx_q + int(np.count_nonzero(~turns))] = 1.0
+        return found
+
+    @cached_property
     def springs(self) -> Springs | None:
         """Springs of the joints; None where no joint has one."""
         if self.effects is None or not self.effects.stiffness.any():

@@ -181,6 +181,20 @@ class Householder:
         ]
 
     @property
+    def orientation(self) -> Scalar | None:
+        """1 or -1, which changes with the sign of det A; none if a block is not square.
+
+        The number of reflections, each of determinant -1, is always the same.
+        """
+        found = ca.SX(1)
+        for factor in self._factors:
+            sign = factor.orientation()
+            if sign is None:
+                return None
+            found *= sign
+        return found
+
+    @property
     def pivots(self) -> list[tuple[int, Scalar]]:
         """Column and size of each pivot; where Cramer's rule is used, 1 / |row of the inverse|."""
         squares: dict[int, Scalar] = {}
@@ -545,6 +559,18 @@ class _BlockFactor:
                     InversePivot(column, _product(1 / unit, entry))
                     for unit, entry in zip(units, entries, strict=True)
                 ]
+        return found
+
+    def orientation(self) -> Scalar | None:
+        """Return the sign of the determinant, but for a constant; none if it is not square."""
+        if not self._square:
+            return None
+        found = ca.SX(1)
+        for pivot in self._pivots:
+            found *= ca.copysign(1.0, pivot.inverse)
+        if self._pair is not None:
+            (a, b), (c, d) = self._pair.inverse
+            found *= ca.copysign(1.0, a * d - b * c)
         return found
 
     # Solutions

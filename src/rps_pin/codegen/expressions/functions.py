@@ -38,6 +38,8 @@ unit_lengths                  q               squared lengths, less 1, of quater
                                               (cos, sin) (nq - nv)
 closing_step                  q               dv of the dependent velocities (nv), squared gap (1),
                                               growth (1)
+continuing_step               q               the same, and the sign of det J_d but for a constant
+                                              (1); 1 where J_d is not square
 stage                         q, v, tau       a (nv), power of actuators, wrenches, damping and
                                               friction (1), growth (1)
 least_norm_step               q               dv of least norm (nv), squared gap (1), growth (1)
@@ -383,6 +385,12 @@ def _unit_lengths(x: MechanismExpressions) -> Made:
 def _closing_step(x: MechanismExpressions) -> Made:
     step = -x.dependent(x.rows.gap)
     return {"q": x.q}, {"step": step, "squared_gap": x.squared_gap, "growth": x.growth}
+
+
+@_function()
+def _continuing_step(x: MechanismExpressions) -> Made:
+    given, results = _closing_step(x)
+    return given, results | {"orientation": ca.SX(1) if x.orientation is None else x.orientation}
 
 
 @_function()

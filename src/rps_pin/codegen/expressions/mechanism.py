@@ -184,6 +184,11 @@ class MechanismExpressions:
         return _growth(self.factors, 1 / self.system.column_scale[self.partition.dependent])
 
     @cached_property
+    def orientation(self) -> Expression | None:
+        """1 or -1, which changes with the sign of det J_d; none if J_d is not square."""
+        return self.factors.orientation if self.partition.dependent.size else ca.SX(1)
+
+    @cached_property
     def opening(self) -> Expression:
         """Sum of the squared gaps, over that of an open configuration."""
         if self._single:  # whose rounding errors are larger than the squares that `rows` sums

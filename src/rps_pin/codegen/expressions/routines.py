@@ -13,6 +13,7 @@ from functools import partial
 from rps_pin.closed_loop.assembly.projection import NEAREST_STEP, NEAREST_STEPS
 from rps_pin.closed_loop.constraints.equations import OPEN
 from rps_pin.codegen.expressions.functions import MechanismFunctions
+from rps_pin.codegen.expressions.mechanism import GROWTH
 from rps_pin.codegen.units import Routine
 
 #: Steps in one call of `steps`.
@@ -26,6 +27,8 @@ _NEWTON_STEPS = 20
 #: As in `rps_pin.closed_loop.assembly.continuation`: the squared ratio of corrections, and the
 #: largest motion in a step, here all together, rad or characteristic lengths.
 _CONTRACTION, _REACH = 1 / 16, 0.3
+#: Squared, the largest relative change of A in a part.
+_CHANGE = 1 / 4
 #: Most parts that a path is divided into.
 _PARTS = 64
 
@@ -119,7 +122,12 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
 
 
 def _completed(functions: MechanismFunctions) -> Routine:
-    """In 1, 2, 4, ... parts, until Newton's steps contract in each as a continuation's must."""
+    """In 1, 2, 4, ... parts, until Newton's steps contract in each as a continuation's must.
+
+    And keep the sign of det A, A the closures' Jacobian by the others: where it changes, a
+    singularity lies between, and Newton's steps led into another assembly mode. Where A is not
+    square, |A^-1| times the motion in a part, which bounds the change of A, must be at most a half.
+    """
     x = functions.expressions
     model, extra = x.tree.model, _extra(functions, False)
     scale, reach = x.system.column_scale, (_REACH * x.system.equations.length) ** 2
@@ -137,8 +145,18 @@ def _completed(functions: MechanismFunctions) -> Routine:
     lengths = [
         f"length += SQUARE(dv[{j}] * CONST({1 / by!r}));" for j, by in enumerate(scale.tolist())
     ]
+    length = x.system.equations.length
+    away = [
+        f"moving += SQUARE((at[{i}] - begin[{i}]) * CONST({by / length!r}));"
+        for i, by in enumerate(x.system.arcs.tolist())
+    ]
+    most = _CHANGE / GROWTH**2
+    kept = "LT(CONST(0), turn[0] * side)"
+    if x.orientation is None:
+        kept = f"LE(growth[0] * moving, CONST({most!r}))"
     body = f"""
     REAL at[{model.nq}], moved[{model.nq}], dv[{model.nv}], gap[1], growth[1];
+    REAL begin[{model.nq}], turn[1], moving, side = CONST(0);
     REAL way = CONST(0), done = CONST(0), good, before, length, worst, share;
     int i, k, n, s;
     #define SQUARE(x) ((x) * (x))
@@ -155,7 +173,7 @@ def _completed(functions: MechanismFunctions) -> Routine:
             if (s) {{ {" ".join(moves)} }}
             before = CONST({reach!r});
             for (k = 0; k < {_NEWTON_STEPS}; ++k) {{
-                {_call("closing_step", ["at"], extra, "dv", "gap", "growth")}
+                {_call("continuing_step", ["at"], extra, "dv", "gap", "growth", "turn")}
                 length = CONST(0);
                 {" ".join(lengths)}
                 worst = FMAX(worst, growth[0]);
@@ -167,7 +185,14 @@ def _completed(functions: MechanismFunctions) -> Routine:
                 if (!ANY(LT({_LAST_OF_ALL}, gap[0]))) break;
             }}
             good = AND(good, LE(gap[0], {_LAST}));
+            if (s) {{
+                moving = CONST(0);
+                {" ".join(away if x.orientation is None else [])}
+                good = AND(good, {kept});
+            }}
+            else side = turn[0];
             if (!ANY(AND(good, NOT(done)))) break;
+            for (i = 0; i < {model.nq}; ++i) begin[i] = at[i];
         }}
         good = AND(good, NOT(done));
         for (i = 0; i < {model.nq}; ++i) q_closed[i] = SELECT(good, at[i], q_closed[i]);
@@ -180,7 +205,7 @@ def _completed(functions: MechanismFunctions) -> Routine:
 """
     outputs = (("q_closed", model.nq), ("check", 2))
     given = (("q", model.nq), ("given", model.nq), *extra)
-    return Routine("completed", given, outputs, body, ("closing_step", "integrate"))
+    return Routine("completed", given, outputs, body, ("continuing_step", "integrate"))
 
 
 def _nearest(functions: MechanismFunctions) -> Routine:

@@ -67,7 +67,8 @@ class Continuation:
         self._nq, self._nv = task.mechanism.model.nq, task.mechanism.model.nv
         self._joint_units = task.mechanism.velocity_scale
         self._actuated = task.mechanism.actuated_indices
-        self._arcs = _arcs(task)
+        length = task.mechanism.characteristic_length
+        self._arcs = task.mechanism.system.arcs / length
         self._start = task.joined(*start)[None]
 
     def speeds(self, q: Array, x: Array) -> Speeds:
@@ -159,21 +160,3 @@ class Continuation:
         count = rank(values / max(float(values[0]), 1e-300), _ZERO)
         square = A.shape[-2] == A.shape[-1] == count
         return count, float(np.sign(np.linalg.det(A[0]))) if square else 0.0
-
-
-def _arcs(task: Task) -> Array:
-    """Return what a unit of each coordinate of q counts for, in characteristic lengths, (nq,).
-
-    Angles count 1; parts of quaternions, sines and cosines 2.
-    """
-    model, length = task.mechanism.model, task.mechanism.characteristic_length
-    angular = task.mechanism.angular_velocities
-    found = np.full(model.nq, 2.0)
-    for joint in list(model.joints)[1:]:
-        turns = angular[joint.idx_v : joint.idx_v + joint.nv]
-        places = int(np.count_nonzero(~turns))
-        if joint.nq == joint.nv:
-            found[joint.idx_q : joint.idx_q + joint.nq] = np.where(turns, 1.0, 1 / length)
-        else:
-            found[joint.idx_q : joint.idx_q + places] = 1 / length
-    return found
