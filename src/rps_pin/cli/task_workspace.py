@@ -61,9 +61,12 @@ def workspace_of_task(
     output: Path,
     overwrite: bool,
     as_json: bool,
+    *,
+    ignore_limits: bool = False,
+    accuracy: float | None = None,
 ) -> None:
     """Compute, write and print a workspace; see `rps_pin.cli.workspace`."""
-    model, file = options.load_mechanism(mechanism)
+    model, file = options.load_mechanism(mechanism, ignore_limits, accuracy)
     if kind_of_file(file) == "parameters":
         raise InputError(f"{file} is a 3-RPS, which has a workspace of its own: --robot {file}")
     task: Task = model.task

@@ -14,6 +14,7 @@ from rps_pin.cli import console as common
 from rps_pin.cli import task_workspace as of_tasks
 from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.given_options import refuse
+from rps_pin.cli.mechanism_options import AccuracyOption, IgnoreLimitsOption
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
 from rps_pin.cli.task_options import MechanismOption, in_unit, unit_of, units
 from rps_pin.errors import InputError
@@ -45,6 +46,8 @@ def workspace_command(
     held: of_tasks.HeldOption = None,
     min_conditioning: of_tasks.MinConditioningOption = MIN_CONDITIONING,
     holding: of_tasks.HoldingOption = False,
+    ignore_limits: IgnoreLimitsOption = False,
+    accuracy: AccuracyOption = None,
     output: common.FolderOption = Path("workspace"),
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
@@ -82,9 +85,11 @@ def workspace_command(
             output,
             overwrite,
             as_json,
+            ignore_limits=ignore_limits,
+            accuracy=accuracy,
         )
         return
-    names = "over", "held", "min_conditioning", "holding"
+    names = "over", "held", "min_conditioning", "holding", "ignore_limits", "accuracy"
     refuse(context, "this option needs a --mechanism", *names)
     machine = common.load_robot(robot)
     parameters = machine.parameters
