@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -38,8 +39,18 @@ def write_film(path: Path, pictures: Iterable[bytes], frame_rate: float) -> None
         options["output_params"] = ["-crf", "18", "-movflags", "+faststart"]
     elif kind == ".webp":
         options |= {"quality": 85, "method": 4}
-    even = 2 if kind == ".mp4" else 1  # H.264 halves the colours' resolution
-    with _imageio().get_writer(path, **options) as film:
+    if kind == ".mp4":
+        _write(path, pictures, 2, **options)  # H.264 halves the colours' resolution
+        return
+    # Pillow writes when it closes: where that fails, the file would stay open.
+    whole = io.BytesIO()
+    _write(whole, pictures, 1, format=kind, **options)
+    path.write_bytes(whole.getbuffer())
+
+
+def _write(target: Path | io.BytesIO, pictures: Iterable[bytes], even: int, **options: Any) -> None:
+    """Write pictures whose sides are cut to multiples of a number of pixels."""
+    with _imageio().get_writer(target, **options) as film:
         for picture in pictures:
             pixels = pixels_of(picture)
             height, width = (side // even * even for side in pixels.shape[:2])
