@@ -1,4 +1,4 @@
-"""Sphinx extension: figures as wide as a journal's page scroll on a phone, at a size to be read."""
+"""Sphinx extension: figures of print size are shown at a size to be read, on a phone too."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from PIL import Image
 from sphinx.application import Sphinx
 
 WIDE = 1200  # pixels; at 200 dpi a journal's column has 669, its page 1377
+SCREEN = 150  # dpi; pictures of screens have less, or none
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -19,8 +20,10 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 
 def mark_wide(app: Sphinx, doctree: nodes.document) -> None:
-    """Give figures that are as wide as a page a class, for docs/_static/site.css."""
+    """Give figures as wide as a journal's page, or column, a class for docs/_static/site.css."""
     for image in doctree.findall(nodes.image):
         with Image.open(Path(app.srcdir) / image["uri"]) as opened:
             if opened.width >= WIDE:
                 image["classes"].append("wide")
+            elif opened.info.get("dpi", (0, 0))[0] > SCREEN:
+                image["classes"].append("column")

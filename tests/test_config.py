@@ -189,12 +189,12 @@ WRONG = {
     "parts: []\n": "a test needs name",
     "name: a\nparts:\n- kind: b\n- {}\n": "line 4: parts[1] needs kind",
     "nam: a\n": "line 1: unknown key 'nam' (did you mean name?)",
-    "name: a\nbest:\n  kind: b\n  size: -1\n": "line 4: best.size = -1: input should be greater",
-    "name: a\nbest:\n  kind: b\n  size: '1'\n": "line 4: best.size = '1': input should be a valid",
-    "name: a\nhome:\n  crank: .nan\n": "line 3: home.crank = nan: input should be a finite number",
+    "name: a\nbest:\n  kind: b\n  size: -1\n": "line 4: best.size = -1: must be greater",
+    "name: a\nbest:\n  kind: b\n  size: '1'\n": "line 4: best.size = '1': must be a valid",
+    "name: a\nhome:\n  crank: .nan\n": "line 3: home.crank = nan: must be a finite number",
     "name: a\nhome:\n  ball: [0, 0]\n": "line 3: home.ball = [0, 0]: ",
     "name: ''\n": "line 1: name = '': ",
-    "name: 3\n": "line 1: name = 3: input should be a valid string",
+    "name: 3\n": "line 1: name = 3: must be a valid string",
 }
 
 

@@ -165,9 +165,7 @@ class YamlFile:
                 f"{path_text(path[:-1]) or what} are: {', '.join(keys)}"
             )
         said = "" if isinstance(value, dict) else f" = {shown(value)}"
-        rule = problem["msg"].removeprefix("Value error, ")
-        rule = rule[0].lower() + rule[1:]
-        return f"{where}: {path_text(path) or what}{said}: {rule}"
+        return f"{where}: {path_text(path) or what}{said}: {rule_of(problem)}"
 
     def _found(self, path: Sequence[str | int]) -> tuple[int, int]:
         """Return how many parts of a path the file holds, and the line (from 0) of the last."""
@@ -207,6 +205,13 @@ def problems_of(error: ValidationError) -> list[Any]:
     """Return all problems, unknown keys first, which may be misspelt missing ones."""
     problems = error.errors(include_url=False)
     return sorted(problems, key=lambda one: one["type"] != "extra_forbidden")
+
+
+def rule_of(problem: Any) -> str:
+    """Return the rule that one of pydantic's problems breaks: "must be greater than 0"."""
+    rule = str(problem["msg"]).removeprefix("Value error, ")
+    rule = rule.replace("Input should", "must", 1)
+    return rule[0].lower() + rule[1:]
 
 
 def together(errors: Sequence[InputError], origin: str) -> InputError:

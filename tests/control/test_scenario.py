@@ -139,7 +139,7 @@ def test_gains_in_the_law_s_own_units(tmp_path: Path) -> None:
     [
         ("robot: micro", "", r"a scenario needs robot"),
         ("robot: micro", "robot: nano", "'nano' is not a file or a preset; the presets are: "),
-        ("robot: micro", "robot: 5", r"line 1: robot = 5: input should be a valid string"),
+        ("robot: micro", "robot: 5", r"line 1: robot = 5: must be a valid string"),
         (
             "controller:",
             "kontroller:",

@@ -84,7 +84,7 @@ def test_all_or_none_are_given(field: str) -> None:
 
 
 def test_a_mass_that_is_given_is_not_zero() -> None:
-    with pytest.raises(ParameterError, match=r"platform_mass = 0\.0: Input should be greater"):
+    with pytest.raises(ParameterError, match=r"platform_mass = 0\.0: must be greater"):
         MICRO.replace(platform_mass=0.0)
     with pytest.raises(ParameterError, match="must be positive"):
         MICRO.replace(platform_inertia=np.zeros((3, 3)))

@@ -146,9 +146,9 @@ def test_the_files_in_the_documents_move_from_rest_to_rest(file: Path) -> None:
             "kind: circle\nhight: 1\nduration: 1\n",
             ", line 2: unknown key 'hight' .did you mean height.*height, tilt",
         ),
-        (CIRCLE.replace("0.1", "'5.0e-3'"), ", line 3: tilt = '5.0e-3': input should be a valid n"),
-        (CIRCLE.replace("0.1", "steep"), ", line 3: tilt = 'steep': input should be a valid num"),
-        (CIRCLE.replace("0.1", ".nan"), ", line 3: tilt = nan: input should be a finite number"),
+        (CIRCLE.replace("0.1", "'5.0e-3'"), ", line 3: tilt = '5.0e-3': must be a valid n"),
+        (CIRCLE.replace("0.1", "steep"), ", line 3: tilt = 'steep': must be a valid num"),
+        (CIRCLE.replace("0.1", ".nan"), ", line 3: tilt = nan: must be a finite number"),
         (CIRCLE.replace("0.1", "yes"), ", line 3: tilt = 'yes': "),
         (CIRCLE.replace("0.1", "true"), ", line 3: tilt = True: "),
         (CIRCLE.replace("0.1", "-0.1"), ", line 3: tilt = -0.1: it must be a positive number"),
@@ -174,7 +174,7 @@ def test_the_files_in_the_documents_move_from_rest_to_rest(file: Path) -> None:
         ),
         (
             "kind: spline\ntimes: [0, 1]\nposes:\n- [1, 0, 0]\n- [1, 0, up]\n",
-            r", line 5: poses\[1\]\[2\] = 'up': input should be a valid number",
+            r", line 5: poses\[1\]\[2\] = 'up': must be a valid number",
         ),
         (
             "kind: spline\nposes: [[1, 0, 0], [2, 0, 0]]\ntimes: [1, 0]\n",

@@ -194,6 +194,14 @@ def test_forces_of_rest_are_said_to_be_and_known_ones_are_not(robot):
         assert ", at rest:" in of_closures
 
 
+def test_forces_that_are_all_zero_are_nothing_to_show():
+    four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
+    run = four_bar.simulate(four_bar.home, duration=0.05, forces=True)
+    assert "forces" not in fitting_layers(four_bar, run)
+    with pytest.raises(InputError, match="the actuators exert no force in this motion"):
+        shown(four_bar, run, layers=["forces"])
+
+
 def test_reactions_of_a_simulation_are_its_own_with_its_wrench():
     four_bar = ClosedLoopModel.load(URDF / "four_bar.yaml")
     push = {"coupler": [3.0, 0.0, -5.0, 0.0, 0.0, 0.0]}

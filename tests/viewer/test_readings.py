@@ -121,7 +121,8 @@ def test_the_use_of_the_limits_is_told_as_a_number():
 def test_the_picture_holds_the_motion_and_all_arrows(name):
     """Every point within the sphere of the frame, and within the outline that the page fits."""
     mechanism = ClosedLoopModel.load(URDF / f"{name}.yaml")
-    run = mechanism.simulate(mechanism.home, duration=0.2, forces=True)
+    tau = np.full(mechanism.actuated_indices.size, 0.3)
+    run = mechanism.simulate(mechanism.home, duration=0.2, forces=True, tau=tau)
     view, recorder = shown(mechanism, run, layers=["forces"], hidden=["reactions"])
     centre, radius = view.scene.frame.centre, view.scene.frame.radius
     stage = stage_around(view.scene.frame, 0.0)

@@ -145,5 +145,7 @@ def _range(low: float, high: float) -> str:
     if low == -high:
         return f"±{high:.4g}"
     if not np.isfinite(low):
-        return f"at most {high:.4g}"
-    return f"{low:.4g} to {high:.4g}" if np.isfinite(high) else f"at least {low:.4g}"
+        found = f"at most {high:.4g}"
+    else:
+        found = f"{low:.4g} to {high:.4g}" if np.isfinite(high) else f"at least {low:.4g}"
+    return found.replace("-", "\N{MINUS SIGN}")

@@ -20,7 +20,7 @@ from ruamel.yaml.comments import CommentedMap
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.dynamics.passive_joint_forces import FRICTION_SPEED
-from rps_pin.config import Finite, NonNegative, Positive, problems_of, read_yaml
+from rps_pin.config import Finite, NonNegative, Positive, problems_of, read_yaml, rule_of
 from rps_pin.errors import InputError, ParameterError, did_you_mean
 from rps_pin.files import write_text
 from rps_pin.other_kinds import refuses_other_kinds
@@ -394,7 +394,7 @@ def _parameter_error(problem: Any) -> ParameterError:
     elif inner:
         rule = "must be two numbers, (lower, upper)"
     else:
-        rule = problem["msg"].removeprefix("Value error, ")
+        rule = rule_of(problem)
     return ParameterError(field, value, rule)
 
 

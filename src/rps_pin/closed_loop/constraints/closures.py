@@ -38,7 +38,7 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop.constraints.couplings import JointCoupling
-from rps_pin.errors import InputError, MechanismError, shown
+from rps_pin.errors import InputError, MechanismError, did_you_mean, shown
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.validation import numbers, real
 
@@ -287,7 +287,8 @@ def joint_id(model: pin.Model, name: str, asked_by: str) -> int:
     """Return the index of a joint, or say which joints there are."""
     names = list(model.names)[1:]  # not the world's
     if name not in names:
-        raise MechanismError(f"{asked_by}: no joint {name!r}; there are: {', '.join(names)}")
+        near = did_you_mean(name, names)
+        raise MechanismError(f"{asked_by}: no joint {name!r}{near}; there are: {', '.join(names)}")
     return names.index(name) + 1
 
 
@@ -299,7 +300,8 @@ def frame_id(model: pin.Model, name: str, asked_by: str = "") -> int:
     names = [frame.name for frame in model.frames]
     prefix = f"{asked_by}: " if asked_by else ""
     if name not in names:
-        raise MechanismError(f"{prefix}no frame {name!r}; there are: {', '.join(names)}")
+        near = did_you_mean(name, names)
+        raise MechanismError(f"{prefix}no frame {name!r}{near}; there are: {', '.join(names)}")
     found = [index for index, one in enumerate(names) if one == name]
     if len(found) > 1:
         links = [i for i in found if model.frames[i].type == pin.FrameType.BODY]

@@ -58,8 +58,10 @@ class Forces(RobotSizedLayer):
     newton_metres_per_metre: float | None = None
 
     def missing(self, subject: DisplayedMechanism, motion: Motion) -> str:
-        """Return whether there are no actuators, or no masses; see `Layer`."""
+        """Return whether there are no actuators, no forces, or no masses; see `Layer`."""
         none = "" if subject.mechanism.actuated else "no joint is actuated"
+        if motion.forces is not None and not motion.forces.any():
+            none = none or "the actuators exert no force in this motion"
         return none or _without_masses(subject, motion.forces)
 
     def draw(self, context: LayerContext) -> DrawnLayer:
@@ -206,7 +208,9 @@ def _arrows(
         )
         first = motion.state_at(0.0)
         known = first.tau if title.name == "forces" else first.constraint_forces
-        at_rest = ", at rest" if motion.at_rest and known is None else ""
+        at_rest = ", at rest" if len(motion.times) == 1 else ", of each pose at rest"
+        if known is not None or not motion.at_rest:
+            at_rest = ""
         most = ", ".join(f"at most {greatest[unit]:.3g} {unit}" for unit in per_metre)
         text = f"{title.text}{at_rest}: {lengths}; {most}"
         legend = LegendEntry(title.name, text, title.colour)
