@@ -232,9 +232,13 @@ def _counted(check: PathCheck) -> str:
     does = "interferes" if len(touching) == 1 else "interfere"
     met = f"; {_pairs(len(touching))} of links {does}" if touching else ""
     return (
-        f"crosses singularities {crossings} times, grazes or stays in them {near} times, "
-        f"leaves limits {outside} times{', and its assembly mode ends' if ends else ''}{met}"
+        f"crosses singularities {_times(crossings)}, grazes or stays in them {_times(near)}, "
+        f"leaves limits {_times(outside)}{', and its assembly mode ends' if ends else ''}{met}"
     )
+
+
+def _times(count: int) -> str:
+    return f"{count} time" if count == 1 else f"{count} times"
 
 
 def pose_of_robot_in_words(pose: Array, angle: str = "rad") -> str:
