@@ -161,7 +161,11 @@ def test_losses_of_replaced_joints_are_told(tmp_path: Path) -> None:
     ("before", "after", "said"),
     [
         ("'motor'", "'moter'", r"line 3: name_mot: no joint 'moter' \(did you mean motor\?\)"),
-        ("'loop_B']", "'loop_C']", r"line 1: closed_loop: no frame 'loop_C' \(did you mean loop_B\?\)"),
+        (
+            "'loop_B']",
+            "'loop_C']",
+            r"line 1: closed_loop: no frame 'loop_C' \(did you mean loop_B\?\)",
+        ),
         ("'loop_B']", "'loop_B', 'base']", "line 1: a loop is closed at two frames, not 3"),
         ("'3D'", "'4D'", "line 2: no type '4D' of a closure; there are: 3d, 6d"),
         ("'3D'", "'3D', '3D'", "line 2: 2 entries of type stand beside 1 of closed_loop"),
