@@ -84,7 +84,9 @@ def test_frames() -> None:
                 wanted = exact.frame_jacobian(s.q, frame, axes=axes)
                 assert difference(found, wanted) <= ACCEPTED
     for engine in (fast, exact):
-        with pytest.raises(MechanismError, match="no frame 'plattform'; there are: "):
+        with pytest.raises(
+            MechanismError, match=r"no frame 'plattform' \(did you mean platform\?\); there are: "
+        ):
             engine.frame_placement(exact.home, "plattform")
 
 

@@ -196,12 +196,13 @@ def test_yaml_numbers_that_overflow_are_not_infinite(number: str, tmp_path: Path
 @pytest.mark.parametrize("name", ["x" * 300, "a/" * 3000])
 def test_names_longer_than_a_system_takes(name: str, tmp_path: Path) -> None:
     scenario = tmp_path / "scenario.yaml"
-    rest = (
-        "trajectory: {kind: circle, height: 0.22, tilt: 0, duration: 1}\n"
-        "controller: {law: computed_torque, bandwidth: 1}\n"
-    )
-    for key in ("robot", "mechanism"):
-        scenario.write_text(f"{key}: {name}\n{rest}", "utf-8")
+    controller = "controller: {law: computed_torque, bandwidth: 1}\n"
+    trajectories = {
+        "robot": "trajectory: {kind: circle, height: 0.22, tilt: 0, duration: 1}\n",
+        "mechanism": "trajectory: {kind: point_to_point, end: {z: 0.6}, duration: 1}\n",
+    }
+    for key, trajectory in trajectories.items():
+        scenario.write_text(f"{key}: {name}\n{trajectory}{controller}", "utf-8")
         with pytest.raises(InputError, match=r"there is no such file|not a file or a preset"):
             load_scenario(scenario)
     with pytest.raises(InputError, match="not a file or a preset"):

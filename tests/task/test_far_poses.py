@@ -92,6 +92,6 @@ def test_no_pose_within_limits_is_beyond_the_reach(name) -> None:
         x = np.asarray(x)[np.isfinite(np.asarray(x)).all(axis=1)]
         reached += len(x)
         lengths = np.linalg.norm(x[:, [not one for one in task.angular]], axis=1)
-        farthest = max(farthest, float(lengths.max(initial=0.0)))
+        farthest = float(np.append(lengths, farthest).max())
     assert reached > 20
     assert farthest <= far.reach < 4 * farthest
