@@ -6,6 +6,7 @@ process made them, so that the next one can remove them.
 
 from __future__ import annotations
 
+import _thread
 import functools
 import hashlib
 import os
@@ -75,7 +76,11 @@ def signals_as_ctrl_c() -> Iterator[None]:
         else:
             hook(found)
             return
-        threading.Timer(_AGAIN, _to_main_thread, (again,)).start()
+        started = False
+        while not started:
+            with suppress(KeyboardInterrupt):  # it came while this was slow: once more
+                _thread.start_new_thread(_to_main_thread, (again,))  # does not wait for the thread
+                started = True
 
     try:
         sys.unraisablehook = lost
@@ -94,6 +99,7 @@ def signals_as_ctrl_c() -> Iterator[None]:
 
 
 def _to_main_thread(number: int) -> None:
+    time.sleep(_AGAIN)
     signal.pthread_kill(threading.main_thread().ident or 0, number)
 
 
