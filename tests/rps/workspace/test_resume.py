@@ -121,12 +121,13 @@ def test_any_executor_gives_the_same_file(tmp_path: Path, kind: type[Executor]) 
 
 
 def killing(pools: list[Any], at: set[int]) -> Callable[[Iterable[int]], Iterator[int]]:
-    """Return a progress that kills a worker of the last pool before these blocks."""
+    """Return a progress that kills the workers of the last pool before these blocks."""
 
     def progress(blocks: Iterable[int]) -> Iterator[int]:
         for i in blocks:
             if i in at:
-                os.kill(next(iter(pools[-1]._processes)), signal.SIGKILL)
+                for worker in list(pools[-1]._processes):
+                    os.kill(worker, signal.SIGKILL)
             yield i
 
     return progress

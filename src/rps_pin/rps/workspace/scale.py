@@ -218,15 +218,7 @@ class _Pool:
             try:
                 found = self._pending[0][1].result()
             except BrokenExecutor:
-                self._deaths += 1
-                if self._given is not None or self._deaths > _MOST_DEATHS:
-                    raise
-                self.end(kill=True)
-                self._pool = _processes(self._workers)
-                lost = [block for block, _ in self._pending]
-                self._pending.clear()
-                for block in lost:
-                    self._submit(block)
+                self._start_again()
                 continue
             self._pending.popleft()
             return found
@@ -239,9 +231,26 @@ class _Pool:
             for _, future in self._pending:
                 future.cancel()
 
+    def _start_again(self) -> None:
+        """Replace processes of which one died, with the blocks under way; or raise what it is."""
+        self._deaths += 1
+        if self._given is not None or self._deaths > _MOST_DEATHS:
+            raise  # noqa: PLE0704  (of the handler that calls this)
+        self.end(kill=True)
+        self._pool = _processes(self._workers)
+        lost = [block for block, _ in self._pending]
+        self._pending.clear()
+        for block in lost:
+            self._submit(block)
+
     def _submit(self, block: Block) -> None:
         with workers_without_signals():  # the first call starts them
-            self._pending.append((block, self._pool.submit(self._cast, block)))
+            try:
+                future = self._pool.submit(self._cast, block)
+            except BrokenExecutor:
+                self._start_again()
+                future = self._pool.submit(self._cast, block)
+        self._pending.append((block, future))
 
 
 def _processes(workers: int) -> Any:
