@@ -364,13 +364,6 @@ class TaskMaps:
         """
         return self._basis(q, x, errors)[..., self._actuated, :]
 
-    def basis(self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise") -> Array:
-        """Return T, the speeds of all joints by the task's, v = T x', shape (..., nv, m).
-
-        Arguments and errors are those of `jacobian`, whose K are the actuators' rows of T.
-        """
-        return self._basis(q, x, errors)[..., : self._nv, :]
-
     def hessian(
         self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise"
     ) -> Array:

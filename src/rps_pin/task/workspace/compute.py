@@ -117,9 +117,7 @@ def workspace(
     for front in fronts(task, grid, first, q):
         for begin in range(0, len(front.at), _BLOCK):
             part = slice(begin, begin + _BLOCK)
-            computed = evaluation.fields(
-                *(one[part] for one in (front.q, front.x, front.speeds.gain))
-            )
+            computed = evaluation.fields(front.q[part], front.x[part])
             for field, values in zip(flat, computed, strict=True):
                 field[front.at[part]] = values
             bar.add(len(front.at[part]))

@@ -154,11 +154,11 @@ class Evaluation:
         """What one point takes in memory."""
         return sum(part.nbytes for part in self.empty(()))
 
-    def fields(self, q: Array, x: Array, K: Array) -> TaskFields:
-        """Return the fields of configurations (n, nq) at task coordinates (n, m), with K there."""
+    def fields(self, q: Array, x: Array) -> TaskFields:
+        """Return the fields of configurations (n, nq) at task coordinates (n, m)."""
         q = self._turned(q)
         a = q[:, self._actuated]
-        measured = gains_of(self._task, K)
+        measured = gains_of(self._task, self._task.jacobian(q, x=x, errors="mask"))
         return TaskFields(
             self._reason(q, x, measured),
             a,

@@ -18,7 +18,7 @@ import numpy as np
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.task.task import Task
-from rps_pin.task.workspace.continuation import Continuation, Speeds
+from rps_pin.task.workspace.continuation import continued
 from rps_pin.task.workspace.grids import TaskGrid
 
 
@@ -31,7 +31,6 @@ class Front(NamedTuple):
     """Task coordinates, shape (n, m)."""
     q: Array
     """Configurations, shape (n, nq)."""
-    speeds: Speeds
 
 
 def fronts(task: Task, grid: TaskGrid, first: int, q: Array) -> Iterator[Front]:
@@ -50,14 +49,9 @@ def fronts(task: Task, grid: TaskGrid, first: int, q: Array) -> Iterator[Front]:
     """
     index = np.array([first], dtype=np.intp)
     x = grid.points(index)
-    continuation = Continuation(task, (q, x[0]))
-
-    def front_of(index: Indices, x: Array, q: Array) -> Front:
-        return Front(index, x, q, continuation.speeds(q, x))
-
     reached = np.zeros(grid.size, dtype=bool)
     reached[first] = True
-    front = front_of(index, x, q[None])
+    front = Front(index, x, q[None])
     steps = [int(np.prod(grid.shape[axis + 1 :], dtype=np.intp)) for axis in range(len(grid.shape))]
     while True:
         yield front
@@ -72,10 +66,9 @@ def fronts(task: Task, grid: TaskGrid, first: int, q: Array) -> Iterator[Front]:
                     continue
                 index = front.at[tried] + way * step
                 x = grid.points(index)
-                begin = front.q[tried], front.x[tried]
-                found, ok = continuation(*begin, x, front.speeds.steepness[tried])
+                found, ok = continued(task, front.q[tried], front.x[tried], x)
                 reached[index[ok]] = True
                 parts.append((index[ok], x[ok], found[ok]))
         if not any(len(index) for index, *_ in parts):
             return
-        front = front_of(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        front = Front(*(np.concatenate(part) for part in zip(*parts, strict=True)))
