@@ -14,7 +14,6 @@ Layout of a file:
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 from collections.abc import Iterator, Sequence
@@ -28,7 +27,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rps_pin.errors import InputError, shown
-from rps_pin.files import whole_file
 from rps_pin.interruption import interruptions_wait
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.parameters import RPSParameters
@@ -37,7 +35,7 @@ from rps_pin.rps.workspace.evaluate import Fields, evaluate
 from rps_pin.rps.workspace.grids import AXES, WHOLE, Block, Grid, checked_grid
 from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.rps.workspace.result import Workspace
-from rps_pin.task.workspace.hdf5 import LastingFile, new_hdf5_file, own_dataset
+from rps_pin.task.workspace.hdf5 import LastingFile, own_dataset, workspace_file
 from rps_pin.validation import choice, non_negative_number, real_array, real_vector
 
 FORMAT = "rps_pin workspace 1"
@@ -98,20 +96,11 @@ def new_workspace_file(
     OSError
         If the disk has no room for it, or a write fails; says so, and how large it would be.
     """
-    target = Path(path)
     names = checked_fields(fields)
     choice(dtype, "dtype", ("float32", "float64"))
-    if not target.parent.is_dir():
-        raise InputError(f"{target.parent} is not a folder: {target.name} cannot be written there")
-    if target.exists() and not overwrite:
-        raise InputError(f"{target} exists; overwrite=True replaces it")
     grid = source.grid
     size = grid.size * bytes_per_point(names, dtype)
-    with (
-        _clear_failures(target, size),
-        whole_file(target) as scratch,
-        new_hdf5_file(scratch) as (file, disk),
-    ):
+    with workspace_file(path, overwrite, f" ({size / 1e9:.3g} GB)") as (file, disk):
         with interruptions_wait():
             _describe(file, source)
             for name in names:
@@ -286,18 +275,3 @@ def bytes_per_point(fields: Sequence[str], dtype: DType) -> int:
     """Return how many bytes of a file one point of the grid takes."""
     numbers = sum(3 if name in _VECTORS else 1 for name in fields if name != "reason")
     return 2 + numbers * np.dtype(dtype).itemsize
-
-
-@contextmanager
-def _clear_failures(target: Path, size: int) -> Iterator[None]:
-    """Say of a failing write which file it was, and how large."""
-    try:
-        yield
-    except OSError as error:
-        code = error.errno or errno.EIO
-        raise OSError(
-            code,
-            f"the workspace ({size / 1e9:.3g} GB) could not be written, and no part of it was "
-            f"kept: {os.strerror(code)}",
-            str(target),
-        ) from error

@@ -9,6 +9,8 @@ reports success in any case.
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +18,7 @@ from pathlib import Path
 import h5py
 
 from rps_pin.errors import InputError
+from rps_pin.files import whole_file
 from rps_pin.interruption import interruptions_wait
 
 
@@ -55,6 +58,48 @@ class LastingFile:
         """Raise the error that was kept, if there is one."""
         if self._failure is not None:
             raise self._failure
+
+
+@contextmanager
+def workspace_file(
+    path: str | os.PathLike[str], overwrite: bool, size: str = ""
+) -> Iterator[tuple[h5py.File, LastingFile]]:
+    """Give a workspace's file to write, which appears at `path`, whole, when the block ends well.
+
+    Any interruption leaves no file, and what stood at `path` before untouched.
+
+    Parameters
+    ----------
+    path
+        Where.
+    overwrite
+        Whether a file that exists is replaced.
+    size
+        How large it will be, for messages: ``" (3 GB)"``.
+
+    Raises
+    ------
+    InputError
+        If the file exists and `overwrite` is false, or its folder does not.
+    OSError
+        If the disk has no room for it, or a write fails.
+    """
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise InputError(f"{target.parent} is not a folder: {target.name} cannot be written there")
+    if target.exists() and not overwrite:
+        raise InputError(f"{target} exists; overwrite=True replaces it")
+    try:
+        with whole_file(target) as scratch, new_hdf5_file(scratch) as opened:
+            yield opened
+    except OSError as error:
+        code = error.errno or errno.EIO
+        raise OSError(
+            code,
+            f"the workspace{size} could not be written, and no part of it was kept: "
+            f"{os.strerror(code)}",
+            str(target),
+        ) from error
 
 
 @contextmanager

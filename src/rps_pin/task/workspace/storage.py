@@ -13,7 +13,6 @@ Layout of a file:
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 from pathlib import Path
@@ -25,12 +24,11 @@ import numpy as np
 import rps_pin
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.files import whole_file
 from rps_pin.interruption import interruptions_wait
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.workspace.evaluate import TaskFields
 from rps_pin.task.workspace.grids import TaskGrid, checked_axis
-from rps_pin.task.workspace.hdf5 import new_hdf5_file, own_dataset
+from rps_pin.task.workspace.hdf5 import own_dataset, workspace_file
 from rps_pin.task.workspace.result import TaskWorkspace
 from rps_pin.validation import non_negative_number
 
@@ -76,23 +74,10 @@ def save_workspace(
     OSError
         If the disk has no room for it, or a write fails.
     """
-    target = Path(path)
-    if not target.parent.is_dir():
-        raise InputError(f"{target.parent} is not a folder: {target.name} cannot be written there")
-    if target.exists() and not overwrite:
-        raise InputError(f"{target} exists; overwrite=True replaces it")
-    try:
-        with whole_file(target) as scratch, new_hdf5_file(scratch) as (file, disk):
-            with interruptions_wait():
-                _write(file, workspace, description)
-            disk.check()
-    except OSError as error:
-        code = error.errno or errno.EIO
-        raise OSError(
-            code,
-            "the workspace could not be written, and no part of it was kept: " + os.strerror(code),
-            str(target),
-        ) from error
+    with workspace_file(path, overwrite) as (file, disk):
+        with interruptions_wait():
+            _write(file, workspace, description)
+        disk.check()
 
 
 @refuses_other_kinds
