@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from rps_pin.closed_loop import ClosedLoopModel
-from rps_pin.config import Faults, YamlFile, read_yaml
+from rps_pin.config import Faults, Schema, YamlFile, read_yaml
 from rps_pin.control.drive_control import DriveControl
 from rps_pin.control.estimator.effective_inertia import effective_inertia
 from rps_pin.control.loop.computed_torque import ComputedTorque
@@ -209,13 +209,7 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
     folder = Path(path).parent
     if "mechanism" in file.values:
         return _of_mechanism(file, folder)
-    faults = Faults(file.origin)
-    with faults:
-        entry = file.validated(ScenarioEntry, "a scenario")
-    if isinstance(file.values.get("trajectory"), Mapping):
-        with faults:
-            validated(file.part("trajectory"))
-    faults.tell()
+    entry = _entry(file, ScenarioEntry, validated)
     with file.at("robot"):
         nominal = load_robot(entry.robot, folder)
         nominal.parameters.require_bodies()
@@ -232,16 +226,24 @@ def load_scenario(path: str | os.PathLike[str]) -> Scenario:
     return Scenario(entry, model, machine, trajectory, gains, _faults(file, entry, 3, 3))
 
 
+def _entry(
+    file: YamlFile, schema: type[Schema], validated_trajectory: Callable[[YamlFile], object]
+) -> Schema:
+    """Return what a file holds, or tell its faults and those of its trajectory at once."""
+    faults = Faults(file.origin)
+    with faults:
+        entry = file.validated(schema, "a scenario")
+    if isinstance(file.values.get("trajectory"), Mapping):
+        with faults:
+            validated_trajectory(file.part("trajectory"))
+    faults.tell()
+    return entry
+
+
 def _of_mechanism(file: YamlFile, folder: Path) -> Scenario:
     """Return the scenario of a mechanism with a task."""
     refuse_parameters(file, folder)
-    faults = Faults(file.origin)
-    with faults:
-        entry = file.validated(TaskScenarioEntry, "a scenario")
-    if isinstance(file.values.get("trajectory"), Mapping):
-        with faults:
-            validated_task_trajectory(file.part("trajectory"))
-    faults.tell()
+    entry = _entry(file, TaskScenarioEntry, validated_task_trajectory)
     nominal = task_of_file(file, folder, entry.mechanism)
     _check_drives(file, entry)
     model = changed(nominal, entry.controller.model.masses)
