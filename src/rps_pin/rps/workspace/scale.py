@@ -217,8 +217,8 @@ class _Pool:
         while True:
             try:
                 found = self._pending[0][1].result()
-            except BrokenExecutor:
-                self._start_again()
+            except BrokenExecutor as death:
+                self._start_again(death)
                 continue
             self._pending.popleft()
             return found
@@ -231,11 +231,11 @@ class _Pool:
             for _, future in self._pending:
                 future.cancel()
 
-    def _start_again(self) -> None:
-        """Replace processes of which one died, with the blocks under way; or raise what it is."""
+    def _start_again(self, death: BrokenExecutor) -> None:
+        """Replace processes of which one died, with the blocks under way; or raise its death."""
         self._deaths += 1
         if self._given is not None or self._deaths > _MOST_DEATHS:
-            raise  # noqa: PLE0704  (of the handler that calls this)
+            raise death
         self.end(kill=True)
         self._pool = _processes(self._workers)
         lost = [block for block, _ in self._pending]
@@ -247,8 +247,8 @@ class _Pool:
         with workers_without_signals():  # the first call starts them
             try:
                 future = self._pool.submit(self._cast, block)
-            except BrokenExecutor:
-                self._start_again()
+            except BrokenExecutor as death:
+                self._start_again(death)
                 future = self._pool.submit(self._cast, block)
         self._pending.append((block, future))
 
