@@ -14,10 +14,12 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.arrays import Array, Bools
+from rps_pin.errors import InputError
 from rps_pin.numerics.intervals import Enclosure, Interval
+from rps_pin.validation import non_negative_number, real_vector, whole_number
 
 Verdict = Literal["inside", "outside", "partly", "undecided"]
 #: Places of a box among those of its size: its level, and counts from the least corner.
@@ -134,7 +136,14 @@ def prove(
         It ends also where this many boxes are undecided.
     progress
         Wraps the loops over blocks of boxes.
+
+    Raises
+    ------
+    InputError
+        If a number that ends the cutting is not one.
     """
+    undecided = non_negative_number(undecided, "undecided")
+    whole_number(most_boxes, "most_boxes", least=1)
     halves = np.array(list(np.ndindex(*(1 + (upper > lower)))), dtype=np.int32)
     places = np.zeros((1, 1 + len(lower)), dtype=np.int32)
     asked = np.ones((1, sum(count for count, _ in groups.values())), dtype=bool)
@@ -162,6 +171,34 @@ def prove(
         cut[:, 0] += 1
         cut[:, 1:] = (1 + (upper > lower)) * cut[:, 1:] + np.tile(halves, (len(places), 1))
         places, asked = cut, np.repeat(asked, len(halves), axis=0)
+
+
+def checked_box(
+    lower: ArrayLike, upper: ArrayLike, size: int, *, held: bool = False
+) -> tuple[Array, Array]:
+    """Return the ends of a box, shape (size,) each.
+
+    Parameters
+    ----------
+    lower, upper
+        As they are given.
+    size
+        Number of coordinates.
+    held
+        Whether some of the coordinates may be held: lower and upper are equal.
+
+    Raises
+    ------
+    InputError
+        If they are not of that shape, or the box is empty.
+    """
+    low, high = real_vector(lower, size, "lower"), real_vector(upper, size, "upper")
+    apart = low < high
+    if not (apart.any() and (low <= high).all() if held else apart.all()):
+        raise InputError(
+            f"the box from {low.tolist()} to {high.tolist()} is empty: lower must be below upper"
+        )
+    return low, high
 
 
 def bounded(margins: Callable[..., Sequence[Any]], box: Interval, slack: float) -> list[Bounds]:

@@ -47,10 +47,12 @@ def bounds_at_ends(s: Interval) -> tuple[Stumpff, Stumpff]:
     return at(s.lower), at(s.upper)
 
 
-def enclosures(s: Enclosure) -> tuple[Enclosure, ...]:
-    """Return c_0 to c_4 over boxes."""
-    low, high = bounds_at_ends(s.values)
+def enclosures(s: Interval | Enclosure) -> tuple[Number, ...]:
+    """Return c_0 to c_4 over boxes; with slopes, of what has them."""
+    low, high = bounds_at_ends(s.values if isinstance(s, Enclosure) else s)
     c = [one.hull(other) for one, other in zip(low, high, strict=True)]
+    if not isinstance(s, Enclosure):
+        return tuple(c[:5])
     return tuple(s.through(c[n], 0.5 * (n * c[n + 2] - c[n + 1])) for n in range(5))
 
 

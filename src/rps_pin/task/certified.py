@@ -23,13 +23,13 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError
-from rps_pin.numerics.boxes import Bounds, CertifiedBoxes, Progress, bounded, prove
+from rps_pin.numerics.boxes import Bounds, CertifiedBoxes, Progress, bounded, checked_box, prove
 from rps_pin.numerics.intervals import Enclosure, Interval
 from rps_pin.numerics.stumpff import enclosures
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.point_legs import PointLegs, point_legs
 from rps_pin.task.task import Task
-from rps_pin.validation import non_negative_number, real_vector, whole_number
+from rps_pin.validation import real_vector
 
 Number = Any
 
@@ -81,17 +81,15 @@ def certify(
         If the start is singular.
     """
     legs = point_legs(task)
-    ends = real_vector(lower, 6, "lower"), real_vector(upper, 6, "upper")
-    _refuse_box(*ends)
-    share = non_negative_number(undecided, "undecided")
-    whole_number(most_boxes, "most_boxes", least=1)
+    ends = checked_box(lower, upper, 6, held=True)
+    _refuse_turns(*ends)
     margins = _Margins(task, legs, task.home if start is None else real_vector(start, 6, "start"))
     groups = {
         "lengths": (12, margins.lengths),
         "angles": (margins.angle_count, margins.angles),
         "singularity": (1, margins.regular),
     }
-    return prove(groups, *ends, undecided=share, most_boxes=most_boxes, progress=progress)
+    return prove(groups, *ends, undecided=undecided, most_boxes=most_boxes, progress=progress)
 
 
 class _Margins:
@@ -183,7 +181,7 @@ class _Margins:
 def _legs(legs: PointLegs, pose: tuple[Number, ...]) -> list[tuple[list[Number], list[Number]]]:
     """Return of each leg its vector p + R a - b, and R a: R v = v + A w x v + B w x (w x v)."""
     position, w = pose[:3], pose[3:]
-    a_, b_ = _coefficients(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    _, a_, b_, *_ = enclosures(_dot(w, w))
     found = []
     for fixed, point in zip(legs.base, legs.platform, strict=True):
         once = _cross(w, point)
@@ -192,15 +190,6 @@ def _legs(legs: PointLegs, pose: tuple[Number, ...]) -> list[tuple[list[Number],
         along = [p + r - f for p, r, f in zip(position, turned, fixed, strict=True)]
         found.append((along, turned))
     return found
-
-
-def _coefficients(s: Number) -> tuple[Number, Number]:
-    """Return A and B over boxes, or at points."""
-    if isinstance(s, Enclosure):
-        c = enclosures(s)
-        return c[1], c[2]
-    flat = enclosures(Enclosure(s, Interval(np.zeros((1, *s.lower.shape)))))
-    return flat[1].values, flat[2].values
 
 
 def _rows(legs: PointLegs, pose: tuple[Number, ...], unit: float) -> list[list[Number]]:
@@ -244,11 +233,7 @@ def _norm(v: list[Number]) -> Number:
     return length
 
 
-def _refuse_box(lower: Array, upper: Array) -> None:
-    if not ((lower <= upper).all() and (lower < upper).any()):
-        raise InputError(
-            f"the box from {lower.tolist()} to {upper.tolist()} is empty: lower must be below upper"
-        )
+def _refuse_turns(lower: Array, upper: Array) -> None:
     turn = float(np.linalg.norm(np.maximum(np.abs(lower), np.abs(upper))[3:]))
     if turn >= LARGEST_TURN:
         raise InputError(

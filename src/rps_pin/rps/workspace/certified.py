@@ -22,7 +22,15 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, SingularityError
-from rps_pin.numerics.boxes import Bounds, CertifiedBoxes, Group, Progress, bounded, prove
+from rps_pin.numerics.boxes import (
+    Bounds,
+    CertifiedBoxes,
+    Group,
+    Progress,
+    bounded,
+    checked_box,
+    prove,
+)
 from rps_pin.numerics.intervals import Interval
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kernels import legs as kernels
@@ -33,7 +41,7 @@ from rps_pin.rps.kernels.tilt_functions import tilt_functions
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import level_pose, parameters_of
 from rps_pin.rps.workspace.evaluate import side_of_singularity
-from rps_pin.validation import non_negative_number, real_vector, whole_number
+from rps_pin.validation import real_vector
 
 if TYPE_CHECKING:
     from rps_pin.rps.robot import RPSRobot
@@ -85,12 +93,12 @@ def certify(
         If the start is singular.
     """
     parameters = parameters_of(robot)
-    ends = real_vector(lower, 3, "lower"), real_vector(upper, 3, "upper")
-    _refuse_box(*ends)
-    share = non_negative_number(undecided, "undecided")
-    whole_number(most_boxes, "most_boxes", least=1)
+    ends = checked_box(lower, upper, 3)
+    _refuse_tilts(*ends)
     margins = Margins(parameters, _checked_start(parameters, ends, start))
-    return prove(margins.groups, *ends, undecided=share, most_boxes=most_boxes, progress=progress)
+    return prove(
+        margins.groups, *ends, undecided=undecided, most_boxes=most_boxes, progress=progress
+    )
 
 
 class Margins:
@@ -216,11 +224,7 @@ def _checked_start(
     return pose
 
 
-def _refuse_box(lower: Array, upper: Array) -> None:
-    if not (lower < upper).all():
-        raise InputError(
-            f"the box from {lower.tolist()} to {upper.tolist()} is empty: lower must be below upper"
-        )
+def _refuse_tilts(lower: Array, upper: Array) -> None:
     largest = float(np.abs([lower[1:], upper[1:]]).max())
     if largest > LARGEST_TILT:
         raise InputError(
