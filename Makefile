@@ -44,7 +44,9 @@ docs: setup-dev ## build the documentation into build/docs, warnings are errors
 	@sh tools/check docs
 
 look: setup-dev ## walk what a new user does, with pictures of it all: build/look/index.html
-	@RPS_PIN_CHROMIUM="$$(sh tools/find-browser)" .venv/bin/python -u tools/look.py
+	@browser=$$(sh tools/install-browser) || \
+		{ echo "no Chromium that runs: sudo apt-get install chromium libatomic1"; exit 1; }; \
+		RPS_PIN_CHROMIUM="$$browser" .venv/bin/python -u tools/look.py
 
 bench: setup-dev ## measure the speed of the solvers, and of generated code against its peers
 	OPENBLAS_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks --benchmark-only $(PYTEST_ARGS)
