@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from rps_pin.task.workspace import load_workspace, volume
+from rps_pin import ClosedLoopModel
+from rps_pin.task import Payload
+from rps_pin.task.workspace import load_workspace, volume, workspace
 from tests.cli.commands import rps_pin
 
 FIVE_BAR = ("workspace", "-m", "five_bar", "--over", "x=-0.8:0.9:25", "--over", "z=-0.8:0.9:22")
@@ -55,6 +57,30 @@ def test_three_axes_in_degrees_make_slices_and_a_mesh(tmp_path: Path) -> None:
     assert box["rx"][1] - box["rx"][0] <= 60.0
 
 
+def test_loads_and_speeds_put_points_out_by_name(tmp_path: Path) -> None:
+    load = ("--payload", "200", "--wrench", "900", "0", "0", "0", "0", "0", "--force", "900")
+    more = (*load, "--over", "rx=-30:30:6", "--speed", "0.6", "--turning-speed", "60")
+    run = rps_pin(*STEWART, *more, "--json", "-o", str(tmp_path))
+    assert run.returncode == 0, run.stderr
+    told, found = json.loads(run.stdout), load_workspace(tmp_path / "workspace.h5")
+    assert told["out"]["leg_1_rod_joint force beyond 2000 N"] > 0
+    assert told["least_speed_left"] == found.speed_left[found.inside].min() > 0
+    assert told["least_force_left"] == found.force_left[found.inside].min() >= 0
+    task = ClosedLoopModel.load("urdf/stewart.yaml").task
+    same = workspace(
+        task,
+        found.grid,
+        payload=Payload(200.0),
+        wrench=[900, 0, 0, 0, 0, 0],
+        force=900,
+        speed=0.6,
+        turning_speed=math.radians(60),
+    )
+    assert np.array_equal(same.reason, found.reason)
+    words = rps_pin(*STEWART, *more, "--overwrite", "-o", str(tmp_path)).stdout
+    assert "speed left inside" in words
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -66,6 +92,8 @@ def test_three_axes_in_degrees_make_slices_and_a_mesh(tmp_path: Path) -> None:
         (("workspace", "-m", "five_bar", "--over", "x=0:1:5", "--over", "x=0:1:5"), "twice"),
         (("workspace", "-m", "five_bar", "--over", "x=0:1:5", "--over", "w=0:1:5"), "'w'"),
         (("workspace", "-m", "five_bar", "--points", "5"), "does not go with a mechanism"),
+        (("workspace", "--payload", "1"), "needs a --mechanism"),
+        (("workspace", "-m", "rps", "--payload-centre", "1", "0", "0"), "give its mass"),
         (("workspace", "--over", "x=0:1:5"), "needs a --mechanism"),
         (("workspace", "-m", "rps", "--over", "z=0:1:5", "--over", "w=0:1:5"), "'w'"),
     ],

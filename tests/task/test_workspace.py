@@ -11,7 +11,7 @@ from scipy.ndimage import label
 from rps_pin import ClosedLoopModel, InputError, MechanismError, RPSRobot, SingularityError
 from rps_pin import errors as of
 from rps_pin.rps import workspace as of_rps
-from rps_pin.task import Cone, Task
+from rps_pin.task import Cone, Payload, Task
 from rps_pin.task.workspace import TaskWorkspace, task_grid, workspace
 from rps_pin.task.workspace.reasons import INTERFERENCE, SINGULAR, UNREACHABLE, reason_names
 from tests.task.robots import compiled, task
@@ -153,9 +153,11 @@ def test_the_3_rps_has_the_numbers_of_its_own_workspace(preset: str) -> None:
 def test_both_engines_agree(name: str, over) -> None:
     """Also beyond the end of the assembly mode, which each finds in its own way."""
     slow, fast = task(name), compiled(name)
-    one, other = (workspace(t, task_grid(t, over), holding=True) for t in (slow, fast))
+    asked = {"holding": True, "payload": Payload(1.0, (0.05, 0, 0)), "speed": 0.5}
+    one, other = (workspace(t, task_grid(t, over), **asked) for t in (slow, fast))
     assert np.array_equal(one.reason, other.reason)
     for part, same in zip(one.fields[1:], other.fields[1:], strict=True):
+        assert part.any()
         assert worst(part - same) < 1e-9 * worst(part, 1.0)
     assert one.mask(UNREACHABLE).any() == (name != "stewart")
 
@@ -304,7 +306,7 @@ def test_a_singular_start_decides_no_mode() -> None:
 
 def test_limits_beyond_the_bits_are_refused() -> None:
     limits = task("stewart").position_limits().signals
-    with pytest.raises(InputError, match=r"72 limits .* at most 61"):
+    with pytest.raises(InputError, match=r"72 limits; .* at most 61"):
         reason_names([*limits, *limits], interference=True)
     assert len(set(reason_names([*limits, *limits][:60], interference=False))) == 62
 

@@ -103,5 +103,5 @@ def of_body(axes: tuple[Array, ...], inside) -> TaskWorkspace:
     angular = tuple(name == "rx" for name in names)
     grid = TaskGrid(names, angular, names, axes, np.full(len(axes), np.nan))
     flags = (~inside(grid.points())).astype(np.uint64)
-    fields = TaskFields(flags, *(np.zeros(grid.shape) for _ in range(6)))
+    fields = TaskFields(flags, *(np.zeros(grid.shape) for _ in TaskFields._fields[1:]))
     return TaskWorkspace("body", (), grid, np.zeros(len(axes)), 0.0, ("outside",), fields)

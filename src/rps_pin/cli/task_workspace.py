@@ -46,6 +46,28 @@ MinConditioningOption = Annotated[
     float,
     typer.Option(help="Conditioning (0 to 1) of a mechanism below which a point is singular."),
 ]
+ForceOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="N",
+        help="Force on a mechanism's output frame in any direction, with the wrench: the actuators "
+        "hold it at every point within their limits.",
+    ),
+]
+MomentOption = Annotated[
+    float | None, typer.Option(metavar="NM", help="The same of a moment, at the same time, N m.")
+]
+SpeedOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="M/S",
+        help="Speed in any direction that the actuators reach at every point within their limits.",
+    ),
+]
+TurningSpeedOption = Annotated[
+    float | None,
+    typer.Option(metavar="RAD/S", help="The same of angles, at the same time; see --degrees."),
+]
 HoldingOption = Annotated[
     bool, typer.Option("--holding", help="Compute the actuators' forces at rest, too.")
 ]
@@ -64,6 +86,8 @@ def workspace_of_task(
     *,
     ignore_limits: bool = False,
     accuracy: float | None = None,
+    turning_speed: float | None = None,
+    **demands: Any,
 ) -> None:
     """Compute, write and print a workspace; see `rps_pin.cli.workspace`."""
     model, file = options.load_mechanism(mechanism, ignore_limits, accuracy)
@@ -72,6 +96,8 @@ def workspace_of_task(
     task: Task = model.task
     if holding:
         options.require_masses(model)
+    if turning_speed is not None:
+        demands["turning_speed"] = math.radians(turning_speed) if degrees else turning_speed
     grid = _grid(task, over, held, degrees)
     drawn = "slices" if len(grid.over) == 3 else "map"
     files = [output / "workspace.h5"]
@@ -85,6 +111,7 @@ def workspace_of_task(
         grid,
         min_conditioning=min_conditioning,
         holding=holding,
+        **demands,
         progress=common.progress_bar(console, "following the assembly mode"),
     )
     if not found.inside.any():
@@ -164,6 +191,7 @@ def _summary(found: space.TaskWorkspace, degrees: bool) -> dict[str, Any]:
         "volume_unit": size.unit.replace("rad", "deg") if degrees else size.unit,
         "cut": list(size.cut),
         "least_conditioning": float(found.conditioning[found.inside].min()),
+        **_left(found),
         "largest_box": None
         if box is None
         else {
@@ -171,6 +199,19 @@ def _summary(found: space.TaskWorkspace, degrees: bool) -> dict[str, Any]:
             for name, low, high in zip(grid.over, box.lower, box.upper, strict=True)
         },
         "out": {as_asked(n): k for n, k in found.counts().items() if k and n != "inside"},
+    }
+
+
+def _left(found: space.TaskWorkspace) -> dict[str, float]:
+    """Return the least shares of the limits of force and speed that are left inside, if asked."""
+    shares = {
+        "least_force_left": (found.force_share, found.force_left),
+        "least_speed_left": (found.speed_share, found.speed_left),
+    }
+    return {
+        name: float(left[found.inside].min())
+        for name, (asked, left) in shares.items()
+        if asked.size
     }
 
 
@@ -216,6 +257,9 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
     if summary["cut"]:
         rows.append(("ends of the grid", f"reached at {', '.join(summary['cut'])}: it may go on"))
     rows.append(("least conditioning inside", f"{summary['least_conditioning']:.4g}"))
+    for quantity in ("force", "speed"):
+        if (left := summary.get(f"least_{quantity}_left")) is not None:
+            rows.append((f"{quantity} left inside", f"at least {left:.1%} of the limits"))
     if summary["largest_box"]:
         sides = summary["largest_box"].items()
         told = ", ".join(f"{name} {a:.6g} to {b:.6g} {units[name]}" for name, (a, b) in sides)

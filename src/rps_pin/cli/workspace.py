@@ -11,6 +11,7 @@ import typer
 from rich.table import Table
 
 from rps_pin.cli import console as common
+from rps_pin.cli import motion_options as motions
 from rps_pin.cli import task_workspace as of_tasks
 from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.given_options import refuse
@@ -25,6 +26,11 @@ from rps_pin.task.workspace.evaluate import MIN_CONDITIONING
 
 #: Lengths per leg of the surfaces in the figures.
 _DRAWN_POINTS = 18
+_OF_MECHANISMS = (
+    *("over", "held", "min_conditioning", "holding", "ignore_limits", "accuracy"),
+    *("payload", "payload_centre", "wrench", "force", "moment"),
+    *("speed", "turning_speed"),
+)
 _FIGURES = (
     "assembly_modes",
     "theoretical_workspace",
@@ -46,6 +52,13 @@ def workspace_command(
     held: of_tasks.HeldOption = None,
     min_conditioning: of_tasks.MinConditioningOption = MIN_CONDITIONING,
     holding: of_tasks.HoldingOption = False,
+    payload: motions.PayloadOption = None,
+    payload_centre: motions.PayloadCentreOption = (0.0, 0.0, 0.0),
+    wrench: motions.WrenchOption = None,
+    force: of_tasks.ForceOption = None,
+    moment: of_tasks.MomentOption = None,
+    speed: of_tasks.SpeedOption = None,
+    turning_speed: of_tasks.TurningSpeedOption = None,
     ignore_limits: IgnoreLimitsOption = False,
     accuracy: AccuracyOption = None,
     output: common.FolderOption = Path("workspace"),
@@ -63,7 +76,8 @@ def workspace_command(
     With **--mechanism**, the workspace of a mechanism's task over a grid of its coordinates, in the
     assembly mode of home: how many points each limit, singularity or end of the mode puts out, its
     volume with an estimate of the error, **workspace.h5**, a map or slices, and over three
-    coordinates the boundary as a mesh (**boundary.stl**).
+    coordinates the boundary as a mesh (**boundary.stl**). With a payload, wrenches or speeds also
+    the points where an actuator's force or speed would be beyond its limit are out.
 
     Exit status: 0 done; 1 an error; 2 wrong usage.
 
@@ -72,9 +86,12 @@ def workspace_command(
     - `rps-pin workspace --points 101 -o results`
 
     - `rps-pin workspace -m delta --over x=-0.5:0.5:41 --over z=-0.8:-0.2:41 -o map`
+
+    - `rps-pin workspace -m delta --over x=-0.5:0.5:41 --over z=-0.8:-0.2:41 --payload 2 --speed 3`
     """
     if mechanism is not None:
         refuse(context, "it does not go with a mechanism", "robot", "points")
+        load = motions.payload_of(payload, payload_centre, wrench)
         of_tasks.workspace_of_task(
             mechanism,
             over or (),
@@ -87,10 +104,15 @@ def workspace_command(
             as_json,
             ignore_limits=ignore_limits,
             accuracy=accuracy,
+            payload=load,
+            wrench=wrench,
+            force=force,
+            moment=moment,
+            speed=speed,
+            turning_speed=turning_speed,
         )
         return
-    names = "over", "held", "min_conditioning", "holding", "ignore_limits", "accuracy"
-    refuse(context, "this option needs a --mechanism", *names)
+    refuse(context, "this option needs a --mechanism", *_OF_MECHANISMS)
     machine = common.load_robot(robot)
     parameters = machine.parameters
     drawn = _FIGURES + ("base_radius",) * (parameters.name == "micro")

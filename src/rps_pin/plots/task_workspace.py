@@ -40,7 +40,11 @@ _FAMILIES = (
     _Family("actuator above limit", "#f3c6a5", "////"),
     _Family("other joint or cone", "#e3c8dc", "\\\\\\\\"),
     _Family("links interfere", "#f2a9a0", "++++"),
+    _Family("actuator's force", "#c5d9ee", "----"),
+    _Family("actuator's speed", "#cfe5cf", "||||"),
 )
+#: Families of the reasons that limits of actuators are, by words in them.
+_OF_ACTUATORS = {" force beyond ": 7, " speed beyond ": 8, " below ": 3, " above ": 4}
 
 
 @styled
@@ -153,7 +157,7 @@ def _families(workspace: TaskWorkspace) -> Indices:
     for name in workspace.reasons:
         number = numbers.get(name, 5)
         if number == 5 and name.startswith((*actuators, "leg ")):
-            number = 3 if " below " in name else 4
+            number = next(family for word, family in _OF_ACTUATORS.items() if word in name)
         of_reason.append((number, name))
     for number, name in sorted(of_reason, reverse=True):
         found[workspace.mask(name)] = number

@@ -86,6 +86,22 @@ class PinocchioEngine:
 
         return self._each(answer, (q,), (self._nq,), errors)
 
+    def frame_placement(self, q: ArrayLike, frame: str, errors: Errors = "raise") -> Array:
+        """Return homogeneous placements of a frame, (..., 4, 4)."""
+
+        def answer(q: Array) -> Array:
+            return self._mechanism.frame_placement(q, frame)
+
+        return self._each(answer, (q,), (4, 4), errors)
+
+    def frame_jacobian(self, q: ArrayLike, frame: str, errors: Errors = "raise") -> Array:
+        """Return Jacobians of a frame by the actuated coordinates, (..., 6, m), world axes."""
+
+        def answer(q: Array) -> Array:
+            return self._mechanism.frame_jacobian(q, frame)
+
+        return self._each(answer, (q,), (6, self._count), errors)
+
     def jacobian(self, q: ArrayLike, errors: Errors = "raise") -> Array:
         """Return J, (..., nc, nv)."""
         shape = (self._mechanism.constraint_size, self._nv)

@@ -9,7 +9,6 @@ same work, and gains the same forces:
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
@@ -104,7 +103,7 @@ class Task(TaskMaps):
         """
         K = self._gain(q, x, errors)
         f = self._rows(forces, self.size, "forces")
-        return self._carried(K, f, errors)
+        return self._carried(K, f[..., None], errors)[..., 0]
 
     def forces_to_task(
         self,
@@ -167,13 +166,32 @@ class Task(TaskMaps):
             raise MechanismError(
                 "a task of joints has no output frame; name one: Task(mechanism, frame=...)"
             )
-        q_ = self._rows(q, self._nq, "q")
-        basis = self._basis(q_, x, errors)[..., : self._nv, :]
-        batch = np.broadcast_shapes(q_.shape[:-1], basis.shape[:-2])
-        found = np.empty((*batch, 6, self.size))
-        for index in np.ndindex(batch):
-            found[index] = self._frame_jacobian(q_[index]) @ basis[index]
-        return found
+        whole = self._whole(self._rows(q, self._nq, "q"), x, errors)
+        found: Array = self._by_task.frame_jacobian(whole, self._x.frame, **options_of(errors))
+        offset = self._x.placement.translation
+        if not offset.any():
+            return found
+        turned = self._by_task.frame_placement(whole, self._x.frame, **options_of(errors))
+        lever = (turned[..., :3, :3] @ offset)[..., None]
+        # The origin's velocity is v + w x lever.
+        linear = found[..., :3, :] + np.cross(found[..., 3:, :], lever, axis=-2)
+        return np.concatenate([linear, found[..., 3:, :]], axis=-2)
+
+    def wrench_map(
+        self, q: ArrayLike, *, x: ArrayLike | None = None, errors: Errors = "raise"
+    ) -> Array:
+        """Return W, (..., na, 6): actuators' forces W w make the wrench w of the output frame.
+
+        W = K^-T E', with E of `twist_map`; arguments are those of `jacobian`, and the wrench is
+        that of `wrench_to_actuators`.
+
+        Raises
+        ------
+        ClosureError, SingularityError, MechanismError
+            As `forces_to_actuators` and `twist_map`.
+        """
+        twists = np.swapaxes(self.twist_map(q, x=x, errors=errors), -1, -2)
+        return self._carried(self._gain(q, x, errors), twists, errors)
 
     def wrench_to_actuators(
         self, q: ArrayLike, wrench: ArrayLike, *, errors: Errors = "raise"
@@ -194,8 +212,7 @@ class Task(TaskMaps):
             As `forces_to_actuators` and `twist_map`.
         """
         given = self._rows(wrench, 6, "wrench")
-        forces = np.einsum("...ij,...i->...j", self.twist_map(q, errors=errors), given)
-        return self.forces_to_actuators(q, forces, errors=errors)
+        return np.asarray(np.einsum("...ij,...j->...i", self.wrench_map(q, errors=errors), given))
 
     # Gains and inertia ----------------------------------------------------------------------------
 
@@ -371,19 +388,6 @@ class Task(TaskMaps):
         K = self.jacobian(np.where(gone, self.mechanism.home, q_), x=x, errors=errors)
         return np.where(gone[..., None], np.nan, K)
 
-    def _frame_jacobian(self, q: Array) -> Array:
-        """Return the output frame's Jacobian, (6, nv), in world axes."""
-        mechanism, x = self.mechanism, self._x
-        frame = mechanism.system.frame(x.frame or "")
-        model, data = mechanism.model, mechanism.system.data
-        pin.computeJointJacobians(model, data, q)
-        pin.framesForwardKinematics(model, data, q)
-        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        jacobian = pin.getFrameJacobian(model, data, frame, world).reshape(6, self._nv).copy()
-        lever = data.oMf[frame].rotation @ x.placement.translation
-        jacobian[:3] -= pin.skew(lever) @ jacobian[3:]
-        return np.asarray(jacobian)
-
     def _one(self, q: ArrayLike) -> Array:
         found = self._rows(q, self._nq, "q")
         if found.ndim != 1:
@@ -418,12 +422,12 @@ class Task(TaskMaps):
         return self._gain(q, x, errors)
 
     def _carried(self, K: Array, f: Array, errors: Errors) -> Array:
-        """Return tau with K' tau = f, of least norm in one unit."""
+        """Return tau with K' tau = f, of least norm in one unit; f (..., m, k)."""
         if self._actuated.size < self.size:
             raise MechanismError(
                 f"{self._actuated.size} actuators do not make all forces of {self.size} coordinates"
             )
-        return self._solved(np.swapaxes(K, -1, -2), f[..., None], errors)[..., 0]
+        return self._solved(np.swapaxes(K, -1, -2), f, errors)
 
     def _solved(self, matrix: Array, right: Array, errors: Errors) -> Array:
         """Return X with matrix X = right, matrix (..., m, na) = K'; checked in one unit."""

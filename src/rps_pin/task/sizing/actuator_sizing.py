@@ -58,15 +58,29 @@ def size_actuators(
     count = len(names)
     given = (("force", force), ("speed", speed), ("length", length))
     arrays = [samples(value, name, len(times), count) for name, value in given]
-    each = [limits] * count if isinstance(limits, ActuatorLimits) else list(limits)
-    if len(each) != count:
-        raise InputError(f"limits of {len(each)} actuators; there are {count}")
+    each = limits_of_each(limits, count)
     actuators = tuple(
         _sizing(k, times, [array[:, k] for array in arrays], each[k], threshold, names[k], turns)
         for k, turns in enumerate(angular)
     )
-    kept = limits if isinstance(limits, ActuatorLimits) else tuple(each)
+    kept = limits if isinstance(limits, ActuatorLimits) else each
     return SizingSheet(actuators, kept, threshold, times, arrays[0], arrays[1])
+
+
+def limits_of_each(
+    limits: ActuatorLimits | Sequence[ActuatorLimits], count: int
+) -> tuple[ActuatorLimits, ...]:
+    """Return the limits of each actuator, given once for all of them, or of each.
+
+    Raises
+    ------
+    InputError
+        If they are of another number of actuators.
+    """
+    each = (limits,) * count if isinstance(limits, ActuatorLimits) else tuple(limits)
+    if len(each) != count:
+        raise InputError(f"limits of {len(each)} actuators; there are {count}")
+    return each
 
 
 def _sizing(

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, MechanismError
 from rps_pin.task.paths.limits import Cone, ConeRooms
+from rps_pin.task.sizing.demands import Demands
 from rps_pin.task.task import Task
 from rps_pin.task.workspace.reasons import (
     INTERFERENCE,
@@ -43,7 +43,13 @@ class TaskFields(NamedTuple):
     """Least way of an actuator to its limits over its stroke, shape (...): 0.5 at best, negative
     beyond a limit, 0.5 if no actuator has two limits."""
     holding: Array
-    """Forces of the actuators at rest, shape (..., na), N or N m; (..., 0) if not asked for."""
+    """Forces of the actuators at rest, with the payload, shape (..., na), N or N m; (..., 0) if not
+    asked for."""
+    force_share: Array
+    """Largest force of each actuator under payload and wrenches, over its limit, shape (..., na);
+    (..., 0) if there are none. 0 without a limit, infinite at a singularity."""
+    speed_share: Array
+    """Largest speed of each actuator at the task's speeds asked for, likewise."""
 
 
 class Gains(NamedTuple):
@@ -85,6 +91,8 @@ class Evaluation:
         Least distance of two links, m; None: links are not looked at.
     ignore
         Pairs of links that may be nearer.
+    **demands
+        Loads and speeds that are asked for everywhere; see `Demands`.
 
     Raises
     ------
@@ -104,8 +112,10 @@ class Evaluation:
         holding: bool = False,
         clearance: float | None = None,
         ignore: Iterable[tuple[str, str]] = (),
+        **demands: Any,
     ) -> None:
         mechanism = task.mechanism
+        self._demands = Demands(task, **demands)
         self._task, self._side, self._least, self._holding = task, side, min_conditioning, holding
         self._actuated = task.of_actuators
         if self._actuated.size < task.size:
@@ -122,6 +132,7 @@ class Evaluation:
             self._links = mechanism.link_distances(ignore)
         self._limits = task.position_limits(), ConeRooms(mechanism, cones)
         signals = [signal for one in self._limits for signal in one.signals]
+        signals += self._demands.signals
         self.reasons = reason_names(signals, interference=clearance is not None)
         model = mechanism.model
         lower, upper = (
@@ -147,6 +158,7 @@ class Evaluation:
             np.zeros(shape),
             np.zeros(shape),
             np.zeros((*shape, na if self._holding else 0)),
+            *(np.zeros((*shape, width)) for width in self._demands.widths),
         )
 
     @property
@@ -158,15 +170,20 @@ class Evaluation:
         """Return the fields of configurations (n, nq) at task coordinates (n, m)."""
         q = self._turned(q)
         a = q[:, self._actuated]
-        measured = gains_of(self._task, self._task.jacobian(q, x=x, errors="mask"))
+        K = self._task.jacobian(q, x=x, errors="mask")
+        measured = gains_of(self._task, K)
+        holding, forces = self._forces(q, x)
+        speeds = self._demands.speed_share(K)
         return TaskFields(
-            self._reason(q, x, measured),
+            self._reason(q, x, measured, self._demands.broken(forces, speeds)),
             a,
             measured.gains,
             measured.conditioning,
             measured.determinant,
             self._stroke_left(a),
-            self._forces(q),
+            holding,
+            forces,
+            speeds,
         )
 
     def _turned(self, q: Array) -> Array:
@@ -191,15 +208,12 @@ class Evaluation:
         found[open_] = q[open_]  # a gear holds the joint
         return found
 
-    def _reason(self, q: Array, x: Array, measured: Gains) -> Flags:
+    def _reason(self, q: Array, x: Array, measured: Gains, broken: Bools) -> Flags:
         flags = np.zeros(len(q), dtype=np.uint64)
         still = np.zeros((len(q), self._task.mechanism.model.nv)), np.zeros(x.shape)
-        bit = 0
-        for limits in self._limits:
-            rooms, _ = limits.rooms(q, still[0], x, still[1])
-            for room in rooms.T:
-                flags |= (~(room >= 0)).astype(np.uint64) << np.uint64(bit)
-                bit += 1
+        rooms = [limits.rooms(q, still[0], x, still[1])[0] for limits in self._limits]
+        for bit, one in enumerate(np.concatenate([*(~(r >= 0) for r in rooms), broken], -1).T):
+            flags |= one.astype(np.uint64) << np.uint64(bit)
         kept = measured.conditioning >= self._least
         if measured.gains.shape[-1] == self._actuated.size:
             kept &= measured.determinant * self._side > 0
@@ -224,9 +238,11 @@ class Evaluation:
         room = np.minimum(a[:, self._bounded] - lower, upper - a[:, self._bounded])
         return np.asarray((room / (upper - lower)).min(axis=-1, initial=0.5))
 
-    def _forces(self, q: Array) -> Array:
-        if not self._holding:
-            return np.zeros((len(q), 0))
-        still = np.zeros((len(q), self._task.mechanism.model.nv))
-        forces = self._task.actuator_forces(q, still, still, errors="mask")
-        return np.where(np.isfinite(forces), forces, math.inf)
+    def _forces(self, q: Array, x: Array) -> tuple[Array, Array]:
+        """Return the forces at rest, and the shares of the limits of forces, (n, na) or (n, 0)."""
+        nothing = np.zeros((len(q), 0))
+        if not (self._holding or self._demands.forces):
+            return nothing, nothing
+        W = self._demands.wrench_map(q, x)
+        at_rest = self._demands.at_rest(q, W)
+        return at_rest if self._holding else nothing, self._demands.force_share(at_rest, W)

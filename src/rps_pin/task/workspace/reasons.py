@@ -37,17 +37,20 @@ def reason_names(limits: Sequence[Signal], *, interference: bool) -> tuple[str, 
     names += [SINGULAR, UNREACHABLE, *([INTERFERENCE] if interference else [])]
     if len(names) > MOST_REASONS:
         raise InputError(
-            f"the mechanism has {len(limits)} limits of positions; a workspace tells at most "
+            f"the mechanism has {len(limits)} limits; a workspace tells at most "
             f"{MOST_REASONS - 3} apart: leave out limits that cannot be met (infinite in the URDF)"
         )
     return tuple(names)
 
 
 def limit_in_words(limit: Signal) -> str:
-    """Return a limit as the reason of a point beyond it: ``"arm_1_joint above 1.2 rad"``."""
+    """Return a limit as the reason of a point beyond it: ``"arm_1_joint above 1.2 rad"``.
+
+    One of a magnitude is ``"leg_3 force beyond 400 N"``.
+    """
     who = limit.joint or f"leg {limit.leg}"
     what = "" if limit.name == "position" else f" {limit.name}"
-    side = "below" if limit.side == "lower" else "above"
+    side = {"lower": "below", "upper": "above", "both": "beyond"}[limit.side]
     return f"{who}{what} {side} {limit.limit:.6g} {limit.unit}"
 
 

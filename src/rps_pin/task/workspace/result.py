@@ -90,6 +90,29 @@ class TaskWorkspace(Region):
         return self.fields.holding
 
     @property
+    def force_share(self) -> Array:
+        """Largest force of each actuator under payload and wrenches, over its limit, (..., na)."""
+        return self.fields.force_share
+
+    @property
+    def speed_share(self) -> Array:
+        """Largest speed of each actuator at the speeds asked for, over its limit, (..., na)."""
+        return self.fields.speed_share
+
+    @property
+    def force_left(self) -> Array:
+        """Share of the limits of force that is left, shape (...): that of the actuator with least.
+
+        1 where nothing is demanded, negative beyond a limit, minus infinity at a singularity.
+        """
+        return np.asarray(1 - self.force_share.max(axis=-1, initial=0.0))
+
+    @property
+    def speed_left(self) -> Array:
+        """Share of the limits of speed that is left, shape (...); as `force_left`."""
+        return np.asarray(1 - self.speed_share.max(axis=-1, initial=0.0))
+
+    @property
     def inside(self) -> Bools:
         """Whether a point is in the workspace."""
         return np.asarray(self.reason == 0)

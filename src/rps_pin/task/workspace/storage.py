@@ -43,7 +43,13 @@ _FIELDS = {
     "determinant": ("1", "of K in one unit"),
     "stroke_left": ("1", "least way of an actuator to its limits over its stroke"),
     "holding": ("N or N m", "forces of the actuators at rest; no columns if not computed"),
+    "force_share": ("1", "largest force of each actuator over its limit; no columns if not asked"),
+    "speed_share": ("1", "largest speed of each actuator over its limit; no columns if not asked"),
 }
+#: Fields with a column for each actuator, or none; they may be infinite.
+_IF_ASKED = ("holding", "force_share", "speed_share")
+#: Of these, those that files of version 0.3.0 lack.
+_ADDED = ("force_share", "speed_share")
 
 
 @refuses_other_kinds
@@ -154,16 +160,16 @@ def _read(file: h5py.File) -> TaskWorkspace:
     grid = TaskGrid(coordinates, tuple(angular), over, axes, at)
     if not np.array_equal(np.isnan(at), [name in over for name in coordinates]):
         raise InputError("at must be NaN of the axes, and of no other coordinate")
-    holding = own_dataset(file, "holding").shape[-1:] == (len(actuated),)
-    sizes = {
-        "actuators": (len(actuated),),
-        "gains": (len(coordinates),),
-        "holding": (len(actuated) if holding else 0,),
-    }
+    sizes = {"actuators": (len(actuated),), "gains": (len(coordinates),)}
     fields: dict[str, Any] = {}
     for name in _FIELDS:
-        wanted = grid.shape + sizes.get(name, ())
+        if name in _ADDED and name not in file:
+            fields[name] = np.zeros((*grid.shape, 0))
+            continue
         item = own_dataset(file, name)
+        if name in _IF_ASKED:
+            sizes[name] = (len(actuated) if item.shape[-1:] == (len(actuated),) else 0,)
+        wanted = grid.shape + sizes.get(name, ())
         if item.shape != wanted:
             raise InputError(f"{name} has shape {item.shape}; it must be {wanted}")
         fields[name] = _flags(item, reasons) if name == "reason" else _floats(item[...], name)
@@ -200,6 +206,6 @@ def _numbers(file: h5py.File, name: str, dimensions: int) -> Array:
 def _floats(values: Any, name: str) -> Array:
     if values.dtype.kind != "f":
         raise InputError(f"{name} is of type {values.dtype}; it must be floating-point numbers")
-    if name != "holding" and not np.isfinite(values).all():
+    if name not in _IF_ASKED and not np.isfinite(values).all():
         raise InputError(f"{name} holds numbers that are not finite")
     return np.asarray(values, dtype=np.float64)
