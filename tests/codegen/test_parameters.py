@@ -317,3 +317,20 @@ def test_moved_inertia() -> None:
     wanted = placement.act(body)
     assert worst(mass - wanted.mass, first[:, 0] - wanted.mass * wanted.lever) < 1e-14
     assert worst(inertia - wanted.matrix()[3:, 3:]) < 1e-13
+
+
+def test_lengths_of_a_mechanism_with_redundant_rows() -> None:
+    """Most changes open its loops; how far, has a derivative all the same."""
+    mechanism = ClosedLoopModel.load("urdf/five_bar.yaml")
+    fast = mechanism.compile(parameters=["closure:tips", "placement:left_joint"])
+    q, nominal, h = mechanism.home, fast.nominal_parameters, 1e-6
+    columns = []
+    for k in range(nominal.size):
+        sides = [
+            fast.reference(nominal + sign * h * np.eye(nominal.size)[k]).loop_errors(q).position
+            for sign in (1, -1)
+        ]
+        columns.append((sides[0] - sides[1]) / (2 * h))
+    wanted = np.transpose(columns)
+    assert worst(wanted[1]) > 0.5  # across the plane
+    assert worst(fast.gaps_by_parameters(q) - wanted) < 1e-9

@@ -135,8 +135,14 @@ class Proof:
             _range(mechanism, group, one, redundant)
             for group, one in zip(parameters, nominal, strict=True)
         ]
-        #: How far parameters are moved for derivatives.
+        #: How far parameters are moved for derivatives of what needs closed loops.
         self._direction = np.concatenate([np.zeros(0), *moved])
+        #: And for those of the gaps, which may open.
+        free = [
+            _range(mechanism, group, one, False)
+            for group, one in zip(parameters, nominal, strict=True)
+        ]
+        self._opening = np.concatenate([np.zeros(0), *free])
         self._parameters = np.concatenate([np.zeros(0), *nominal])
         self._parameters += 0.03 * self._direction * self._rng.uniform(size=self._direction.size)
         self._nominal, self._groups = mechanism, tuple(parameters)
@@ -458,17 +464,21 @@ class Proof:
         moved = pin.difference(model, s.near, q)[self._independent[chosen]]
         return np.asarray(q + np.abs(moved).max(initial=self._open_by(q)))
 
-    def _slope(self, s: Sample, name: str, found: Array) -> Array:
+    def _slope(self, s: Sample, name: str, found: Array) -> Array | None:
         """Return a function's derivatives by the parameters, corrected in one random direction.
 
-        The derivative in that direction is the Pinocchio engine's, by differences.
+        The derivative in that direction is the Pinocchio engine's, by differences; there is none if
+        no parameter can be moved with the loops closed.
         """
         answer = {
             "gaps_by_parameters": self._gaps,
             "inverse_dynamics_by_parameters": self._reduced_force,
             "forward_dynamics_by_parameters": self._independent_acceleration,
         }[name]
-        direction = self._direction * self._rng.uniform(0.5, 1.0, self._direction.size)
+        direction = self._opening if name == "gaps_by_parameters" else self._direction
+        direction = direction * self._rng.uniform(0.5, 1.0, direction.size)
+        if not direction.any():
+            return None
         slope, mechanism = np.zeros(found.shape[:-1]), self._m
         for times, weight in _STENCIL:
             values = s.parameters + times * _DIFFERENCE * direction
