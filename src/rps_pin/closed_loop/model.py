@@ -18,7 +18,8 @@ from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop import kinematics
 from rps_pin.closed_loop.assembly.closing import close, closed_gap
 from rps_pin.closed_loop.assembly.completion import complete
-from rps_pin.closed_loop.assembly.modes import FoundModes, assembly_modes
+from rps_pin.closed_loop.assembly.every.found_modes import FoundModes
+from rps_pin.closed_loop.assembly.modes import Method, assembly_modes
 from rps_pin.closed_loop.assembly.projection import project
 from rps_pin.closed_loop.assembly.rounding import find_rule
 from rps_pin.closed_loop.constraints.closures import Closure, Kind, LoopClosure
@@ -889,17 +890,26 @@ class ClosedLoopModel:
         q_guess: ArrayLike | None = None,
         *,
         frames: Sequence[str] | None = None,
+        method: Method = "search",
+        probability: float | None = None,
         seed: int = 0,
         starts: int = 20_000,
         seconds: float | None = None,
         within_limits: bool = True,
         progress: Callable[[float], None] | None = None,
     ) -> FoundModes:
-        """Return the closed configurations with given joint values that a search finds.
+        """Return the closed configurations with given joint values.
 
-        The loops are closed from random starts, until new ones are not expected any more; the
-        result says how many starts led to each and how many are expected in all. See `modes` for
-        the method and its rule. That is no proof that there are no others.
+        By ``"search"``, the loops are closed from random starts, until new ones are not expected
+        any more, or until all are found with a probability that is asked for. The result says how
+        many starts led to each and how many are expected in all. See `modes` for the method and its
+        rule. That is no proof that there are no others.
+
+        By ``"all"``, all solutions of the closures over the complex numbers are followed from those
+        of a general mechanism of the kind. The result says how many there are, how that is known,
+        and of which of the real ones it is proven that they exist; see `every`. Of legs that are
+        closed in several ways for one pose of the platform, one way is returned: the nearest to
+        the guess. Other mechanisms are searched, and `known` says so.
 
         Parameters
         ----------
@@ -913,6 +923,10 @@ class ClosedLoopModel:
         frames
             Frames by whose places modes are told apart, ``["platform"]``. Left out: all links; so
             a leg turned by half a turn on its universal joint makes another mode.
+        method
+            ``"search"`` or ``"all"``.
+        probability
+            Of all modes being found, between 0 and 1, at which a search ends.
         seed
             Of the random numbers: the same starts each time.
         starts, seconds
@@ -941,6 +955,8 @@ class ClosedLoopModel:
             values,
             self.search_start(q_guess),
             frames=frames,
+            method=method,
+            probability=probability,
             seed=seed,
             starts=starts,
             seconds=seconds,

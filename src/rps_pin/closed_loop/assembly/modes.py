@@ -6,27 +6,31 @@ and counted once (`sameness`).
 
 The search has no proof: it finds what starts lead to. Each mode has a share of the starts that end
 in it. If nothing is known about these shares, and w modes were found in n closed starts, the
-expected number of modes, found or not, is
+expected number of modes, found or not, and the probability that all are found, are
 
-    w (n - 1) / (n - w - 2)
+    w (n - 1) / (n - w - 2)   and   (n - 2)/n (n - 3)/(n + 1) ... (n - 1 - w)/(n - 1 + w)
 
 (Boender and Rinnooy Kan, Bayesian stopping rules for multistart global optimization methods, 1987).
-The search ends where that is at most w + 1/2, which takes n = 2 w^2 + 3 w + 2 closed starts,
-`LEAST_CLOSED` at least, and where each mode was found by `LEAST_HITS` starts: if some were found by
-one, there are likely others of their kind. A mode of a share far below 1/n is missed, as one is
-that no start near it leads to.
+The search ends where a probability that was asked for is reached. If none was, it ends where the
+expected number is at most w + 1/2, which takes n = 2 w^2 + 3 w + 2 closed starts. It takes
+`LEAST_CLOSED` closed starts at least, and goes on until each mode was found by `LEAST_HITS` starts:
+if some were found by one, there are likely others of their kind. A mode of a share far below 1/n is
+missed, as one is that no start near it leads to.
+
+`every` finds all modes by homotopy instead, where it can.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array, Bools, Indices
+from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop.assembly.closing import close_gaps, is_closed
 from rps_pin.closed_loop.assembly.completion import (
     beyond_limits,
@@ -34,14 +38,22 @@ from rps_pin.closed_loop.assembly.completion import (
     refuse_values_outside,
     with_values,
 )
+from rps_pin.closed_loop.assembly.every.all_modes import every_mode
+from rps_pin.closed_loop.assembly.every.conditions import (
+    condition_of,
+    conditions,
+    rank_of,
+    values_at,
+)
+from rps_pin.closed_loop.assembly.every.found_modes import FoundModes, Stopped
+from rps_pin.closed_loop.assembly.every.solutions import NoFormulationError
 from rps_pin.closed_loop.assembly.many import Equations, close_many, equations_of
 from rps_pin.closed_loop.assembly.random_starts import RandomStarts
 from rps_pin.closed_loop.assembly.sameness import Sameness
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.closed_loop.freedoms import in_words, open_motions, rest_of
 from rps_pin.errors import ClosureError, InputError
-from rps_pin.numerics.linear_algebra import rank, singular_values
-from rps_pin.validation import positive_number, whole_number
+from rps_pin.validation import positive_number, real, whole_number
 
 #: Closed starts that a search takes at least; starts without any closed one that it gives up after.
 LEAST_CLOSED, MOST_OPEN = 100, 1000
@@ -51,46 +63,7 @@ _BATCH = 128
 #: Modes whose places differ by less are one; near a singularity they are less sharp.
 _SAME, _SAME_SINGULAR, _SINGULAR = 1e-6, 1e-3, 1e5
 
-Stopped = Literal["settled", "starts", "time", "interrupted"]
-
-
-class FoundModes(NamedTuple):
-    """The assembly modes that a search has found, those nearest to its first guess first."""
-
-    q: Array
-    """Closed configurations, shape (k, nq)."""
-    hits: Indices
-    """How many of the starts ended in each, shape (k,)."""
-    condition: Array
-    """Condition number of the closures by the joints that are not given, shape (k,): infinite or
-    huge at a singularity, where modes coincide."""
-    starts: int
-    """Random starts."""
-    closed: int
-    """Starts whose loops closed."""
-    outside: int
-    """Modes that were left out since they are outside joint limits."""
-    expected: float
-    """Expected number of modes, found or not, those outside the limits included; infinite where
-    the starts are too few to tell."""
-    stopped: Stopped
-    """What ended the search: its rule (``"settled"``), the most ``"starts"`` or the ``"time"`` that
-    was given, or Ctrl-C (``"interrupted"``)."""
-
-    def __str__(self) -> str:
-        """Say what was found, and how sure that is."""
-        rarest = f", the rarest in {self.hits.min()} of them" if self.hits.size else ""
-        left_out = f"; {self.outside} more outside joint limits" if self.outside else ""
-        ended = {
-            "settled": "the search has settled",
-            "starts": "the search ended at the most starts it was given",
-            "time": "the search ended at the time it was given",
-            "interrupted": "the search was interrupted",
-        }[self.stopped]
-        return (
-            f"{self.hits.size} found in {self.starts} random starts, of which {self.closed} closed"
-            f"{rarest}{left_out}. Expected in all: {self.expected:.4g}; {ended}"
-        )
+Method = Literal["search", "all"]
 
 
 def assembly_modes(
@@ -100,13 +73,19 @@ def assembly_modes(
     *,
     equations: Equations | None = None,
     frames: Sequence[str] | None = None,
+    method: Method = "search",
+    probability: float | None = None,
     seed: int = 0,
     starts: int = 20_000,
     seconds: float | None = None,
     within_limits: bool = True,
     progress: Callable[[float], None] | None = None,
 ) -> FoundModes:
-    """Return the assembly modes that a search finds; see `ClosedLoopModel.assembly_modes`."""
+    """Return the assembly modes that are found; see `ClosedLoopModel.assembly_modes`."""
+    if method not in get_args(Method):
+        raise InputError(f"method = {method!r}: there are 'search' and 'all'")
+    if probability is not None and not 0 < real(probability) < 1:
+        raise InputError(f"probability = {probability!r} must be a number between 0 and 1")
     whole_number(starts, "starts")
     whole_number(seed, "seed", 0)
     longest = np.inf if seconds is None else positive_number(seconds, "seconds", "s", infinite=True)
@@ -125,27 +104,22 @@ def assembly_modes(
     if chosen is not None and not len(chosen):
         raise InputError("frames is empty: name one by whose place modes differ, or leave it out")
     same = Sameness(system, about, chosen)
+    told = ""
+    if method == "all":
+        try:
+            return every_mode(system, about, held, same, within_limits)
+        except NoFormulationError as refusal:
+            told = f"searched, not solved as polynomials, since {refusal}"
     search = _Search(system, about, held, equations, same, within_limits)
-    rng, begin = np.random.default_rng(seed), time.monotonic()
-    stopped: Stopped = "starts"
-    try:
-        while search.starts < starts:
-            search.take(rng, min(_BATCH, starts - search.starts))
-            spent = time.monotonic() - begin
-            if progress is not None:
-                shares = search.closed / search.needed, search.starts / starts, spent / longest
-                progress(min(max(shares), 1.0))
-            if search.has_settled:
-                stopped = "settled"
-                break
-            if spent >= longest:
-                stopped = "time"
-                break
-            if not search.closed and search.starts >= MOST_OPEN:
-                break
-    except KeyboardInterrupt:
-        stopped = "interrupted"
-    return search.found(stopped)
+    stopped = search.run(np.random.default_rng(seed), starts, longest, probability, progress)
+    return search.found(stopped)._replace(known=told)
+
+
+def probability_of_all(count: int, closed: int) -> float:
+    """Return the probability that all modes are found, of `count` in `closed` closed starts."""
+    if closed < count + 2:
+        return 0.0
+    return math.prod((closed - 1 - i) / (closed - 1 + i) for i in range(1, count + 1))
 
 
 class _Search:
@@ -172,16 +146,54 @@ class _Search:
         self._least_gap, self._nearest = np.inf, about
         self.starts = self.closed = 0
 
-    @property
-    def needed(self) -> int:
-        """Closed starts after which the search ends with the modes found so far."""
+    def needed(self, probability: float | None) -> int:
+        """Return the closed starts after which the search ends with the modes found so far."""
         count = len(self._q)
-        return max(LEAST_CLOSED, 2 * count * count + 3 * count + 2)
+        if probability is None:
+            return max(LEAST_CLOSED, 2 * count * count + 3 * count + 2)
+        # log of the product: about - w (w + 1) / (n - 1)
+        return max(LEAST_CLOSED, math.ceil(1 - count * (count + 1) / math.log(probability)))
 
     @property
-    def has_settled(self) -> bool:
-        """Whether no further mode is expected."""
-        return self.closed >= self.needed and min(self._hits) >= LEAST_HITS
+    def probability(self) -> float:
+        """Of all modes being among those found, after these starts."""
+        return probability_of_all(len(self._q), self.closed)
+
+    def ended(self, probability: float | None) -> Stopped | None:
+        """Return by which rule the search has ended, if it has."""
+        if self.closed < LEAST_CLOSED or min(self._hits) < LEAST_HITS:
+            return None
+        if probability is not None:
+            return "probable" if self.probability >= probability else None
+        return "settled" if self.closed >= self.needed(None) else None
+
+    def run(
+        self,
+        rng: np.random.Generator,
+        starts: int,
+        longest: float,
+        probability: float | None,
+        progress: Callable[[float], None] | None,
+    ) -> Stopped:
+        """Search, and return what ended it."""
+        begin = time.monotonic()
+        try:
+            while self.starts < starts:
+                self.take(rng, min(_BATCH, starts - self.starts))
+                spent = time.monotonic() - begin
+                if progress is not None:
+                    needed = self.needed(probability)
+                    shares = self.closed / needed, self.starts / starts, spent / longest
+                    progress(min(max(shares), 1.0))
+                if (rule := self.ended(probability)) is not None:
+                    return rule
+                if spent >= longest:
+                    return "time"
+                if not self.closed and self.starts >= MOST_OPEN:
+                    break
+        except KeyboardInterrupt:
+            return "interrupted"
+        return "starts"
 
     def take(self, rng: np.random.Generator, count: int) -> None:
         """Close the loops from some more starts; the first of all is the guess itself."""
@@ -203,7 +215,7 @@ class _Search:
         By the configuration of the largest rank.
         """
         system, free = self._system, ~self._held
-        ranks = [self._rank(values) for values in map(self._singular_values, closed)]
+        ranks = [rank_of(system, values_at(system, one, self._held)) for one in closed]
         q = closed[int(np.argmax(ranks))]
         if max(ranks) == np.count_nonzero(free):
             return
@@ -233,8 +245,9 @@ class _Search:
 
     def _keep(self, q: Array) -> int:
         """Keep a closed configuration, and return which mode it is."""
-        values, places = self._singular_values(q), self._same.places(q)
-        near = _SAME_SINGULAR if _condition(values, self._rank(values)) > _SINGULAR else _SAME
+        values, places = values_at(self._system, q, self._held), self._same.places(q)
+        condition = condition_of(values, rank_of(self._system, values))
+        near = _SAME_SINGULAR if condition > _SINGULAR else _SAME
         within, inside = self._same.within_a_turn(q, self._held), not self._is_outside(q)
         k = self._known(places, near)
         if k is None:
@@ -263,13 +276,6 @@ class _Search:
         k = int(np.argmin(apart))
         return k if apart[k] <= near else None
 
-    def _singular_values(self, q: Array) -> Array:
-        jacobian = self._system.scaled(self._system.equations.jacobian(q))
-        return singular_values(jacobian[:, ~self._held])
-
-    def _rank(self, values: Array) -> int:
-        return rank(values, self._system.rule.tolerance)
-
     def _keep_nearest(self, q: Array) -> None:
         equations = self._system.equations
         for one in q:
@@ -287,8 +293,7 @@ class _Search:
                 self._least_gap,
             )
         q, hits = np.array(self._q), np.array(self._hits, dtype=np.intp)
-        largest = max(map(self._rank, self._values))
-        condition = np.array([_condition(values, largest) for values in self._values])
+        condition = conditions(self._system, self._values)
         apart = np.linalg.norm(np.array(self._places) - self._same.places(self._about), axis=1)
         order = np.argsort(apart, kind="stable")
         order = order[np.array(self._inside)[order]]
@@ -303,11 +308,5 @@ class _Search:
             count - order.size,
             float(expected),
             stopped,
+            self.probability,
         )
-
-
-def _condition(values: Array, count: int) -> float:
-    """Return the condition number by the first singular values."""
-    if not count:
-        return 1.0
-    return float(values[0] / values[count - 1]) if values[count - 1] > 0 else np.inf

@@ -19,7 +19,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools, Indices
-from rps_pin.closed_loop.assembly.modes import FoundModes, assembly_modes
+from rps_pin.closed_loop.assembly.every.found_modes import FoundModes
+from rps_pin.closed_loop.assembly.modes import assembly_modes
 from rps_pin.closed_loop.constraints.closures import Closure
 from rps_pin.closed_loop.constraints.equations import LoopErrors
 from rps_pin.closed_loop.constraints.unit_parts import normalised, unit_parts
@@ -372,10 +373,10 @@ class CompiledMechanism:
         q_guess: ArrayLike | None = None,
         **options: Any,
     ) -> FoundModes:
-        """Return the closed configurations with given joint values that a search finds.
+        """Return the closed configurations with given joint values.
 
-        As `ClosedLoopModel.assembly_modes`, from the same starts, with gaps and Jacobians by
-        generated code.
+        As `ClosedLoopModel.assembly_modes`, with its options. A search has the same starts, with
+        gaps and Jacobians by generated code.
         """
 
         def equations(q: Array) -> tuple[Array, Array]:
