@@ -162,9 +162,12 @@ def workers_without_signals() -> Iterator[None]:
 
 
 @contextmanager
-def scratch_folder() -> Iterator[Path]:
-    """Give a folder for temporary files; remove it, and those that killed processes left."""
-    place = Path(tempfile.gettempdir())
+def scratch_folder(place: Path | None = None) -> Iterator[Path]:
+    """Give a folder for temporary files; remove it, and those that killed processes left.
+
+    It lies in `place`; left out, in the system's folder for temporary files.
+    """
+    place = Path(tempfile.gettempdir()) if place is None else place
     remove_leftovers(place)
     folder = place / _who()
     folder.mkdir(mode=0o700)

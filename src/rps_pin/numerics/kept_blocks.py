@@ -1,18 +1,20 @@
 """Blocks of a long computation, kept beside the file that they are for, so that it can go on.
 
 They stand in a hidden folder, one file each, written whole or not at all, with the description of
-the computation: blocks of another one are refused. The folder is removed when the file is written.
+the computation: blocks of another one are refused. Only one process at a time has the folder.
 """
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import json
+import os
 import shutil
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +22,13 @@ from numpy.typing import NDArray
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 
-_NAME = "computation.txt"
+_NAME, _LOCK = "computation.txt", "lock"
 
 
 class KeptBlocks:
-    """The blocks that a computation has kept.
+    """The blocks that a computation has kept, for this process alone while the context lasts.
+
+    The folder is removed when the context ends without error, or holds no block.
 
     Parameters
     ----------
@@ -36,17 +40,56 @@ class KeptBlocks:
     Raises
     ------
     InputError
-        If blocks of another computation are there.
+        If blocks of another computation are there, or another process computes them.
     OSError
         If the folder cannot be made or read.
     """
 
-    def __init__(self, target: Path, description: Mapping[str, Any]) -> None:
-        self.folder = target.with_name(f".{target.name}.blocks")
+    def __init__(self, target: str | os.PathLike[str], description: Mapping[str, Any]) -> None:
+        path = Path(target)
+        self.folder = path.with_name(f".{path.name}.blocks")
         key = hashlib.sha256(
             json.dumps(description, sort_keys=True, default=_of_array).encode()
         ).hexdigest()
-        self.folder.mkdir(exist_ok=True)
+        self._lock = self._locked()
+        try:
+            self._refuse_others(key)
+        except BaseException:
+            os.close(self._lock)
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        try:
+            if kind is None or not any(self.folder.glob("*.npz")):
+                shutil.rmtree(self.folder)
+        finally:
+            os.close(self._lock)
+
+    def _locked(self) -> int:
+        """Return a file of the folder, locked until it is closed, also by the process's end."""
+        while True:
+            self.folder.mkdir(exist_ok=True)
+            path = self.folder / _LOCK
+            found = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+            try:
+                fcntl.flock(found, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if path.exists() and os.path.samestat(path.stat(), os.fstat(found)):
+                    return found
+            except BlockingIOError:
+                os.close(found)
+                raise InputError(
+                    f"another process computes the blocks in {self.folder}; wait for it, or give "
+                    "another file"
+                ) from None
+            except BaseException:
+                os.close(found)
+                raise
+            os.close(found)  # removed meanwhile by the process that had it
+
+    def _refuse_others(self, key: str) -> None:
         name = self.folder / _NAME
         if not name.exists():
             with whole_file(name) as scratch:
@@ -74,10 +117,6 @@ class KeptBlocks:
         """Keep a block's arrays."""
         with whole_file(self._path(index)) as scratch, scratch.open("wb") as file:
             np.savez(file, **arrays)  # type: ignore[arg-type]
-
-    def remove(self) -> None:
-        """Remove all blocks."""
-        shutil.rmtree(self.folder)
 
     def _path(self, index: int) -> Path:
         return self.folder / f"{index}.npz"

@@ -92,6 +92,8 @@ class TaskMaps:
             "placement": placement,
             "characteristic_length": characteristic_length,
         }
+        #: What `compile` was given.
+        self.compile_options: dict[str, Any] = {}
         self._refuse_wrong_count()
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -102,6 +104,7 @@ class TaskMaps:
         copied: Self = _call_reduced(self.__reduce__(), memo)
         if self.compiled:
             copied._by_task, copied._by_actuators = self._by_task, self._by_actuators
+            copied.compile_options = self.compile_options
         return copied
 
     def __repr__(self) -> str:
@@ -193,6 +196,7 @@ class TaskMaps:
             As there.
         """
         compiled = type(self)(self.mechanism, **self._options)
+        compiled.compile_options = dict(options)
         functions = options.pop("functions", ("kinematics", "closing"))
         compiled._by_task = self.extended.compile(functions=functions, **options)
         compiled._by_actuators = self.mechanism.compile(functions=functions, **options)

@@ -15,6 +15,7 @@ import pytest
 
 from rps_pin import RPSParameters
 from rps_pin.errors import InputError
+from rps_pin.numerics import block_runs
 from rps_pin.rps.workspace import leg_grid, scale, workspace_to_file
 
 MICRO = RPSParameters.from_preset("micro")
@@ -116,8 +117,28 @@ def test_any_executor_gives_the_same_file(tmp_path: Path, kind: type[Executor]) 
         workspace_to_file(MICRO, path, GRID, executor=executor, resume=True)
         assert executor.submit(int, 3).result() == 3  # still at its owner's service
     assert same_file(path, right)
-    with pytest.raises(InputError, match="either workers or an executor"):
-        workspace_to_file(MICRO, tmp_path / "no.h5", GRID, executor=executor, workers=2)
+
+
+def test_as_many_blocks_are_under_way_as_the_workers_of_an_executor_need(tmp_path: Path) -> None:
+    """A cluster may have more cores than this machine."""
+    under_way, most = set(), []
+
+    class Counting(ThreadPoolExecutor):
+        def submit(self, *given: Any, **named: Any) -> Any:
+            future = super().submit(*given, **named)
+            under_way.add(future)
+            most.append(len(under_way))
+            return future
+
+    def progress(blocks: Iterable[int]) -> Iterator[int]:
+        for i in blocks:
+            yield i
+            under_way.difference_update([one for one in under_way if one.done()])
+
+    with Counting(1) as executor:
+        options: Any = {"executor": executor, "workers": 6}
+        workspace_to_file(MICRO, tmp_path / "space.h5", GRID, **options)
+    assert max(most) >= 18
 
 
 def killing(pools: list[Any], at: set[int]) -> Callable[[Iterable[int]], Iterator[int]]:
@@ -138,12 +159,12 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The pools of processes that are made."""
     found: list[Any] = []
 
-    class Pool(scale.ProcessPoolExecutor):
+    class Pool(block_runs.ProcessPoolExecutor):
         def __init__(self, *given: Any, **named: Any) -> None:
             super().__init__(*given, **named)
             found.append(self)
 
-    monkeypatch.setattr(scale, "ProcessPoolExecutor", Pool)
+    monkeypatch.setattr(block_runs, "ProcessPoolExecutor", Pool)
     return found
 
 
@@ -157,7 +178,7 @@ def test_a_worker_that_is_killed_costs_its_blocks_only(tmp_path: Path, pools: li
 def test_workers_that_die_again_and_again_end_the_run_which_goes_on(
     tmp_path: Path, pools: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(scale, "_MOST_DEATHS", 0)
+    monkeypatch.setattr(block_runs, "_MOST_DEATHS", 0)
     right, path = serial(tmp_path), tmp_path / "space.h5"
     with pytest.raises(BrokenExecutor):
         workspace_to_file(MICRO, path, GRID, workers=2, resume=True, progress=killing(pools, {5}))

@@ -20,6 +20,7 @@ import pytest
 
 from rps_pin import RPSParameters
 from rps_pin.errors import InputError
+from rps_pin.numerics import block_runs
 from rps_pin.rps.workspace import (
     Grid,
     Reason,
@@ -230,9 +231,10 @@ def test_ctrl_c_in_a_real_process_leaves_no_file(tmp_path: Path) -> None:
 
 WITH_WORKERS = """
     from rps_pin import RPSParameters
-    from rps_pin.rps.workspace import leg_grid, scale, workspace_to_file
+    from rps_pin.numerics import block_runs
+    from rps_pin.rps.workspace import leg_grid, workspace_to_file
 
-    class Pool(scale.ProcessPoolExecutor):
+    class Pool(block_runs.ProcessPoolExecutor):
         def __init__(self, *given, **named):
             super().__init__(*given, **named)
             pools.append(self)
@@ -243,7 +245,7 @@ WITH_WORKERS = """
                 print(*pools[0]._processes, flush=True)
             yield i
 
-    pools, scale.ProcessPoolExecutor = [], Pool
+    pools, block_runs.ProcessPoolExecutor = [], Pool
     micro = RPSParameters.from_preset("micro")
     workspace_to_file(micro, "space.h5", leg_grid(micro, 400), workers=2, progress=progress)
 """
@@ -364,7 +366,7 @@ def test_memory_does_not_grow_with_the_grid(micro: RPSParameters, tmp_path: Path
             super().shutdown(cancel_futures=kill_workers)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scale, "ProcessPoolExecutor", Threads)
+        patch.setattr(block_runs, "ProcessPoolExecutor", Threads)
         patch.setattr(scale, "BLOCK", 400)
         patch.setattr(scale.GridJob, "compute", counted)
         workspace_to_file(

@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import copy
 import threading
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, RPSPinError, SingularityError, UnreachableError, shown
+from rps_pin.codegen.calls import LARGE_BATCH
+from rps_pin.errors import (
+    CompileError,
+    InputError,
+    RPSPinError,
+    SingularityError,
+    UnreachableError,
+    shown,
+)
 from rps_pin.task.engine import PinocchioEngine
 from rps_pin.task.task import Task
 from rps_pin.task.workspace.evaluate import Evaluation, TaskFields, gains_of
+from rps_pin.task.workspace.filling.continuation import continued
 from rps_pin.task.workspace.filling.division import Division
 from rps_pin.task.workspace.filling.flood import Seeds, Work, filled
 from rps_pin.task.workspace.grids import TaskGrid
@@ -68,7 +78,7 @@ class Job:
         self.grid = grid.holding(self.start)
         options |= {"holding": bool(holding), "clearance": clearance}
         self._arguments = _side(task, q, self.start), self.min_conditioning
-        self._options = options
+        self.options = options
         self.evaluation = Evaluation(task, *self._arguments, **options)
         per_point = self.evaluation.bytes_per_point
         if grid.size * per_point > most_bytes:
@@ -94,6 +104,23 @@ class Job:
                 field[part] = values
         return Found(found.at, fields, found.beside)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but generated code and scratch memory, which each process has of its own."""
+        state = self.__dict__.copy()
+        for name in ("evaluation", "_own", "_local"):
+            del state[name]
+        compiled = self.task.compile_options if self.task.compiled else None
+        return state | {"task": self.task.interpreted(), "_compiled": compiled}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        compiled = state.pop("_compiled")
+        self.__dict__.update(state)
+        if compiled is not None:
+            self.task = self.task.compile(**compiled)
+        self.evaluation = Evaluation(self.task, *self._arguments, **self.options)
+        self._own, self._local = threading.get_ident(), threading.local()
+        settle(self.task, holding=self.options["holding"])
+
     def _of_this_thread(self) -> tuple[Task, Evaluation]:
         """Return the task and its evaluation with scratch memory of this thread."""
         if threading.get_ident() == self._own:
@@ -101,9 +128,27 @@ class Job:
         local: Any = self._local
         if not hasattr(local, "parts"):
             task = copy.deepcopy(self.task)
-            local.parts = task, Evaluation(task, *self._arguments, **self._options)
+            local.parts = task, Evaluation(task, *self._arguments, **self.options)
         parts: tuple[Task, Evaluation] = local.parts
         return parts
+
+
+def settle(task: Task, *, holding: bool) -> None:
+    """Wait for generated code that is being built: all blocks are to be computed by the same.
+
+    Code for batches rounds in another way than that for samples, which answers meanwhile.
+    """
+    if not task.compiled:
+        return
+    q, x = (np.tile(one, (LARGE_BATCH, 1)) for one in (task.mechanism.home, task.home))
+    continued(task, q, x, x)
+    task.jacobian(q, x=x, errors="mask")
+    if holding:
+        still = np.zeros((LARGE_BATCH, task.mechanism.model.nv))
+        task.actuator_forces(q, still, still, errors="mask")
+    for engine in task.engines:
+        with suppress(CompileError):  # the code that is there stays in use
+            engine.wait()
 
 
 def _refuse_other_grid(task: Task, grid: TaskGrid) -> None:
