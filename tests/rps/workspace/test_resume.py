@@ -17,6 +17,7 @@ from rps_pin import RPSParameters
 from rps_pin.errors import InputError
 from rps_pin.numerics import block_runs
 from rps_pin.rps.workspace import leg_grid, scale, workspace_to_file
+from tests.processes import wait_for_end
 
 MICRO = RPSParameters.from_preset("micro")
 GRID = leg_grid(MICRO, 20)
@@ -204,5 +205,5 @@ def test_a_dask_cluster_of_which_a_worker_is_killed(tmp_path: Path) -> None:
                 yield i
 
         workspace_to_file(MICRO, path, GRID, executor=client.get_executor(), progress=progress)
-        assert workers[0] not in client.run(os.getpid).values()
+        wait_for_end([workers[0]])
     assert same_file(path, right)
