@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import os
 import pickle
 from collections.abc import Sequence
@@ -14,19 +15,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rps_pin.errors import InputError
 from rps_pin.interruption import scratch_folder
 from rps_pin.numerics.block_runs import Arrays, Workers, cores, results
 from rps_pin.numerics.kept_blocks import KeptBlocks
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.task.paths.limits import Cone
 from rps_pin.task.task import Task
-from rps_pin.task.workspace.compute import Bar, Progress
-from rps_pin.task.workspace.evaluate import MIN_CONDITIONING
+from rps_pin.task.workspace.compute import Bar, Progress, workspace
 from rps_pin.task.workspace.filling.flood import Seeds, Work
-from rps_pin.task.workspace.filling.job import Found, Job, settle
+from rps_pin.task.workspace.filling.job import Found, Job
 from rps_pin.task.workspace.filling.rounds import Rounds
 from rps_pin.task.workspace.filling.seeds import OnDisk
 from rps_pin.task.workspace.grids import TaskGrid
@@ -35,6 +33,7 @@ from rps_pin.task.workspace.result import INSIDE
 from rps_pin.task.workspace.storage import DType, new_workspace_file
 from rps_pin.validation import whole_number
 
+_OPTIONS = set(inspect.signature(workspace).parameters) - {"task", "grid", "progress"}
 #: Points from which more than one worker pays.
 _WORTH_WORKERS = 300_000
 
@@ -56,12 +55,6 @@ def workspace_to_file(
     path: str | os.PathLike[str],
     grid: TaskGrid,
     *,
-    start: ArrayLike | None = None,
-    min_conditioning: float = MIN_CONDITIONING,
-    cones: Sequence[Cone] = (),
-    holding: bool = False,
-    clearance: float | None = None,
-    ignore: Sequence[tuple[str, str]] = (),
     dtype: DType = "float64",
     description: str = "",
     executor: Executor | None = None,
@@ -70,6 +63,7 @@ def workspace_to_file(
     resume: bool = False,
     overwrite: bool = False,
     progress: Progress = iter,
+    **options: Any,
 ) -> TaskCounts:
     """Compute a workspace block by block with several workers and write it to an HDF5 file.
 
@@ -80,7 +74,7 @@ def workspace_to_file(
 
     Parameters
     ----------
-    task, grid, start, min_conditioning, cones, holding, clearance, ignore
+    task, grid
         As for `workspace`.
     path
         The file to write; `load_workspace` reads it, or parts of it.
@@ -105,6 +99,8 @@ def workspace_to_file(
         Whether a file that exists is replaced.
     progress
         Wraps a loop, for a progress bar.
+    **options
+        Others of `workspace`: what is computed, from which start.
 
     Raises
     ------
@@ -118,23 +114,15 @@ def workspace_to_file(
         If the disk has no room, or a write fails.
     """
     count = _count(task, grid, executor, workers, threads)
-    settle(task, holding=bool(holding))
-    job = Job(
-        task,
-        grid,
-        start=start,
-        min_conditioning=min_conditioning,
-        cones=cones,
-        holding=holding,
-        clearance=clearance,
-        ignore=ignore,
-    )
+    if unknown := set(options) - _OPTIONS:
+        raise TypeError(f"workspace_to_file has no option {min(unknown)!r}")
+    job = Job(task, grid, settled=True, **options)
     compute = Compute(job, dtype)
     tally = _Tally(job)
-    options: dict[str, Any] = {"dtype": dtype, "description": description, "overwrite": overwrite}
+    made = new_workspace_file(path, job, dtype=dtype, description=description, overwrite=overwrite)
     with ExitStack() as stack:
         kept = stack.enter_context(KeptBlocks(path, compute.description())) if resume else None
-        file = stack.enter_context(new_workspace_file(path, job, **options))
+        file = stack.enter_context(made)
         folder = kept.folder if kept else stack.enter_context(scratch_folder(Path(path).parent))
         pool = None
         if executor is not None or count > 1 or workers is not None:
@@ -180,15 +168,15 @@ class Compute:
     def description(self) -> dict[str, Any]:
         """Return what decides the numbers of the blocks."""
         job = self._job
-        again = pickle.loads(pickle.dumps(job.task.interpreted()))  # what was read
         return {
             "version": version("rps-pin"),
-            "task": hashlib.sha256(pickle.dumps(again)).hexdigest(),
+            "task": _digest(job.task.interpreted()),
+            "options": _digest(job.options),
+            "min_conditioning": job.min_conditioning,
             "compiled": repr(job.task.compile_options) if job.task.compiled else "",
             "grid": [job.grid.over, *job.grid.axes, job.grid.at],
             "sides": job.division.sides,
             "start": [job.start, job.q],
-            "options": repr((job.min_conditioning, sorted(job.options.items()))),
             "dtype": self._dtype,
         }
 
@@ -198,6 +186,12 @@ class Compute:
     @cached_property
     def _packed(self) -> bytes:
         return pickle.dumps(self._job)
+
+
+def _digest(part: object) -> str:
+    """Return a digest of an object by its pickle, of a copy: what it shares is shared alike."""
+    again = pickle.loads(pickle.dumps(part))  # it was pickled here
+    return hashlib.sha256(pickle.dumps(again)).hexdigest()
 
 
 @lru_cache(maxsize=2)

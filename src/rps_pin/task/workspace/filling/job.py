@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import threading
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -22,7 +23,7 @@ from rps_pin.errors import (
 )
 from rps_pin.task.engine import PinocchioEngine
 from rps_pin.task.task import Task
-from rps_pin.task.workspace.evaluate import Evaluation, TaskFields, gains_of
+from rps_pin.task.workspace.evaluate import MIN_CONDITIONING, Evaluation, TaskFields, gains_of
 from rps_pin.task.workspace.filling.continuation import continued
 from rps_pin.task.workspace.filling.division import Division
 from rps_pin.task.workspace.filling.flood import Seeds, Work, filled
@@ -52,7 +53,7 @@ class Job:
     """A workspace to be computed.
 
     Any number of threads may compute blocks of it. Arguments and errors are those of `workspace`;
-    fields of more than `most_bytes` are refused.
+    fields of more than `most_bytes` are refused. With `settled` generated code is waited for.
     """
 
     def __init__(
@@ -60,11 +61,12 @@ class Job:
         task: Task,
         grid: TaskGrid,
         *,
-        start: ArrayLike | None,
-        min_conditioning: float,
-        holding: bool,
-        clearance: float | None,
+        start: ArrayLike | None = None,
+        min_conditioning: float = MIN_CONDITIONING,
+        holding: bool = False,
+        clearance: float | None = None,
         most_bytes: float = np.inf,
+        settled: bool = False,
         **options: Any,
     ) -> None:
         _refuse_other_grid(task, grid)
@@ -74,9 +76,11 @@ class Job:
         if clearance is not None:
             clearance = non_negative_number(clearance, "clearance", "m")
         self.task = task
+        options |= {"holding": bool(holding), "clearance": clearance}
+        if settled:
+            settle(task, options)
         self.start, q = _started(task, grid, start)
         self.grid = grid.holding(self.start)
-        options |= {"holding": bool(holding), "clearance": clearance}
         self._arguments = _side(task, q, self.start), self.min_conditioning
         self.options = options
         self.evaluation = Evaluation(task, *self._arguments, **options)
@@ -119,7 +123,7 @@ class Job:
             self.task = self.task.compile(**compiled)
         self.evaluation = Evaluation(self.task, *self._arguments, **self.options)
         self._own, self._local = threading.get_ident(), threading.local()
-        settle(self.task, holding=self.options["holding"])
+        settle(self.task, self.options)
 
     def _of_this_thread(self) -> tuple[Task, Evaluation]:
         """Return the task and its evaluation with scratch memory of this thread."""
@@ -133,19 +137,17 @@ class Job:
         return parts
 
 
-def settle(task: Task, *, holding: bool) -> None:
+def settle(task: Task, options: Mapping[str, Any]) -> None:
     """Wait for generated code that is being built: all blocks are to be computed by the same.
 
     Code for batches rounds in another way than that for samples, which answers meanwhile.
+    `options` are those of `Evaluation`.
     """
     if not task.compiled:
         return
     q, x = (np.tile(one, (LARGE_BATCH, 1)) for one in (task.mechanism.home, task.home))
     continued(task, q, x, x)
-    task.jacobian(q, x=x, errors="mask")
-    if holding:
-        still = np.zeros((LARGE_BATCH, task.mechanism.model.nv))
-        task.actuator_forces(q, still, still, errors="mask")
+    Evaluation(task, 1.0, 0.0, **options).fields(q, x)
     for engine in task.engines:
         with suppress(CompileError):  # the code that is there stays in use
             engine.wait()
