@@ -240,6 +240,11 @@ class Faults:
         self._errors.append(error)
         return True
 
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self._errors)
+
     def tell(self) -> None:
         """Raise the errors that were kept, as one, if there are any."""
         if self._errors:

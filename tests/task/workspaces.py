@@ -53,7 +53,12 @@ def five_bar(points: Array) -> Closed:
     return Closed(margin > 0, margin, np.stack(angles, -1), np.stack(rows, -2))
 
 
-def delta_arms(points: Array) -> Closed:
+def delta_arms(
+    points: Array,
+    arm: float = delta.ARM,
+    rod_length: float = delta.ROD,
+    base: float = delta.BASE,
+) -> Closed:
     """A line that meets a unit circle, see tests/reference/delta; K by the rods' directions.
 
     Each pair of rods bears a moment about the normal of its plane. Where these three normals lie in
@@ -62,17 +67,17 @@ def delta_arms(points: Array) -> Closed:
     margin = np.full(len(points), np.inf)
     angles, rows, normals = [], [], []
     for turn in delta.TURNS:
-        local = points @ turn + [delta.PLATFORM - delta.BASE, 0, 0]
+        local = points @ turn + [delta.PLATFORM - base, 0, 0]
         b, y = local[:, [0, 2]], local[:, 1]
         far = np.hypot(*b.T)
-        along = (far**2 + y**2 + delta.ARM**2 - delta.ROD**2) / (2 * delta.ARM)
+        along = (far**2 + y**2 + arm**2 - rod_length**2) / (2 * arm)
         margin = np.minimum(margin, far - np.abs(along))
         with np.errstate(invalid="ignore"):
             turned = np.arctan2(b[:, 1], b[:, 0]) + np.arccos(along / far)
         u = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
-        rod = np.stack([b[:, 0] - delta.ARM * u[:, 0], y, b[:, 1] - delta.ARM * u[:, 1]], -1)
+        rod = np.stack([b[:, 0] - arm * u[:, 0], y, b[:, 1] - arm * u[:, 1]], -1)
         # arm angle = -turned: the elbow moves by ARM (sin, 0, cos) of `turned` a rad of it
-        lever = delta.ARM * (rod[:, 0] * u[:, 1] - rod[:, 2] * u[:, 0])
+        lever = arm * (rod[:, 0] * u[:, 1] - rod[:, 2] * u[:, 0])
         rows.append(rod @ turn.T / lever[:, None])
         normals.append(np.cross(rod, [0.0, 1.0, 0.0]) @ turn.T)
         angles.append((-turned + np.pi) % (2 * np.pi) - np.pi)

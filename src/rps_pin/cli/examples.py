@@ -25,6 +25,7 @@ _COPIED = {
     "path.yaml": "a trajectory of the mechanism delta",
     "scenario.yaml": "a control loop and its simulated robot",
     "faults.yaml": "another, with faults",
+    "design.yaml": "a design: the dimensions of a Delta for a cylinder",
 }
 
 

@@ -68,7 +68,8 @@ def export_c_command(
         typer.Option(
             metavar="GROUP",
             help="Numbers that become an argument: **gravity**, **mass:JOINT**, **inertia:JOINT**, "
-            "**placement:JOINT**, **closure:NAME**, **payload:FRAME**; repeat it.",
+            "**placement:JOINT**, **closure:NAME**, **distance:NAME**, **payload:FRAME**; repeat "
+            "it.",
         ),
     ] = None,
     wrench_frames: Annotated[

@@ -205,8 +205,8 @@ def to_casadi(
         The mechanism. Later changes of it do not change the functions.
     parameters
         Groups of numbers that are an argument of each function: ``"gravity"``, ``"inertia:JOINT"``,
-        ``"mass:JOINT"``, ``"placement:JOINT"``, ``"closure:NAME"``, ``"payload:FRAME"`` (see
-        `rps_pin.codegen.expressions.parameters`).
+        ``"mass:JOINT"``, ``"placement:JOINT"``, ``"closure:NAME"``, ``"distance:NAME"``,
+        ``"payload:FRAME"`` (see `rps_pin.codegen.expressions.parameters`).
     wrench_frames
         Frames at which external wrenches act.
 

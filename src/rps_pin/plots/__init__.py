@@ -7,6 +7,7 @@ that compare with the paper stand in ``rps_pin.paper``; the 3D viewer is `rps_pi
 from rps_pin.plots.assembly_modes import plot_assembly_modes
 from rps_pin.plots.conditioning import plot_height_conditioning, plot_tilt_conditioning
 from rps_pin.plots.control import plot_loop_forces, plot_tracking
+from rps_pin.plots.design import plot_front
 from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
 from rps_pin.plots.motion import plot_forces, plot_length_phase, plot_lengths, plot_path
 from rps_pin.plots.simulation import plot_simulation
@@ -36,6 +37,7 @@ __all__ = [
     "plot_effective",
     "plot_force_causes",
     "plot_forces",
+    "plot_front",
     "plot_height_conditioning",
     "plot_length_phase",
     "plot_lengths",

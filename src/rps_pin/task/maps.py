@@ -121,6 +121,11 @@ class TaskMaps:
         return type(self)(mechanism, **self._options)
 
     @property
+    def options(self) -> dict[str, Any]:
+        """What it was made with, by the constructor's names, the mechanism apart."""
+        return dict(self._options)
+
+    @property
     def compiled(self) -> bool:
         """Whether generated code computes the maps: see `compile`."""
         return not isinstance(self._by_task, PinocchioEngine)

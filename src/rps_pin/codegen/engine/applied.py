@@ -64,6 +64,11 @@ def _apply(model: pin.Model, closures: list[Closure], group: str, values: Array)
     elif kind == "closure":
         index = next(i for i, closure in enumerate(closures) if closure.name == name)
         closures[index] = _moved_ends(closures[index], values)
+    elif kind == "distance":
+        index = next(i for i, closure in enumerate(closures) if closure.name == name)
+        rod = closures[index]
+        assert isinstance(rod, LoopClosure)
+        closures[index] = replace(rod, distance=float(values[0]))
     else:
         frame = model.frames[model.getFrameId(name)]
         body = frame.placement.act(_body(values, group))

@@ -349,7 +349,9 @@ class CompiledMechanism:
             )
         return self._closed("completed", (guess, wanted), answer, within_limits, options)
 
-    def continued(self, values: Array, q: Array) -> tuple[Array, Bools]:
+    def continued(
+        self, values: Array, q: Array, parameters: Array | None = None
+    ) -> tuple[Array, Bools]:
         """Return what `complete` finds by generated code alone, (n, nq), and of which samples.
 
         Closed configurations (n, nq) are continued to the actuated joints' values (n, na). Samples
@@ -358,12 +360,12 @@ class CompiledMechanism:
         """
         at, system = self._actuated_coordinates, self.mechanism.system
         if at is None or not (system.actuated.size == at.size and self._is_actuated):
-            options: dict[str, Any] = {"restarts": 0, "errors": "mask"}
+            options: dict[str, Any] = {"restarts": 0, "errors": "mask", "parameters": parameters}
             found = self.complete(values, q, within_limits=False, **options)
             return found, np.asarray(np.isfinite(found).all(axis=-1))
         wanted = q.copy()
         wanted[:, at] = values
-        given = (q, wanted, *self._extra("completed", None, None))
+        given = (q, wanted, *self._extra("completed", None, parameters))
         found, *_, status = self._generated(None)["completed"](*given)
         return found, np.asarray(status) == 0
 

@@ -33,8 +33,8 @@ def compile_mechanism(
         The mechanism. Later changes of it do not change the code.
     parameters
         Groups of numbers that are given with each call: ``"gravity"``, ``"inertia:JOINT"``,
-        ``"mass:JOINT"``, ``"placement:JOINT"``, ``"closure:NAME"``, ``"payload:FRAME"`` (see
-        `rps_pin.codegen.expressions.parameters`).
+        ``"mass:JOINT"``, ``"placement:JOINT"``, ``"closure:NAME"``, ``"distance:NAME"``,
+        ``"payload:FRAME"`` (see `rps_pin.codegen.expressions.parameters`).
     wrench_frames
         Frames at which external wrenches will act. Others are possible: code for them is built when
         they are first named, which takes seconds.

@@ -108,17 +108,17 @@ class Chains:
     """
 
     def __init__(self, tree: Tree) -> None:
-        self._tree, self._nv = tree, tree.v.numel()
+        self.tree, self._nv = tree, tree.v.numel()
         self._down: dict[tuple[int, int], tuple[_Step, Expression]] = {}
 
     def ancestor(self, first: int, second: int) -> int:
         """Return the nearest joint that carries both, or is one of them; 0 is the world."""
         above = {first}
         while first:
-            first = self._tree.parents[first]
+            first = self.tree.parents[first]
             above.add(first)
         while second not in above:
-            second = self._tree.parents[second]
+            second = self.tree.parents[second]
         return second
 
     def from_joint(self, root: int, end: End, sign: int = 1) -> Motion:
@@ -139,7 +139,7 @@ class Chains:
         """Return the motion of frame b relative to frame a."""
         root = self.ancestor(a.joint, b.joint)
         up, down = self._path(root, a.joint)[::-1], self._path(root, b.joint)
-        placement = self._tree.placement
+        placement = self.tree.placement
         # From a up to the common ancestor: its frame's rotation and a point of it so far reached.
         rotation, reached = a.rotation.T, a.origin
         steps, segments = [], []
@@ -174,11 +174,11 @@ class Chains:
             return motion
         velocity, acceleration = ca.SX(3, 1), ca.SX(3, 1)
         for joint, (step, own) in zip(path[::-1], motion.levers[::-1], strict=True):
-            v = self._tree.v[step.columns.start]
+            v = self.tree.v[step.columns.start]
             axis = constant(step.own_angular)
             faster = velocity + (constant(step.own_linear) + cross(axis, own)) * (motion.sign * v)
             acceleration = acceleration + cross(axis * v, velocity + faster)
-            turn, _ = self._tree.placement[joint]
+            turn, _ = self.tree.placement[joint]
             velocity, acceleration = tidy(turn @ tidy(faster)), tidy(turn @ tidy(acceleration))
         other = motion._replace(velocity=velocity, acceleration=acceleration)
         return min(motion, other, key=_operations)
@@ -188,13 +188,13 @@ class Chains:
         path = []
         while joint != root:
             path.append(joint)
-            joint = self._tree.parents[joint]
+            joint = self.tree.parents[joint]
         return path[::-1]
 
     def _down_to(self, root: int, joint: int) -> tuple[_Step, Expression]:
         """Return a joint in its ancestor's axes, and the vector to it from the joint before."""
         if (root, joint) not in self._down:
-            parent, (turn, origin) = self._tree.parents[joint], self._tree.placement[joint]
+            parent, (turn, origin) = self.tree.parents[joint], self.tree.placement[joint]
             rotation = ca.SX.eye(3)
             if parent != root:
                 rotation = self._down_to(root, parent)[0].rotation
@@ -203,10 +203,10 @@ class Chains:
         return self._down[root, joint]
 
     def _step(self, joint: int, rotation: Expression, sign: int) -> _Step:
-        columns = self._tree.columns[joint]
-        own_linear, own_angular = self._tree.subspace[joint]
+        columns = self.tree.columns[joint]
+        own_linear, own_angular = self.tree.subspace[joint]
         linear, angular = (tidy(rotation @ constant(s)) for s in (own_linear, own_angular))
-        v = sign * self._tree.v[columns.start : columns.stop]
+        v = sign * self.tree.v[columns.start : columns.stop]
         slide, spin = tidy(linear @ v), tidy(angular @ v)
         return _Step(columns, sign, rotation, own_linear, own_angular, linear, angular, slide, spin)
 
@@ -217,7 +217,7 @@ class Chains:
         points = []
         for joint in reversed(path):
             points.append(point)
-            turn, origin = self._tree.placement[joint]
+            turn, origin = self.tree.placement[joint]
             point = tidy(origin + turn @ point)
         return points[::-1], point
 
@@ -242,7 +242,7 @@ class Chains:
             block = _columns(step, sign * step.sign, to_tip, own)
             of_step = slice(step.columns.start, step.columns.stop)
             jacobian[:, of_step], spin_jacobian[:, of_step] = block, step.sign * step.angular
-            moved = block @ self._tree.v[of_step]
+            moved = block @ self.tree.v[of_step]
             if len(step.columns) > 1 and block.nnz():
                 moved = sign * step.slide + _signed_cross(sign, step.spin, to_tip)
             faster = velocity + moved

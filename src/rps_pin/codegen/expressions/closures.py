@@ -268,14 +268,14 @@ def _rigid(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
 
 def _distance(chains: Chains, ends: _Ends, closure: LoopClosure) -> _Rows:
     """L - |e|, with u = -e / |e|: rate u . e'; J' v = u . e'' - (e'^2 - (u . e')^2) / |e|."""
-    assert closure.distance is not None  # its constructor saw to that
+    rod = chains.tree.parameters.rod(closure.name)
     a, b = _from_ancestor(chains, ends)
     e, _, rate, bias, square, _ = _point_to_point(a, b)
     length = ca.sqrt(square)
     u = e / -length
     along = u.T @ rate
     across_square = (rate.T @ rate - along**2) / length
-    gap, jacobian = closure.distance - length, a.along(u) + b.along(u)
+    gap, jacobian = rod - length, a.along(u) + b.along(u)
     return _Rows(gap, jacobian, along, u.T @ bias - across_square, apart=gap**2)
 
 

@@ -10,6 +10,7 @@ mass:JOINT         1    the mass, kg, of a body that has one, centre and inertia
 placement:JOINT    6    a shift, m, and a turn (roll, pitch, yaw), rad, of the joint in its own
                         frame, nominal 0
 closure:NAME       12   the same of the closure's frames a and b
+distance:NAME      1    the length of the rod of a ``distance`` closure, m
 payload:FRAME      10   a body added at the frame, as inertia:JOINT about the frame's origin in its
                         axes, nominal 0
 =================  ===  ===========================================================================
@@ -43,6 +44,7 @@ _KINDS = (
     "mass:JOINT",
     "placement:JOINT",
     "closure:NAME",
+    "distance:NAME",
     "payload:FRAME",
 )
 _BODY = ("mass", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
@@ -79,6 +81,11 @@ class Parameters:
     def __init__(self, system: ConstraintSystem, names: Sequence[str] = ()) -> None:
         self._system, self.model = system, split(system.model)
         self._closures = {closed.closure.name: closed for closed in system.equations.closed_frames}
+        self._rods = {
+            name: float(closed.closure.distance)
+            for name, closed in self._closures.items()
+            if closed.closure.distance is not None
+        }
         self._length = max(
             [float(np.abs(m.translation).max()) for m in self.model.jointPlacements]
             + [float(np.abs(f.placement.translation).max()) for f in self.model.frames]
@@ -118,6 +125,7 @@ class Parameters:
             *(f"mass:{name}" for name in with_mass),
             *(f"placement:{name}" for name in joints),
             *(f"closure:{name}" for name in self._closures),
+            *(f"distance:{name}" for name in self._rods),
             *(f"payload:{name}" for name in frames),
         )
 
@@ -178,8 +186,9 @@ class Parameters:
             return np.array(self.model.gravity.linear), [f"gravity[{k}]" for k in range(3)]
         if kind == "inertia":
             return self._body(name).toDynamicParameters(), [f"{group}.{part}" for part in _BODY]
-        if kind == "mass":
-            return np.array([self._body(name).mass]), [group]
+        if kind in ("mass", "distance"):
+            one = self._rods[name] if kind == "distance" else self._body(name).mass
+            return np.array([one]), [group]
         if kind == "placement":
             return np.zeros(6), [f"{group}.{part}" for part in _MOVE]
         if kind == "closure":
@@ -250,6 +259,10 @@ class Parameters:
         if own is None:
             return a, b
         return _product(a, _small_move(own[:6])), _product(b, _small_move(own[6:]))
+
+    def rod(self, closure: str) -> Expression:
+        """Return the length of the rod of a ``distance`` closure, m."""
+        return self._symbols.get(f"distance:{closure}", ca.SX(self._rods[closure]))
 
     def _numbers(self, placement: Any) -> Placement:
         """Return a placement without its rounding errors."""
