@@ -194,8 +194,8 @@ def _impossible(measures: Measures, failed: dict[str, Array]) -> str:
     if (measures.unreached > 1.0).all():
         nearest = 2.0 - float(measures.unreached.min())
         return (
-            f"none of {count} candidates closes at the middle of the region: on the straight way to
-            " f"it, of dimensions and coordinates, the best gets {nearest:.0%}"
+            f"none of {count} candidates closes at the middle of the region: on the straight way "
+            f"to it, of dimensions and coordinates, the best gets {nearest:.0%}"
         )
     total = np.sum([np.maximum(value, 0.0) for value in failed.values()], axis=0)
     best = int(np.argmin(total))
