@@ -54,7 +54,7 @@ def design_command(
 
     Examples:
 
-    - `rps-pin design design.yaml --candidates 400 -o chosen`
+    - `rps-pin design design.yaml --candidates 100 -o chosen`
     """
     described = of_tasks.load_design(file)
     check_outputs(
@@ -109,9 +109,9 @@ def _summary(found: of_tasks.DesignResult, chosen: list[of_tasks.Chosen]) -> dic
 
 
 def _table(found: of_tasks.DesignResult, chosen: list[of_tasks.Chosen]) -> Any:
+    """Return a table with a column for each chosen robot."""
     columns, rows = found.table([one.row for one in chosen])
-    told = [
-        (one.name, *(short(cell) if isinstance(cell, float) else str(cell) for cell in row))
-        for one, row in zip(chosen, rows, strict=True)
-    ]
-    return common.table_of(told, "robot", *columns, right=slice(1, len(columns) - 1))
+    cells = [[short(c) if isinstance(c, float) else str(c) for c in row] for row in rows]
+    told = [(name, *parts) for name, parts in zip(columns, zip(*cells, strict=True), strict=True)]
+    names = [one.name.replace("_", " ") for one in chosen]
+    return common.table_of(told, "", *names)
