@@ -86,10 +86,7 @@ def rps_pin(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Closed-loop robots on Pinocchio: the 3-RPS, and any other mechanism.
-
-    Units are SI: m, rad, s, kg, N. Begin with **rps-pin helix** and **rps-pin view**.
-    """
+    """Closed-loop robots on Pinocchio. SI units. Begin with **rps-pin helix** and **view**."""
 
 
 def _show_warning(others: Callable[..., None], warning: object, kind: object, *rest: Any) -> None:
