@@ -18,7 +18,6 @@ from rps_pin.task.design import (
     Requirements,
     RoundPart,
     design,
-    forget,
 )
 from rps_pin.task.design.measures import Measuring
 from rps_pin.task.design.search import best_of
@@ -293,11 +292,21 @@ def test_an_interrupted_run_goes_on(tmp_path: Path) -> None:
         assert_same(run(store=store), whole)
     assert sum(asked) == 240 - 3 * 40
     assert kept == 3
-    assert_same(run(store=store, candidates=280), run(candidates=280))
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_run_goes_on_with_more_candidates(tmp_path: Path) -> None:
+    store = tmp_path / "candidates"
+
+    def stopped(loop):
+        yield from list(loop)[:3]
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run(store=store, progress=stopped)
     with pytest.raises(InputError, match="another computation"):
         run(store=store, seed=6)
-    forget(store)
-    assert not list(tmp_path.iterdir())
+    assert_same(run(store=store, candidates=280), run(candidates=280))
 
 
 def test_steps_and_dimensions_that_are_held() -> None:

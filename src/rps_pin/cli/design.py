@@ -30,12 +30,6 @@ def design_command(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes; default: one for each core.")
     ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option(
-            "--resume", help="Go on where an interrupted run stopped; or with more candidates."
-        ),
-    ] = False,
     output: common.FolderOption = Path("design"),
     overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
@@ -48,7 +42,7 @@ def design_command(
     files that every other command takes, and **sheet.txt**, which says of each which requirement
     binds. Angles in the file are in radians.
 
-    Ctrl-C keeps the generations that are done; with **--resume** the same command goes on.
+    Ctrl-C keeps the generations that are done: the same command goes on with them.
 
     Exit status: 0 done; 1 an error, or no candidate meets all requirements; 2 wrong usage.
 
@@ -64,8 +58,6 @@ def design_command(
     )
     output.mkdir(parents=True, exist_ok=True)
     store = output / "candidates"
-    if not resume:
-        of_tasks.forget(store)
     console = common.text_console(as_json)
     found = of_tasks.design(
         described.space,
@@ -86,7 +78,6 @@ def design_command(
 
     if len(found.objectives) > 1:
         files += plots.save_figure(plots.plot_front(found), output, "front")
-    of_tasks.forget(store)
     if as_json:
         common.print_json(_summary(found, chosen) | {"files": files})
         return

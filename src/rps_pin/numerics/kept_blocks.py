@@ -25,11 +25,6 @@ from rps_pin.files import whole_file
 _NAME, _LOCK = "computation.txt", "lock"
 
 
-def kept_folder(target: Path) -> Path:
-    """Return the folder of the blocks that are kept for a file."""
-    return target.with_name(f".{target.name}.blocks")
-
-
 class KeptBlocks:
     """The blocks that a computation has kept, for this process alone while the context lasts.
 
@@ -51,7 +46,8 @@ class KeptBlocks:
     """
 
     def __init__(self, target: str | os.PathLike[str], description: Mapping[str, Any]) -> None:
-        self.folder = kept_folder(Path(target))
+        path = Path(target)
+        self.folder = path.with_name(f".{path.name}.blocks")
         key = hashlib.sha256(
             json.dumps(description, sort_keys=True, default=_of_array).encode()
         ).hexdigest()

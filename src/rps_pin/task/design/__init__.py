@@ -5,7 +5,7 @@ vary) in generated code whose parameters the dimensions are, and returns the fro
 meet `Requirements` and are best in one to three `Objective` s.
 """
 
-from rps_pin.task.design.compute import design, forget
+from rps_pin.task.design.compute import design
 from rps_pin.task.design.dimensions import Dimension
 from rps_pin.task.design.file import DescribedDesign, load_design
 from rps_pin.task.design.measures import Measures
@@ -29,6 +29,5 @@ __all__ = [
     "RoundPart",
     "Space",
     "design",
-    "forget",
     "load_design",
 ]

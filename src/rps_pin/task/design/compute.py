@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
+from contextlib import ExitStack
 from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
-from loky import cpu_count
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.numerics.kept_blocks import KeptBlocks, kept_folder
+from rps_pin.numerics.block_runs import Workers, cores
+from rps_pin.numerics.kept_blocks import KeptBlocks
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.design.measures import Measures, Measuring
 from rps_pin.task.design.requirements import Objective, Requirements, objectives_of
 from rps_pin.task.design.result import DesignResult
-from rps_pin.task.design.search import PORTION, Search, Workers, best_of
+from rps_pin.task.design.search import PORTION, Portions, Search, best_of, measured
 from rps_pin.task.design.space import Space
 from rps_pin.task.design.violations import contradictions, violations
 from rps_pin.validation import whole_number
@@ -72,8 +71,8 @@ def design(
         Dask's (``Client.get_executor()``) for many machines. It is not shut down.
     store
         A file's path: each generation is kept in a hidden folder beside it, so that the same call,
-        after an interruption, goes on where it stopped, also with more candidates. The folder
-        stays.
+        after an interruption, goes on where it stopped, also with more candidates. The folder is
+        removed at the end.
     compiler
         See `rps_pin.codegen.compile_mechanism`.
     progress
@@ -100,21 +99,23 @@ def design(
     measuring = Measuring(space, requirements, compiler)
     count = whole_number(workers, "workers") if workers is not None else 1
     if workers is None and candidates * len(measuring.points) >= _WORTH_PROCESSES:
-        count = int(cpu_count())
-    kept = None
-    if store is not None:
-        kept = KeptBlocks(Path(store), _description(measuring, asked, seed, population))
-    run = _Run(measuring, asked, Workers(measuring, count, executor), kept)
-    run.search = Search(space.dimensions, len(asked), len(run.requirements), population, seed)
+        count = cores()
     generations = -(-candidates // population)
-    done = False
-    try:
+    with ExitStack() as stack:
+        kept = None
+        if store is not None:
+            description = _description(measuring, asked, seed, population)
+            kept = stack.enter_context(KeptBlocks(store, description))
+        pool = None
+        if executor is not None or count > 1:
+            own = count if executor is None else cores()
+            pool = stack.enter_context(Workers(Portions(measuring), own, executor))
+        run = _Run(measuring, asked, pool, kept)
+        requirements_ = len(run.requirements)
+        run.search = Search(space.dimensions, len(asked), requirements_, population, seed)
         for generation in progress(range(generations)):
             run.one(generation)
-        done = True
-    finally:
-        run.workers.end(kill=not done)
-    return run.result(seed)
+        return run.result(seed)
 
 
 class _Run:
@@ -126,11 +127,11 @@ class _Run:
         self,
         measuring: Measuring,
         objectives: tuple[Objective, ...],
-        workers: Workers,
+        workers: Workers | None,
         kept: KeptBlocks | None,
     ) -> None:
         self._measuring, self._objectives = measuring, objectives
-        self.workers, self._kept = workers, kept
+        self._workers, self._kept = workers, kept
         self._names = [one.name for one in measuring.space.dimensions]
         self._values: list[Array] = []
         self._measures: list[Measures] = []
@@ -143,7 +144,7 @@ class _Run:
         values = self.search.ask()
         measures = self._stored(generation, values)
         if measures is None:
-            measures = self.workers(values)
+            measures = measured(self._measuring, values, self._workers)
             if self._kept is not None:
                 self._kept.put(generation, {"values": values} | measures._asdict())
         self._values.append(values)
@@ -222,8 +223,3 @@ def _description(
         "population": population,
         "portion": PORTION,
     }
-
-
-def forget(store: str | os.PathLike[str]) -> None:
-    """Remove the generations that a design has kept beside a file's path, if there are any."""
-    shutil.rmtree(kept_folder(Path(store)), ignore_errors=True)

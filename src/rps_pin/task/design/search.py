@@ -7,28 +7,20 @@ result.
 
 from __future__ import annotations
 
-import multiprocessing.resource_tracker
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor
+import pickle
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from loky import ProcessPoolExecutor
-from loky.backend import resource_tracker
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
-from rps_pin.interruption import end_with_parent, workers_without_signals
+from rps_pin.numerics.block_runs import Workers
 from rps_pin.task.design.dimensions import Dimension
-from rps_pin.task.design.measures import Measures
+from rps_pin.task.design.measures import Measures, Measuring
 
 #: Candidates that are measured as one batch.
 PORTION = 25
-#: Workers that may die before the work is given up.
-_MOST_DEATHS = 3
-#: The cores are shared out among processes: none of them shall take more than one.
-_ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
 #: What an objective of a candidate that was not measured is for the search, which looks at its
 #: violations alone.
 _NOT_MEASURED = 1e30
@@ -118,71 +110,32 @@ def best_of(objectives: Array) -> Array:
     return np.array(kept, dtype=np.intp)
 
 
-class Workers:
-    """Measures candidates here, in processes of our own, or in those of an executor.
+class Portions:
+    """Measures portions of candidates in any process, which loads generated code once."""
 
-    Parameters
-    ----------
-    measure
-        What measures a portion of candidates, (n, d).
-    count
-        Number of processes; one measures here.
-    executor
-        Any `concurrent.futures.Executor` in place of processes of our own.
-    """
+    def __init__(self, measuring: Measuring) -> None:
+        self._key, self._pickled = measuring.key, pickle.dumps(measuring)
 
-    def __init__(
-        self, measure: Callable[[Array], Measures], count: int, executor: Executor | None
-    ) -> None:
-        self._measure, self._count, self._given = measure, count, executor
-        self._pool: Any = executor
-        self._deaths = 0
-
-    def __call__(self, values: Array) -> Measures:
-        """Return the measures of candidates (n, d), in their order."""
-        portions = [values[k : k + PORTION] for k in range(0, len(values), PORTION)]
-        parts = list(self._parts(portions))
-        return Measures(*(np.concatenate(part) for part in zip(*parts, strict=True)))
-
-    def end(self, *, kill: bool) -> None:
-        """End our own processes."""
-        if self._given is None and self._pool is not None:
-            self._pool.shutdown(kill_workers=kill)
-            self._pool = None
-
-    def _parts(self, portions: Sequence[Array]) -> Iterator[Measures]:
-        if self._given is None and self._count == 1:
-            return iter([self._measure(portion) for portion in portions])
-        while True:
-            try:
-                with workers_without_signals():  # the first call starts them
-                    if self._pool is None:
-                        self._pool = _processes(self._count)
-                    under_way = [
-                        self._pool.submit(_measured, self._measure, one) for one in portions
-                    ]
-                return iter([one.result() for one in under_way])
-            except BrokenExecutor:
-                self._deaths += 1
-                if self._given is not None or self._deaths > _MOST_DEATHS:
-                    raise
-                self.end(kill=True)
+    def __call__(self, values: Array) -> dict[str, Array]:
+        """Return the measures of candidates (n, d), by name."""
+        if self._key not in _KNOWN:
+            _KNOWN[self._key] = pickle.loads(self._pickled)
+        return _KNOWN[self._key](values)._asdict()
 
 
-#: What this process measures with, by its identity: generated code is loaded once.
-_KNOWN: dict[str, Callable[[Array], Measures]] = {}
+#: What this process measures with, by its key.
+_KNOWN: dict[str, Measuring] = {}
 
 
-def _measured(measure: Any, values: Array) -> Measures:
-    """Measure in a worker, with the generated code of the calls before."""
-    found: Measures = _KNOWN.setdefault(measure.key, measure)(values)
-    return found
-
-
-def _processes(count: int) -> Any:
-    """Return an executor of processes of our own."""
-    multiprocessing.resource_tracker.ensure_running()
-    resource_tracker.ensure_running()
-    return ProcessPoolExecutor(
-        count, initializer=end_with_parent, initargs=(os.getpid(),), env=_ONE_THREAD
-    )
+def measured(measuring: Measuring, values: Array, workers: Workers | None) -> Measures:
+    """Return the measures of candidates (n, d), in their order, by workers if there are any."""
+    portions = [values[k : k + PORTION] for k in range(0, len(values), PORTION)]
+    if workers is None:
+        parts = [measuring(portion)._asdict() for portion in portions]
+    else:
+        waiting = iter(portions)
+        parts = []
+        for _ in portions:
+            workers.fill(waiting)
+            parts.append(dict(workers.next()))
+    return Measures(*(np.concatenate([part[name] for part in parts]) for name in Measures._fields))
