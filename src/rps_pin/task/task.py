@@ -16,6 +16,7 @@ from rps_pin.codegen.engine.batches import Errors
 from rps_pin.errors import InputError, MechanismError, SingularityError
 from rps_pin.numerics.linear_algebra import RANK_TOLERANCE
 from rps_pin.task import polytope
+from rps_pin.task.ellipsoids import Ellipsoids, ellipsoids
 from rps_pin.task.maps import TaskMaps, options_of
 from rps_pin.task.paths.limits import JointRooms, PositionLimits
 from rps_pin.task.singularity import SingularityMeasures
@@ -345,6 +346,22 @@ class Task(TaskMaps):
         if not ((lower < 0) & (upper > 0)).all():
             raise InputError("limits of speeds: the least must be negative, the largest positive")
         return polytope.of_speeds(self.jacobian(self._one(q)), lower, upper, self._units)
+
+    def ellipsoids(self, q: ArrayLike, *, x: ArrayLike | None = None) -> Ellipsoids:
+        """Return the semi-axes of the ellipsoids of forces and speeds; see `Ellipsoids`.
+
+        Their lengths in one unit are the gains of a workspace, and the inverses of these. Arguments
+        are those of `jacobian`.
+
+        Raises
+        ------
+        ClosureError
+            If the loops are open.
+        SingularityError
+            If the actuators do not determine the task here.
+        """
+        K = self.in_one_unit(self._gain(q, x, "raise"))
+        return ellipsoids(K, self._units, self.mechanism.max_condition)
 
     # Singularities --------------------------------------------------------------------------------
 
