@@ -148,9 +148,9 @@ def _without_limits() -> Task:
         (RPSRobot.from_preset("micro").task, "its coordinates are z, rx, ry"),
     ],
 )
-def test_other_mechanisms_are_refused(task: Task, words: str) -> None:
+def test_other_mechanisms_are_no_such_platform(task: Task, words: str) -> None:
     with pytest.raises(MechanismError, match=words):
-        certify(task, np.zeros(6), np.ones(6))
+        point_legs(task)
 
 
 def test_bad_boxes_and_starts_are_refused() -> None:

@@ -110,7 +110,7 @@ class CertifiedBoxes:
         return "inside" if inside else "outside"
 
     def _boxes(self, which: int) -> Array:
-        return np.moveaxis(np.array(_ends(self.places[which], self.lower, self.upper)), 0, 1)
+        return np.moveaxis(np.array(ends_of(self.places[which], self.lower, self.upper)), 0, 1)
 
 
 def prove(
@@ -152,7 +152,7 @@ def prove(
         left: list[tuple[Places, Bools, Array]] = []
         for i in progress(range(0, len(places), _BLOCK)):
             block, open_ = places[i : i + _BLOCK], asked[i : i + _BLOCK]
-            box = Interval(*(end.T for end in _ends(block, lower, upper)))
+            box = Interval(*(end.T for end in ends_of(block, lower, upper)))
             with np.errstate(invalid="ignore", over="ignore"):  # no bounds: NaN proves nothing
                 out, parts = _judged(groups, box, open_)
             proven = ~open_.any(axis=1) & ~out
@@ -243,7 +243,7 @@ def _judged(
     return out, np.stack([np.maximum(inside, 0.0), outside], axis=-1)
 
 
-def _ends(places: Places, lower: Array, upper: Array) -> tuple[Array, Array]:
+def ends_of(places: Places, lower: Array, upper: Array) -> tuple[Array, Array]:
     """Return the least and greatest coordinates of boxes, (n, m) each; equal where they touch."""
     parts = np.ldexp(1.0, -places[:, :1])
     at = places[:, 1:].astype(np.float64)

@@ -219,10 +219,10 @@ class Enclosure:
         wide = half.max(axis=1, initial=0.0) > 0.0  # coordinates that are not held
         half, low, high = (one[wide] for one in (half, self.slopes.lower, self.slopes.upper))
         g, d = (low + high) / 2, np.maximum(high - low, 0.0) * (0.5 + 2.0**-40)
-        return _share_beyond(np.abs(g) * half, (d * half).sum(axis=0) - centre.lower)
+        return share_beyond(np.abs(g) * half, (d * half).sum(axis=0) - centre.lower)
 
 
-def _share_beyond(a: Array, t: Array) -> Array:
+def share_beyond(a: Array, t: Array) -> Array:
     """Return the share of the cube |u_i| <= 1 in which a . u > t, or a little less.
 
     In k dimensions its volume is the sum of +- (a . u - t)^k / (k! a_1 ... a_k) over the corners u

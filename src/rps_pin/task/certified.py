@@ -1,6 +1,7 @@
-"""Boxes of poses that are proven to be inside the workspace of a 6-UPS platform, or outside.
+"""Boxes of task coordinates that are proven to be inside a mechanism's workspace, or outside.
 
-A box of coordinates (x, y, z, rx, ry, rz) is inside if in all of its poses
+Of mechanisms in general by `rps_pin.task.certification`; of a platform on six legs between points
+in closed form. A box of its coordinates (x, y, z, rx, ry, rz) is inside if in all of its poses
 
 - every leg's length |p + R a - b| keeps the limits of its actuator, and is not zero;
 - the angles of its universal joint (`rps_pin.task.point_legs`) keep their limits, without passing
@@ -22,11 +23,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, SingularityError
+from rps_pin.errors import InputError, MechanismError, SingularityError
 from rps_pin.numerics.boxes import Bounds, CertifiedBoxes, Progress, bounded, checked_box, prove
 from rps_pin.numerics.intervals import Enclosure, Interval
 from rps_pin.numerics.stumpff import enclosures
 from rps_pin.other_kinds import refuses_other_kinds
+from rps_pin.task.certification.general import certify_general
 from rps_pin.task.point_legs import PointLegs, point_legs
 from rps_pin.task.task import Task
 from rps_pin.validation import real_vector
@@ -48,22 +50,41 @@ def certify(
     upper: ArrayLike,
     *,
     start: ArrayLike | None = None,
+    free: float = 0.02,
     undecided: float = 0.01,
     most_boxes: int = 200_000,
     progress: Progress = iter,
 ) -> CertifiedBoxes:
-    """Prove of which poses of a box a 6-UPS platform reaches them, by intervals and bisection.
+    """Prove of which task coordinates of a box a mechanism reaches them, by intervals.
+
+    A box is inside if for each of its points there is one closed configuration, that of the start's
+    assembly mode, every joint keeps its limits there (by whole turns, where these make no
+    difference), the closures are regular given the task's coordinates (no type I singularity), and
+    K is regular, on the start's side (no type II singularity). It is joined to the start's box by
+    boxes for all of whose points that configuration is proven.
+
+    A box is outside if in all of its configurations, joined so, one limit is broken or K has the
+    other sign; or if nothing closes at any of its points within the joints' limits, as far as the
+    part of the output frame's pose that is no coordinate of the task stays within `free` of the
+    start's.
 
     Parameters
     ----------
     task
-        Of a platform on six legs with universal joints, prismatic actuators and balls; its
-        coordinates are x, y, z, rx, ry and rz.
+        The task, of a frame in the world or of joints. A platform on six legs with universal
+        joints, prismatic actuators and balls is certified in closed form; others need CasADi,
+        ``pip install rps-pin[compile]``.
     lower, upper
-        Least and greatest coordinates of the box, shape (6,), m and rad; equal where a coordinate
+        Least and greatest coordinates of the box, shape (m,), m and rad; equal where a coordinate
         is held.
     start
-        Coordinates (6,) whose side of the singularities counts; those of home if left out.
+        Task coordinates (m,), followed straight from home, or a closed configuration (nq,), that
+        decide the assembly mode and the side of the singularities; within the box. Left out: home,
+        or the point of the box nearest to it. Of a platform on six legs, coordinates (6,) anywhere,
+        home if left out.
+    free
+        See above, rad and characteristic lengths. A Delta's platform could turn: boxes beyond its
+        reach are excluded for turns of at most this.
     undecided
         Undecided share of the volume inside at which the cutting ends.
     most_boxes
@@ -74,14 +95,23 @@ def certify(
     Raises
     ------
     MechanismError
-        If it is another mechanism.
+        If the closures are redundant or leave idle freedoms, there are fewer actuators than
+        coordinates, or the task's reference frame is not the world.
     InputError
-        If the box is empty, or has rotation vectors longer than 2 rad.
-    SingularityError
-        If the start is singular.
+        If the box is empty, has rotation vectors longer than 2 rad, or the start is outside it.
+    ClosureError, SingularityError
+        If the start cannot be reached from home, or is singular.
+    CompileError
+        If CasADi is needed and not installed.
     """
-    legs = point_legs(task)
-    ends = checked_box(lower, upper, 6, held=True)
+    ends = checked_box(lower, upper, task.size, held=True)
+    options: dict[str, Any] = {
+        "undecided": undecided, "most_boxes": most_boxes, "progress": progress
+    }  # fmt: skip
+    try:
+        legs = point_legs(task)
+    except MechanismError:
+        return certify_general(task, *ends, start=start, free=free, **options)
     _refuse_turns(*ends)
     margins = _Margins(task, legs, task.home if start is None else real_vector(start, 6, "start"))
     groups = {
@@ -89,7 +119,7 @@ def certify(
         "angles": (margins.angle_count, margins.angles),
         "singularity": (1, margins.regular),
     }
-    return prove(groups, *ends, undecided=undecided, most_boxes=most_boxes, progress=progress)
+    return prove(groups, *ends, **options)
 
 
 class _Margins:

@@ -135,7 +135,6 @@ def _axis(model: pin.Model, joint: int) -> Array | None:
 
 def _refuse(task: Task, why: str) -> NoReturn:
     raise MechanismError(
-        f"boxes are certified of a 3-RPS, and of platforms on six legs with universal joints, "
-        f"prismatic actuators and balls; {task.mechanism.name or 'this mechanism'!r} is no such: "
-        f"{why}"
+        f"{task.mechanism.name or 'this mechanism'!r} is no platform on six legs with universal "
+        f"joints, prismatic actuators and balls: {why}"
     )

@@ -1,0 +1,1 @@
+"""Boxes of task coordinates that are proven, of any mechanism: equations, Newton, growth."""
