@@ -30,7 +30,7 @@ _FORMULATIONS = {
 #: Modes whose places differ by less are one.
 _SAME = 1e-7
 #: Of closing legs within their limits.
-_RESTARTS = 3
+_RESTARTS = 1
 
 
 def every_mode(
