@@ -207,6 +207,48 @@ def test_platforms_have_those_that_the_search_finds(name: str) -> None:
         assert worst(np.abs(mechanism.system.equations.gaps(q))) < 1e-10
 
 
+def on_legs(kinds: str, seed: int) -> ClosedLoopModel:
+    """A platform with a real pose on legs: rods (d), with balls on it (p), then at the base (b)."""
+    base, platform, length = random_legs(seed)
+    model = pin.Model()
+    body = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "platform")
+    model.addFrame(pin.Frame("top", body, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    closures = []
+    for k, kind in enumerate(kinds):
+        foot, corner = at(*base[k]), at(*platform[k])
+        if kind == "d":
+            points = {"placement_a": corner, "placement_b": foot}
+            rod = LoopClosure("top", "universe", "distance", f"{k}", distance=length[k], **points)
+            closures.append(rod)
+            continue
+        parent, place = (0, foot) if kind == "b" else (body, corner)
+        ball = model.addJoint(parent, pin.JointModelSpherical(), place, f"ball{k}")
+        model.addFrame(pin.Frame(f"tip{k}", ball, at(length[k]), pin.FrameType.OP_FRAME))
+        other = ("top", corner) if kind == "b" else ("universe", foot)
+        closures.append(LoopClosure(f"tip{k}", other[0], name=f"{k}", placement_b=other[1]))
+    for index in range(1, model.njoints):
+        model.appendBodyToJoint(index, pin.Inertia.Random(), pin.SE3.Identity())
+    return ClosedLoopModel(model, closures, [])
+
+
+def test_legs_of_all_kinds_lead_to_the_same_poses() -> None:
+    """The rods' spins about their lines are idle."""
+    places = []
+    for kinds in ("dddddd", "ddppbb"):
+        mechanism = on_legs(kinds, 7)
+        neutral = pin.neutral(mechanism.model)
+        found = mechanism.assembly_modes(q_guess=neutral, method="all", frames=["top"])
+        assert found.complex_count == 40
+        assert found.certified is not None
+        assert found.certified.all()
+        for q in found.q:
+            assert worst(np.abs(mechanism.system.equations.gaps(q))) < 1e-10
+        places.append(np.array([mechanism.frame_placement(q, "top") for q in found.q]))
+    assert len(places[0]) == len(places[1]) >= 2
+    apart = np.abs(places[0][:, None] - places[1]).max(axis=(2, 3))
+    assert worst(apart.min(axis=0)) < 1e-9
+
+
 def three_rpr(seed: int) -> tuple[ClosedLoopModel, Array]:
     """A general planar 3-RPR: a platform at the end of leg 1, legs of given lengths."""
     rng, model = np.random.default_rng(seed), pin.Model()

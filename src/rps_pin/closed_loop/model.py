@@ -931,7 +931,7 @@ class ClosedLoopModel:
         seed
             Of the random numbers: the same starts each time.
         starts, seconds
-            Most random starts, and the longest time, s.
+            Most random starts, and the longest time, s, of a search.
         within_limits
             Whether the modes must lie within the joint limits; the starts do then.
         progress
