@@ -10,6 +10,7 @@ from rps_pin.numerics.linear_algebra import (
     Decomposition,
     condition_number,
     full_svd,
+    many_singular_values,
     null_space,
     rank,
     singular_values,
@@ -98,3 +99,24 @@ def test_full_svd_is_one(shape: tuple[int, int]) -> None:
     np.testing.assert_allclose(left @ middle @ right, a, rtol=0, atol=1e-13)
     np.testing.assert_allclose(left @ left.T, np.eye(shape[0]), rtol=0, atol=1e-13)
     np.testing.assert_allclose(values, singular_values(a), rtol=1e-13)
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (3, 3), (6, 6), (8, 6), (4, 1)])
+def test_singular_values_of_many_are_those_they_were_made_of(shape: tuple[int, int]) -> None:
+    """To 1e-12 of each but for the SVD's own error, at any conditioning; zero matrices too."""
+    rows, columns = shape
+    rng, n = np.random.default_rng(1), 400
+    left = np.linalg.qr(rng.normal(size=(n, rows, rows)))[0][:, :, :columns]
+    right = np.linalg.qr(rng.normal(size=(n, columns, columns)))[0]
+    ratio = 10 ** rng.uniform(-9, 0, size=n)  # of the least to the largest
+    share = np.sort(rng.uniform(size=(n, columns)))[:, ::-1]
+    share[:, 0], share[:, -1] = 1.0, 0.0 if columns > 1 else 1.0
+    wanted = 10 ** rng.uniform(-3, 3, size=(n, 1)) * ratio[:, None] ** (1 - share)
+    found = many_singular_values(left * wanted[:, None, :] @ right)
+    error = np.abs(found - wanted)
+    assert (error <= 1e-12 * wanted + 2e-14 * wanted[:, :1]).all()
+    regular = ratio > 0.04
+    assert regular.any()
+    assert (error[regular] <= 1e-12 * wanted[regular]).all()
+    assert not many_singular_values(np.zeros((2, *shape))).any()
+    assert many_singular_values(np.zeros((0, *shape))).shape == (0, columns)

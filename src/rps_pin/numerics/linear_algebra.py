@@ -24,6 +24,9 @@ from rps_pin.errors import SingularityError
 
 #: A singular value below this, relative to the largest (or to 1 if that is less), counts as zero.
 RANK_TOLERANCE = 1e-10
+#: Least square of the least singular value, of the largest, for which the eigenvalues of A'A give
+#: it to 1e-12: eps / 1e-3, times a factor of the size.
+_WELL_CONDITIONED = 1e-3
 
 
 def rank(values: Array, tolerance: float = RANK_TOLERANCE, size: float = 1.0) -> int:
@@ -47,6 +50,20 @@ def rank(values: Array, tolerance: float = RANK_TOLERANCE, size: float = 1.0) ->
 def singular_values(matrix: Array) -> Array:
     """Return the singular values, largest first."""
     return np.asarray(np.linalg.svd(matrix, compute_uv=False), np.float64)
+
+
+def many_singular_values(matrices: Array) -> Array:
+    """Return the singular values of matrices (n, rows, columns), rows >= columns, largest first.
+
+    The roots of the eigenvalues of A'A, in half the time of the SVD, where their rounding error,
+    some eps s_1^2 each, is at most 1e-12 of the least; else by the SVD.
+    """
+    squares = np.linalg.eigvalsh(np.swapaxes(matrices, -1, -2) @ matrices)[:, ::-1]
+    found = np.sqrt(np.maximum(squares, 0.0))
+    poor = np.flatnonzero(~(squares[:, -1] >= _WELL_CONDITIONED * squares[:, 0]))
+    if poor.size:
+        found[poor] = np.linalg.svd(matrices[poor], compute_uv=False)
+    return np.asarray(found, np.float64)
 
 
 def full_svd(matrix: Array) -> tuple[Array, Array, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, MechanismError
+from rps_pin.numerics.linear_algebra import many_singular_values
 from rps_pin.task.paths.limits import Cone, ConeRooms
 from rps_pin.task.sizing.demands import Demands
 from rps_pin.task.task import Task
@@ -65,7 +66,7 @@ def gains_of(task: Task, K: Array) -> Gains:
     K = task.in_one_unit(K)
     there = np.asarray(np.isfinite(K).all(axis=(-2, -1)))
     K = np.where(there[:, None, None], K, 0.0)
-    gains = np.asarray(np.linalg.svd(K, compute_uv=False), dtype=np.float64)
+    gains = many_singular_values(K)
     square = K.shape[-2] == K.shape[-1]
     determinant = np.linalg.det(K) if square else np.prod(gains, axis=-1)
     largest = np.where(there & (gains[:, 0] > 0), gains[:, 0], 1.0)
