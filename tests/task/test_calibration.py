@@ -1,0 +1,286 @@
+"""Calibration: predicted readings by differences, what can be known, and simulated measurements."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from rps_pin import ClosedLoopModel, InputError, Task, UnreachableError
+from rps_pin.arrays import Array
+from rps_pin.task.calibration import Calibration, CalibrationModel, Readings, calibrate, readings
+from rps_pin.task.calibration.outliers import outliers
+from rps_pin.task.calibration.problem import Problem
+from tests.worst import worst
+
+#: Of the five-bar's encoders, rad, and of what measures its tip, m.
+DEVIATIONS = {"left_joint": 1e-4, "right_joint": 1e-4, "x": 3e-5, "z": 3e-5}
+GROUPS = (
+    "placement:left_joint",
+    "placement:left_arm_joint",
+    "placement:right_joint",
+    "placement:right_arm_joint",
+    "closure:tips",
+)
+
+
+class Case(NamedTuple):
+    """A five-bar with all of its lengths as parameters, and poses."""
+
+    task: Task
+    model: CalibrationModel
+    x: Array
+    q: Array
+
+
+@cache
+def five_bar() -> Case:
+    task = ClosedLoopModel.load("urdf/five_bar.yaml").task
+    model = CalibrationModel(task, GROUPS, tuple(DEVIATIONS), offsets=["left_joint", "right_joint"])
+    x = task.home + np.random.default_rng(0).uniform(-0.075, 0.075, (60, 2))
+    return Case(task, model, x, model.home(x, model.nominal))
+
+
+def read(values: Array) -> Readings:
+    task = five_bar().task
+    return readings(task, dict(zip(DEVIATIONS, values.T, strict=True)), DEVIATIONS)
+
+
+def seen() -> Array:
+    """Combinations of parameters that can be known, (p, 11)."""
+    case = five_bar()
+    exact = case.model.predict(case.x, case.q, case.model.nominal).readings
+    problem = Problem(case.model, read(exact), np.full(case.model.nominal.size, np.inf))
+    problem.begin(None)
+    return problem.identifiable().seen
+
+
+def wrong(rng: np.random.Generator, size: float = 1e-3) -> Array:
+    """Parameters whose loops close, about `size` (m) from the believed ones."""
+    model, basis = five_bar().model, seen()
+    return model.nominal + basis @ (size * rng.normal(size=basis.shape[1])) / model.units
+
+
+def measured(p: Array, rng: np.random.Generator, bad: int = 0) -> tuple[Array, Array]:
+    """Readings with noise at parameters, and which of them are spoilt, 20 to 100 deviations."""
+    case = five_bar()
+    values = case.model.predict(case.x, case.q, p).readings
+    deviation = np.broadcast_to(list(DEVIATIONS.values()), values.shape)
+    values = values + deviation * rng.normal(size=values.shape)
+    spoilt = np.zeros(values.shape, dtype=bool)
+    spoilt.flat[rng.choice(values.size, bad, replace=False)] = True
+    sizes = rng.uniform(20, 100, values.shape) * rng.choice([-1, 1], values.shape)
+    return values + spoilt * sizes * deviation, spoilt
+
+
+# What is predicted --------------------------------------------------------------------------------
+
+
+def test_derivatives_of_what_is_predicted() -> None:
+    """By poses and by parameters, against differences; the latter where the loops stay closed."""
+    _, model, x, q = five_bar()
+    rng, h = np.random.default_rng(1), 1e-6
+    p = wrong(rng)
+    found = model.predict(x, q, p)
+    direction = rng.normal(size=x.shape)
+    sides = [model.predict(x + s * h * direction, q, p).readings for s in (1, -1)]
+    slope = np.einsum("nsm,nm->ns", found.by_pose, direction)
+    assert worst((sides[0] - sides[1]) / (2 * h) - slope) < 1e-8 * worst(slope)
+    basis = seen() / model.units[:, None]
+    for column in basis.T:
+        sides = [model.predict(x, q, p + s * h * column).readings for s in (1, -1)]
+        slope = found.by_parameters @ column
+        assert worst((sides[0] - sides[1]) / (2 * h) - slope) < 1e-8 * max(worst(slope), 1.0)
+
+
+def test_readings_are_the_pinocchio_engines() -> None:
+    """At parameters that are wrong: the mechanism rebuilt with them, completed at the poses."""
+    task, model, x, q = five_bar()
+    p = wrong(np.random.default_rng(2))
+    found = model.predict(x, q, p).readings
+    own = len(model.engine.parameters)
+    other = model.engine.reference(p[:own])
+    columns = [
+        task.mechanism.model.joints[task.mechanism.model.getJointId(n)].idx_q
+        for n in ("left_joint", "right_joint")
+    ]
+    for one, start, values in zip(x[:5], q[:5], found[:5], strict=True):
+        there = other.complete(one, start, within_limits=False)
+        assert worst(there[columns] - p[own:] - values[:2]) < 1e-9
+        assert worst(values[2:] - one) < 1e-12
+
+
+def test_scale_of_a_sensor() -> None:
+    task = five_bar().task
+    model = CalibrationModel(task, [], ["left_joint", "x"], offsets=["x"], scales=["left_joint"])
+    assert model.labels == ("offset:x", "scale:left_joint")
+    x = five_bar().x[:3]
+    q = model.home(x, model.nominal)
+    plain, h = model.predict(x, q, model.nominal), 1e-6
+    p = np.array([0.01, 1.1])
+    found = model.predict(x, q, p)
+    assert worst(found.readings[:, 0] * 1.1 - plain.readings[:, 0]) < 1e-12
+    assert worst(found.readings[:, 1] + 0.01 - plain.readings[:, 1]) < 1e-12
+    for k in range(2):
+        step = h * np.eye(2)[k]
+        sides = [model.predict(x, q, p + s * step).readings for s in (1, -1)]
+        assert worst((sides[0] - sides[1]) / (2 * h) - found.by_parameters[..., k]) < 1e-8
+
+
+# What can be known --------------------------------------------------------------------------------
+
+
+def test_how_many_combinations_of_a_five_bar_can_be_known() -> None:
+    """Counted by hand: base points, both lengths and offset of an arm (5 each), closed point (2).
+
+    The point that is measured is the left tip; a length of the left forearm goes to it, and the
+    closed point has two coordinates from there. Then the right forearm's length is known too.
+    """
+    assert seen().shape[1] == 5 + 5 + 1
+
+
+def test_combinations_that_cannot_be_known_are_kept() -> None:
+    """Readings without noise: what can be known is found, the rest stays as believed."""
+    case, rng = five_bar(), np.random.default_rng(3)
+    p = wrong(rng, 3e-3)
+    found = calibrate(case.model, read(case.model.predict(case.x, case.q, p).readings))
+    assert not found.outliers.any()
+    off = (found.parameters - p) * case.model.units
+    assert worst(found.identifiable.seen.T @ off) < 1e-5 * worst(
+        (p - found.before) * case.model.units
+    )
+    assert (
+        worst(found.identifiable.unseen.T @ ((found.parameters - found.before) * case.model.units))
+        < 1e-12
+    )
+    assert worst(found.residuals) < 1e-3
+    assert np.isinf(found.deviations[~found.alone]).all()
+    assert np.isfinite(found.deviations[found.alone]).all()
+
+
+def test_a_prior_separates_parameters() -> None:
+    case = five_bar()
+    model = CalibrationModel(
+        case.task, ["placement:left_joint"], tuple(DEVIATIONS), offsets=["left_joint"]
+    )
+    values = model.predict(case.x, case.q, model.nominal).readings
+    priors = {
+        "placement:left_joint.x": 1e-4,
+        "placement:left_joint.z": 1e-4,
+        "offset:left_joint": 1e-3,
+    }
+    free = calibrate(model, read(values))
+    held = calibrate(model, read(values), priors=priors)
+    # A turn of the base joint about its axis is an offset of its encoder.
+    names = [np.array(model.labels)[one.alone].tolist() for one in (free, held)]
+    either = ["placement:left_joint.pitch", "offset:left_joint"]
+    assert names[0] == ["placement:left_joint.x", "placement:left_joint.z"]
+    assert names[1] == [*names[0], *either]
+    assert (held.deviations[free.alone] < free.deviations[free.alone]).all()
+    k = model.labels.index("placement:left_joint.x")
+    assert held.deviations[k] < 1e-4
+
+
+# Noise and outliers -------------------------------------------------------------------------------
+
+
+def run(seed: int) -> tuple[Calibration, Array, Array]:
+    """A calibration of simulated readings with 20 outliers; its errors, and what was spoilt."""
+    rng = np.random.default_rng(seed)
+    p = wrong(rng)
+    values, spoilt = measured(p, rng, bad=20)
+    found = calibrate(five_bar().model, read(values))
+    return found, found.parameters - p, spoilt
+
+
+def test_errors_are_those_that_the_covariance_says() -> None:
+    """Sums of squared errors over their covariance, 9 parameters of 10 runs, and coverage."""
+    squares, within, freedom = 0.0, [], 0
+    for seed in range(10):
+        found, error, spoilt = run(seed)
+        known = found.alone
+        part = found.covariance[np.ix_(known, known)]
+        squares += float(error[known] @ np.linalg.solve(part, error[known]))
+        freedom += int(known.sum())
+        within.append(np.abs(error[known]) < 1.96 * found.deviations[known])
+        assert np.count_nonzero(spoilt & ~found.outliers) <= 3  # pairs in one pose can agree
+        assert 0.6 < found.chi_squared / found.freedom < 1.6
+    assert freedom == 90
+    # Chi squared of 90 degrees of freedom: 0.1 % and 99.9 %.
+    assert 52.0 < squares < 137.3
+    assert np.mean(within) > 0.85
+
+
+def test_outliers_of_a_pose() -> None:
+    """One wrong of five readings of two coordinates is named; of three, none can be."""
+    rng = np.random.default_rng(4)
+    A = rng.normal(size=(2, 5, 2))
+    r = np.einsum("nsm,nm->ns", A, rng.normal(size=(2, 2)))
+    r[0, 3] += 50.0
+    r[1, 1] -= 30.0
+    known = np.ones((2, 5), dtype=bool)
+    wanted = np.zeros((2, 5), dtype=bool)
+    wanted[0, 3] = wanted[1, 1] = True
+    assert np.array_equal(outliers(r, A, known), wanted)
+    known[1, 3:] = False  # any one of the three may be wrong: all go
+    assert np.array_equal(outliers(r, A, known)[1], known[1])
+
+
+# Bad input ----------------------------------------------------------------------------------------
+
+
+def test_faults_of_readings() -> None:
+    task = five_bar().task
+    with pytest.raises(InputError, match="called 'left_jiont' \\(did you mean"):
+        readings(task, {"left_jiont": [0.0]}, {"left_jiont": 1e-3})
+    with pytest.raises(InputError, match="one number of each sensor for each pose"):
+        readings(task, {"x": [0.0], "z": [0.0, 1.0]}, {"x": 1e-3, "z": 1e-3})
+    with pytest.raises(InputError, match="no deviation of 'z'"):
+        readings(task, {"x": [0.0], "z": [0.0]}, {"x": 1e-3})
+    with pytest.raises(InputError, match="pose 1 has no reading"):
+        readings(task, {"x": [0.0, np.nan]}, {"x": 1e-3})
+    with pytest.raises(InputError, match="a reading is infinite"):
+        readings(task, {"x": [np.inf]}, {"x": 1e-3})
+
+
+def test_faults_of_a_calibration() -> None:
+    case = five_bar()
+    values = case.model.predict(case.x, case.q, case.model.nominal).readings
+    with pytest.raises(InputError, match="no group of geometric parameters"):
+        CalibrationModel(case.task, ["mass:left_joint"], ["x"])
+    with pytest.raises(InputError, match="'z' is not read"):
+        CalibrationModel(case.task, [], ["x"], offsets=["z"])
+    with pytest.raises(InputError, match="the model's sensors are"):
+        calibrate(case.model, readings(case.task, {"x": values[:, 2]}, {"x": 1e-3}))
+    with pytest.raises(InputError, match="8 readings at 2 poses leave nothing"):
+        calibrate(case.model, read(values[:2]))
+    with pytest.raises(InputError, match="no parameter 'closure:tip'"):
+        calibrate(case.model, read(values), priors={"closure:tip": 1e-3})
+
+
+def test_readings_of_another_machine_are_doubted() -> None:
+    """Columns in the wrong order; noise that is larger than was said."""
+    case, rng = five_bar(), np.random.default_rng(5)
+    values, _ = measured(case.model.nominal, rng)
+    try:
+        doubts = calibrate(case.model, read(values[:, [1, 0, 3, 2]])).doubts
+    except UnreachableError as error:
+        doubts = (str(error),)
+    assert doubts
+    assert not calibrate(case.model, read(values)).doubts
+    loud = case.model.predict(case.x, case.q, case.model.nominal).readings
+    loud = loud + 2.0 * (values - loud)
+    (doubt,) = calibrate(case.model, read(loud)).doubts
+    assert "the residuals are 1." in doubt  # outliers are left out
+
+
+def test_a_reading_that_cannot_be_is_an_outlier() -> None:
+    """A digit typed wrong puts the tip 9 m away."""
+    case, rng = five_bar(), np.random.default_rng(6)
+    values, _ = measured(case.model.nominal, rng)
+    values[7, 3] = 9.0
+    found = calibrate(case.model, read(values))
+    assert found.outliers[7, 3]
+    assert found.outliers.sum() == 1
