@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Annotated, Any, NoReturn, TypeVar, get_args
+from typing import Annotated, Any, NoReturn, TypeVar, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from ruamel.yaml import YAML
@@ -252,9 +252,13 @@ class Faults:
 
 
 def _schema_at(schema: type[BaseModel], path: Sequence[str | int]) -> type[BaseModel]:
+    is_key = False  # of a mapping whose values are of the schema
     for part in path:
-        if isinstance(part, str):
-            schema = next(_schemas_in(schema.model_fields[part].annotation))
+        if isinstance(part, str) and not is_key:
+            annotation = schema.model_fields[part].annotation
+            schema, is_key = next(_schemas_in(annotation)), get_origin(annotation) is dict
+        else:
+            is_key = False
     return schema
 
 

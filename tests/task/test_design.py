@@ -10,6 +10,7 @@ import pytest
 
 from rps_pin import ClosedLoopModel, InputError, Task
 from rps_pin.arrays import Array
+from rps_pin.task import certify
 from rps_pin.task.design import (
     DesignSpace,
     Dimension,
@@ -18,6 +19,7 @@ from rps_pin.task.design import (
     Requirements,
     RoundPart,
     design,
+    load_design,
 )
 from rps_pin.task.design.measures import Measuring
 from rps_pin.task.design.search import best_of
@@ -374,3 +376,83 @@ def test_violations_fall_as_candidates_come_nearer() -> None:
 def test_bad_dimensions(options: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         DesignSpace(delta().task, [Dimension("one", **{"lower": 0.1, "upper": 0.5, **options})])
+
+
+# Files --------------------------------------------------------------------------------------------
+
+SAMPLE = Path("src/rps_pin/cli/samples/design.yaml")
+
+
+def test_the_sample_file_is_read(tmp_path: Path) -> None:
+    (tmp_path / "path.yaml").write_text(SAMPLE.with_name("path.yaml").read_text())
+    (tmp_path / "design.yaml").write_text(SAMPLE.read_text())
+    found = load_design(tmp_path / "design.yaml")
+    np.testing.assert_allclose(found.space.nominal, [0.25, 0.6, 0.2], rtol=1e-12)
+    assert [one.name for one in found.objectives] == ["size", "conditioning"]
+    assert (found.candidates, found.population, found.seed) == (10000, 100, 1)
+    grid = found.requirements.region.grid(found.space.task)
+    assert len(grid) == 5 * (1 + 8 + 16)
+    np.testing.assert_allclose(grid[0], [0, 0, -0.5], atol=1e-15)
+    np.testing.assert_allclose(np.hypot(grid[:, 0], grid[:, 1]).max(), 0.15)
+
+
+FAULTS = """robot: delta
+dimensions:
+  arm: {range: [0.4, 0.1], length: [rod_1_left.a]}
+  rod: {range: [0.3, 0.9], distance: [rod_7]}
+  hand: {range: [0.3, 0.9], length: [elbow.a]}
+  base: {value: 0.2, range: [0.1, 0.2], radius: [arm_1_joint]}
+requirements:
+  region: {box: {w: [0, 1]}}
+  motions: [nowhere.yaml]
+  stiffness: {arm_1_joint: 10}
+objectives: [size, stifness]
+"""
+
+
+def test_all_faults_of_a_file_are_told_with_their_lines(tmp_path: Path) -> None:
+    file = tmp_path / "design.yaml"
+    file.write_text(FAULTS)
+    with pytest.raises(InputError) as told:
+        load_design(file)
+    words = str(told.value)
+    for line, word in (
+        (3, "range 0.4 to 0.1 is empty"),
+        (4, "no rod 'rod_7'"),
+        (5, "no point 'elbow.a'"),
+        (6, "either a range or a value"),
+        (8, "no coordinate 'w'"),
+        (9, "nowhere.yaml"),
+        (10, "stiffness of arm_2_joint, arm_3_joint is missing"),
+    ):
+        assert f"line {line}" in words and word in words, (line, words)
+    misspelt = FAULTS.replace("hand: ", "length: ").replace("length: [elbow.a]", "lenth: [elbow.a]")
+    file.write_text(misspelt)
+    with pytest.raises(InputError, match=r"line 5: unknown key 'lenth' .did you mean length"):
+        load_design(file)
+    file.write_text(FAULTS.replace("robot: delta", "robot: deltoid"))
+    with pytest.raises(InputError, match=r"line 1: 'deltoid' is not a file or a robot .* delta,"):
+        load_design(file)
+
+
+OF_STEWART = """robot: stewart
+dimensions:
+  platform_radius:
+    range: [0.15, 0.25]
+    radius: [ball_1.a, ball_2.a, ball_3.a, ball_4.a, ball_5.a, ball_6.a]
+requirements:
+  region: {box: {z: [0.58, 0.62], rx: [-0.05, 0.05]}, points: 3}
+  min_conditioning: 0.02
+objectives: [conditioning]
+"""
+
+
+def test_the_winner_of_a_stewart_platform_is_certified(tmp_path: Path) -> None:
+    (tmp_path / "design.yaml").write_text(OF_STEWART)
+    found = load_design(tmp_path / "design.yaml")
+    result = design(found.space, found.requirements, found.objectives, candidates=40, population=20)
+    result.write(tmp_path)
+    built = ClosedLoopModel.load(tmp_path / f"{result.chosen(1)[0].name}.yaml").task
+    box = np.array([[0, 0, 0.58, -0.05, 0, 0], [0, 0, 0.62, 0.05, 0, 0]])
+    proven = certify(built, *box, undecided=0.0)
+    assert len(proven.places[0]) and not len(proven.places[1]) and not len(proven.places[2])

@@ -190,7 +190,7 @@ class Measuring:
         goal = np.broadcast_to(self.points, (count, *self.points.shape))
         q, reached = self._reached(start.q, goal, numbers)
         reached &= there[:, None]
-        K, side, conditioning = self._gains(q, numbers, reached)
+        K, side, conditioning = self._gains(q, numbers, reached, candidates.length)
         nq = task.mechanism.model.nq
         rooms = self._rooms(candidates, values, q[..., :nq], goal)
         rooms = np.where(reached[..., None], rooms, np.inf).min(axis=1)
@@ -225,8 +225,13 @@ class Measuring:
         found, ok = self.engines[0].continued(goal.reshape(count * points, -1), whole, each)
         return found.reshape(count, points, -1), ok.reshape(count, points).copy()
 
-    def _gains(self, q: Array, numbers: Array, reached: Bools) -> tuple[Array, Bools, Array]:
-        """Return K, NaN at type I, whether it is on home's side, and the conditioning."""
+    def _gains(
+        self, q: Array, numbers: Array, reached: Bools, length: Array
+    ) -> tuple[Array, Bools, Array]:
+        """Return K, NaN at type I, whether it is on home's side, and the conditioning.
+
+        Angles of the task count as arcs of the candidates' lengths (n,), in the task's unit.
+        """
         task, (count, points) = self.space.task, q.shape[:2]
         each = np.repeat(numbers, points, axis=0)
         T, *_, status = self.engines[0].generated(
@@ -235,6 +240,9 @@ class Measuring:
         K = T[:, task.mechanism.actuated_indices, :]
         good = (np.asarray(status) == 0) & reached.ravel()
         K = np.where(good[:, None, None], K, np.nan)
+        # Angles of the task as arcs of each candidate's own length.
+        arcs = np.repeat(task.characteristic_length / length, points)[:, None]
+        K = K * np.where(task.angular, arcs, 1.0)[:, None, :]
         measured = gains_of(task, K)
         side = measured.conditioning > 0
         if K.shape[-1] == K.shape[-2]:

@@ -47,6 +47,8 @@ class Candidates(NamedTuple):
     """Of all bodies, kg, shape (n,)."""
     size: Array
     """Sum of all lengths, m, shape (n,); see `DesignSpace`."""
+    length: Array
+    """Characteristic length, in which angles of the task count as arcs, m, shape (n,)."""
 
 
 class Space(Protocol):
@@ -235,7 +237,8 @@ class DesignSpace:
         size = np.sum([*lengths, *rods.values()], axis=0)
         for at in self._strokes():
             size = size + np.where(np.isfinite(upper[:, at]), upper[:, at], 0.0)
-        return Candidates(numbers, lower, upper, mass, size)
+        length = np.full(len(values), self.task.characteristic_length)
+        return Candidates(numbers, lower, upper, mass, size, length)
 
     def _strokes(self) -> list[int]:
         """Return where prismatic actuators are in q."""
