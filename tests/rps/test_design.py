@@ -57,7 +57,7 @@ def test_measures_are_those_of_the_robots_closed_forms(tmp_path: Path) -> None:
 
 def test_the_winner_is_certified(tmp_path: Path) -> None:
     asked = Requirements(REGION, min_conditioning=0.2, limit_margin=0.01)
-    found = design(space(), asked, "platform_radius", candidates=200, population=40)
+    found = design(space(), asked, "platform_radius", candidates=200, population=40, compiler="tcc")
     found.write(tmp_path)
     (one,) = found.chosen()
     robot = RPSRobot(RPSParameters.from_yaml(tmp_path / f"{one.name}.yaml"))

@@ -185,7 +185,7 @@ def test_numbers_are_those_of_the_robot_that_is_written(name: str, tmp_path: Pat
     requirements = Requirements(
         region, motions={"path": path}, samples=7, stiffness=stiffness, min_stiffness=1.0
     )
-    one = Measuring(space, requirements)
+    one = Measuring(space, requirements, "tcc")
     low, high = np.array([[d.lower, d.upper] for d in space.dimensions]).T
     values = np.random.default_rng(1).uniform(low, high, (3, low.size))
     found, q = one(values), one.middles(values)
@@ -320,7 +320,9 @@ def test_steps_and_dimensions_that_are_held() -> None:
             Dimension("base", 0.18, 0.18, radius=[f"arm_{leg}_joint" for leg in LEGS]),
         ],
     )
-    found = design(space, Requirements(CYLINDER), "rod", candidates=80, population=40)
+    found = design(
+        space, Requirements(CYLINDER), "rod", candidates=80, population=40, compiler="tcc"
+    )
     np.testing.assert_allclose(found.values[:, 0] / 0.05, np.round(found.values[:, 0] / 0.05))
     np.testing.assert_array_equal(found.values[:, 2], 0.18)
     assert len(found.front) == 1
@@ -341,7 +343,7 @@ def test_what_is_impossible_says_by_how_much() -> None:
 def test_two_requirements_that_contradict_each_other_are_named() -> None:
     """Small arms keep the limits' margin away from their ends, long ones the conditioning."""
     space = DesignSpace(task("delta"), [Dimension("rod", 0.55, 0.95, distance=RODS)])
-    one = Measuring(space, Requirements(CYLINDER))
+    one = Measuring(space, Requirements(CYLINDER), "tcc")
     measures = one(np.linspace(0.55, 0.95, 41)[:, None])
     good = np.isfinite(measures.conditioning) & (measures.unreached == 0)
     worst, room = measures.conditioning[good], measures.room[good]
@@ -349,7 +351,7 @@ def test_two_requirements_that_contradict_each_other_are_named() -> None:
     asked = Requirements(CYLINDER, float(worst.max() - 1e-3), float(room.max() - 1e-3))
     assert np.argmax(worst) != np.argmax(room)
     with pytest.raises(InputError, match="some meet limits and some conditioning, but none both"):
-        design(space, asked, "rod", candidates=200, population=40, seed=1)
+        design(space, asked, "rod", candidates=200, population=40, seed=1, compiler="tcc")
 
 
 def test_violations_fall_as_candidates_come_nearer() -> None:
