@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 import trimesh
 
 from rps_pin import ClosedLoopModel
-from rps_pin.task import Payload
+from rps_pin.task import Payload, certify
 from rps_pin.task.workspace import load_workspace, volume, workspace
 from tests.cli.commands import rps_pin
 
@@ -115,3 +116,48 @@ def test_a_3_rps_keeps_its_own_and_nothing_inside_is_an_error(tmp_path: Path) ->
     run = rps_pin(*FIVE_BAR, *most, "-o", str(tmp_path / "none"))
     assert "no point of the grid is inside the workspace" in run.stderr
     assert "singular" in run.stderr
+
+
+def test_certified_boxes_of_a_mechanism_and_of_a_3_rps(tmp_path: Path) -> None:
+    over = ("--over", "x=0.1:0.3:2", "--over", "z=0.2:0.6:2")
+    words = ("workspace", "-m", "five_bar", "--certify", *over, "--most-boxes", "2000", "--json")
+    run = rps_pin(*words, "-o", str(tmp_path / "one"))
+    assert run.returncode == 0, run.stderr
+    told = json.loads(run.stdout)
+    found = certify(
+        ClosedLoopModel.load("urdf/five_bar.yaml").task, (0.1, 0.2), (0.3, 0.6), most_boxes=2000
+    )
+    assert told["verdict"] == found.verdict
+    assert list(told["shares"].values()) == [v / sum(found.volumes) for v in found.volumes]
+    rows = list(csv.DictReader((tmp_path / "one" / "boxes.csv").read_text().splitlines()))
+    for verdict in ("inside", "outside", "undecided"):
+        boxes = [row for row in rows if row["verdict"] == verdict]
+        assert told["boxes"][verdict] == len(boxes) == len(getattr(found, verdict))
+    sizes = [
+        (float(r["x_most"]) - float(r["x_least"])) * (float(r["z_most"]) - float(r["z_least"]))
+        for r in rows
+    ]
+    assert math.isclose(sum(sizes), 0.2 * 0.4, rel_tol=1e-9)
+    tilts = ("--over", "rx=-6:6:2", "--over", "ry=-6:6:2", "--degrees")
+    run = rps_pin(
+        "workspace", "--certify", "--over", "z=0.22:0.23:2", *tilts, "-o", str(tmp_path / "rps")
+    )
+    assert run.returncode == 0, run.stderr
+    assert "-6 to 6 deg" in run.stdout
+    assert "the whole box" in run.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--certify", "--points", "5"), "does not go with --certify"),
+        (("--certify", "-m", "five_bar", "--holding"), "does not go with --certify"),
+        (("--certify", "--over", "z=0.2:0.3:2", "--over", "rx=0:0.1:2"), "--over of each"),
+        (("--undecided", "0.1"), "needs --certify"),
+        (("-m", "five_bar", "--most-boxes", "10"), "needs --certify"),
+    ],
+)
+def test_what_does_not_go_with_certified_boxes(words, told: str, tmp_path: Path) -> None:
+    run = rps_pin("workspace", *words, "-o", str(tmp_path / "out"), folder=tmp_path)
+    assert run.returncode in (1, 2)
+    assert told in " ".join(run.stderr.replace("│", " ").split())

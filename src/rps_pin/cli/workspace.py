@@ -10,6 +10,7 @@ import numpy as np
 import typer
 from rich.table import Table
 
+from rps_pin.cli import certified_boxes as boxes
 from rps_pin.cli import console as common
 from rps_pin.cli import motion_options as motions
 from rps_pin.cli import task_workspace as of_tasks
@@ -38,6 +39,10 @@ _FIGURES = (
     "workspace_surface",
     "workspace_outlines",
 )
+#: Options of a mechanism's workspace that say nothing of certified boxes.
+_NOT_CERTIFIED = tuple(
+    name for name in _OF_MECHANISMS if name not in ("over", "held", "ignore_limits", "accuracy")
+)
 
 
 def workspace_command(
@@ -59,6 +64,9 @@ def workspace_command(
     moment: of_tasks.MomentOption = None,
     speed: of_tasks.SpeedOption = None,
     turning_speed: of_tasks.TurningSpeedOption = None,
+    certify: boxes.CertifyOption = False,
+    undecided: boxes.UndecidedOption = 0.01,
+    most_boxes: boxes.MostBoxesOption = 100_000,
     ignore_limits: IgnoreLimitsOption = False,
     accuracy: AccuracyOption = None,
     output: common.FolderOption = Path("workspace"),
@@ -79,6 +87,9 @@ def workspace_command(
     coordinates the boundary as a mesh (**boundary.stl**). With a payload, wrenches or speeds also
     the points where an actuator's force or speed would be beyond its limit are out.
 
+    With **--certify**, which parts of the box that **--over** spans are proven to be inside, and
+    which outside, by intervals: **boxes.csv**. The numbers of points do not count.
+
     Exit status: 0 done; 1 an error; 2 wrong usage.
 
     Examples:
@@ -88,9 +99,32 @@ def workspace_command(
     - `rps-pin workspace -m delta --over x=-0.5:0.5:41 --over z=-0.8:-0.2:41 -o map`
 
     - `rps-pin workspace -m delta --over x=-0.5:0.5:41 --over z=-0.8:-0.2:41 --payload 2 --speed 3`
+
+    - `rps-pin workspace -m five_bar --certify --over x=0.1:0.3:2 --over z=0.4:0.7:2 -o proven`
     """
     if mechanism is not None:
         refuse(context, "it does not go with a mechanism", "robot", "points")
+    if certify:
+        refuse(context, "it does not go with --certify", "points", *_NOT_CERTIFIED)
+        if mechanism is None:
+            refuse(context, "this option needs a --mechanism", "ignore_limits", "accuracy")
+        boxes.certify_boxes(
+            robot,
+            mechanism,
+            over or (),
+            held or (),
+            degrees,
+            output,
+            overwrite,
+            as_json,
+            undecided=undecided,
+            most_boxes=most_boxes,
+            ignore_limits=ignore_limits,
+            accuracy=accuracy,
+        )
+        return
+    refuse(context, "this option needs --certify", "undecided", "most_boxes")
+    if mechanism is not None:
         load = motions.payload_of(payload, payload_centre, wrench)
         of_tasks.workspace_of_task(
             mechanism,

@@ -1,0 +1,148 @@
+"""Certified boxes on the command line: ``rps-pin workspace --certify``."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from rps_pin.cli import console as common
+from rps_pin.cli import mechanism_options as options
+from rps_pin.cli.outputs import check_outputs
+from rps_pin.cli.task_options import in_unit, unit_of
+from rps_pin.cli.task_workspace import _grid as grid_of
+from rps_pin.errors import InputError
+from rps_pin.files import write_text
+from rps_pin.numerics.boxes import CertifiedBoxes
+from rps_pin.rps.robot_file import kind_of_file
+from rps_pin.rps.workspace import certify as certify_rps
+from rps_pin.task import Task, certify
+
+CertifyOption = Annotated[
+    bool,
+    typer.Option(
+        "--certify",
+        help="Prove of the box that **--over** spans which parts are inside, and which outside.",
+    ),
+]
+UndecidedOption = Annotated[
+    float,
+    typer.Option(help="Undecided part of the volume inside at which **--certify** ends."),
+]
+MostBoxesOption = Annotated[
+    int, typer.Option(help="Undecided boxes at which **--certify** ends in any case.")
+]
+
+
+def certify_boxes(
+    robot: str,
+    mechanism: Path | None,
+    over: Sequence[str],
+    held: Sequence[str],
+    degrees: bool,
+    output: Path,
+    overwrite: bool,
+    as_json: bool,
+    *,
+    undecided: float,
+    most_boxes: int,
+    ignore_limits: bool = False,
+    accuracy: float | None = None,
+) -> None:
+    """Prove boxes, write and print them; see `rps_pin.cli.workspace`."""
+    inputs = []
+    prove: Any
+    if mechanism is None:
+        machine = common.load_robot(robot)
+        task, prove = machine.task, certify_rps
+        name, of = machine.parameters.name, machine
+    else:
+        model, file = options.load_mechanism(mechanism, ignore_limits, accuracy)
+        if kind_of_file(file) == "parameters":
+            raise InputError(f"{file} is a 3-RPS, which has boxes of its own: --robot {file}")
+        task, prove = model.task, certify
+        name, of = model.name, task
+        inputs = [file]
+    grid = grid_of(task, over, held, degrees)
+    if mechanism is None and len(grid.over) < task.size:
+        raise InputError("boxes of a 3-RPS are of z, rx and ry: give --over of each")
+    grid = grid.holding(task.home)
+    lower, upper = grid.at.copy(), grid.at.copy()
+    for column, axis in zip(grid.columns, grid.axes, strict=True):
+        lower[column], upper[column] = axis[0], axis[-1]
+    file = output / "boxes.csv"
+    check_outputs([file], overwrite, inputs=inputs)
+    output.mkdir(parents=True, exist_ok=True)
+    console = common.text_console(as_json)
+    with console.status("proving boxes"):
+        found = prove(of, lower, upper, undecided=undecided, most_boxes=most_boxes)
+        write_text(file, boxes_csv(found, task))
+    summary = _summary(found, task, name or "mechanism", degrees)
+    if as_json:
+        common.print_json(summary | {"files": [file]})
+        return
+    console.print(common.table_of(_rows(summary)))
+    common.print_files(console, [file])
+
+
+def boxes_csv(found: CertifiedBoxes, task: Task) -> str:
+    """Return the boxes as a table: what each is, and its least and largest coordinates, m or rad.
+
+    Of an undecided box, the last columns are the parts of it that are proven inside and outside.
+    """
+    text = io.StringIO()
+    ends = [f"{one}_{end}" for one in task.coordinates for end in ("least", "most")]
+    text.write(",".join(["verdict", *ends, "part_inside", "part_outside"]) + "\n")
+    whole = {"inside": (1.0, 0.0), "outside": (0.0, 1.0)}
+    for verdict in ("inside", "outside", "undecided"):
+        boxes = getattr(found, verdict)
+        numbers = np.moveaxis(boxes, 1, 2).reshape(len(boxes), 2 * task.size)
+        parts = found.parts if verdict == "undecided" else np.tile(whole[verdict], (len(boxes), 1))
+        for row in np.hstack([numbers, parts]).tolist():
+            text.write(",".join([verdict, *map(repr, row)]) + "\n")
+    return text.getvalue()
+
+
+def _summary(found: CertifiedBoxes, task: Task, name: str, degrees: bool) -> dict[str, Any]:
+    volumes = np.array(found.volumes)
+    free = found.upper > found.lower
+    ends = zip(task.coordinates, task.angular, found.lower, found.upper, strict=True)
+    return {
+        "mechanism": name,
+        "box": {
+            one: [in_unit(float(low), turns, degrees), in_unit(float(high), turns, degrees)]
+            for one, turns, low, high in ends
+        },
+        "units": {
+            one: unit_of(turns, degrees)
+            for one, turns in zip(task.coordinates, task.angular, strict=True)
+        },
+        "over": [one for one, here in zip(task.coordinates, free, strict=True) if here],
+        "verdict": found.verdict,
+        "shares": dict(
+            zip(
+                ("inside", "outside", "undecided"),
+                (volumes / volumes.sum()).tolist(),
+                strict=True,
+            )
+        ),
+        "boxes": {one: len(getattr(found, one)) for one in ("inside", "outside", "undecided")},
+    }
+
+
+def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    units = summary["units"]
+    ends = summary["box"].items()
+    counts = summary["boxes"]
+    return [
+        *((name, f"{low:.6g} to {high:.6g} {units[name]}") for name, (low, high) in ends),
+        ("the whole box", summary["verdict"]),
+        *(
+            (name, f"{100 * share:.4g} % of the volume, {counts[name]} boxes")
+            for name, share in summary["shares"].items()
+        ),
+    ]
