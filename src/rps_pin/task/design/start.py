@@ -19,6 +19,9 @@ from rps_pin.task.design.space import Space
 #: change.
 _WAYS = ((12, 1.0), (96, 1.0), (96, 0.5))
 
+#: Coordinates below this, m or rad, are 0 but for rounding.
+_ROUNDING = 1e-15
+
 
 class Started(NamedTuple):
     """Configurations at the middle of the region."""
@@ -51,6 +54,8 @@ def started(space: Space, engine: Any, values: Array, goal: Array) -> Started:
         found[left[better]] = q[better]
         best[left] = np.maximum(best[left], done)
         left = left[~whole]
+    # Continuations from quaternions with parts such as 1e-50 were seen to fail; from 0 they do not.
+    found[np.abs(found) < _ROUNDING] = 0.0
     return Started(found, best)
 
 
