@@ -88,6 +88,7 @@ LAYERS = [
         "bounds",
         "files",
         "interruption",
+        "locks",
         "config",
         "moved",
         "plain_text",

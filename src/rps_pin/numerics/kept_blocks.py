@@ -6,7 +6,6 @@ the computation: blocks of another one are refused. Only one process at a time h
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
+from rps_pin.locks import locked
 
 _NAME, _LOCK = "computation.txt", "lock"
 
@@ -51,7 +51,11 @@ class KeptBlocks:
         key = hashlib.sha256(
             json.dumps(description, sort_keys=True, default=_of_array).encode()
         ).hexdigest()
-        self._lock = self._locked()
+        self._lock = locked(
+            self.folder / _LOCK,
+            f"another process computes the blocks in {self.folder}; wait for it, or give another "
+            "file",
+        )
         try:
             self._refuse_others(key)
         except BaseException:
@@ -67,27 +71,6 @@ class KeptBlocks:
                 shutil.rmtree(self.folder)
         finally:
             os.close(self._lock)
-
-    def _locked(self) -> int:
-        """Return a file of the folder, locked until it is closed, also by the process's end."""
-        while True:
-            self.folder.mkdir(exist_ok=True)
-            path = self.folder / _LOCK
-            found = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
-            try:
-                fcntl.flock(found, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if path.exists() and os.path.samestat(path.stat(), os.fstat(found)):
-                    return found
-            except BlockingIOError:
-                os.close(found)
-                raise InputError(
-                    f"another process computes the blocks in {self.folder}; wait for it, or give "
-                    "another file"
-                ) from None
-            except BaseException:
-                os.close(found)
-                raise
-            os.close(found)  # removed meanwhile by the process that had it
 
     def _refuse_others(self, key: str) -> None:
         name = self.folder / _NAME

@@ -20,6 +20,7 @@ import h5py
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.interruption import interruptions_wait
+from rps_pin.locks import only_writer
 
 
 class LastingFile:
@@ -80,7 +81,8 @@ def workspace_file(
     Raises
     ------
     InputError
-        If the file exists and `overwrite` is false, or its folder does not.
+        If the file exists and `overwrite` is false, its folder does not, or another process is
+        writing it.
     OSError
         If the disk has no room for it, or a write fails.
     """
@@ -90,7 +92,7 @@ def workspace_file(
     if target.exists() and not overwrite:
         raise InputError(f"{target} exists; overwrite=True replaces it")
     try:
-        with whole_file(target) as scratch, new_hdf5_file(scratch) as opened:
+        with only_writer(target), whole_file(target) as scratch, new_hdf5_file(scratch) as opened:
             yield opened
     except OSError as error:
         code = error.errno or errno.EIO
