@@ -373,6 +373,12 @@ def test_assembly_modes_are_printed_and_each_can_be_a_home() -> None:
             mechanism.loop_gap([mode["home"][name] for name in list(mechanism.model.names)[1:]])
             < 1e-12
         )
+    run = rps_pin("assembly-modes", "four_bar", "--at", "crank_joint=1.2", "--all", "--json")
+    every = json.loads(run.stdout)
+    assert every["complex_count"] == every["paths"] == 2
+    assert [mode["certified"] for mode in every["modes"]] == [True, True]
+    run = rps_pin("assembly-modes", "four_bar", "--at", "crank_joint=1.2", "--all")
+    assert "2 found on 2 paths; 2 certified. Complex solutions: 2" in run.stdout
     run = rps_pin("assembly-modes", "four_bar", "--at", "crank=1.2")
     assert run.returncode == 1
     assert "crank_joint" in run.stderr

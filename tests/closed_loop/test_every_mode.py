@@ -8,10 +8,11 @@ from typing import Any
 
 import mpmath
 import numpy as np
+import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from rps_pin import ClosedLoopModel
+from rps_pin import ClosedLoopModel, LoopClosure, RPSRobot
 from rps_pin.closed_loop.assembly.every.study import (
     Legs,
     general_platform,
@@ -25,7 +26,7 @@ from rps_pin.errors import InputError
 from rps_pin.numerics.homotopy.krawczyk import disjoint, proven_zero
 from rps_pin.numerics.homotopy.tracking import Accuracy, tracked
 from rps_pin.numerics.intervals import Interval
-from tests.closed_loop.test_assembly_modes import dietmaier, four_bar
+from tests.closed_loop.test_assembly_modes import at, dietmaier, four_bar
 from tests.proofs.common import loaded
 from tests.worst import worst
 
@@ -206,6 +207,136 @@ def test_platforms_have_those_that_the_search_finds(name: str) -> None:
         assert worst(np.abs(mechanism.system.equations.gaps(q))) < 1e-10
 
 
+def on_legs(kinds: str, seed: int) -> ClosedLoopModel:
+    """A platform with a real pose on legs: rods (d), with balls on it (p), then at the base (b)."""
+    base, platform, length = random_legs(seed)
+    model = pin.Model()
+    body = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "platform")
+    model.addFrame(pin.Frame("top", body, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    closures = []
+    for k, kind in enumerate(kinds):
+        foot, corner = at(*base[k]), at(*platform[k])
+        if kind == "d":
+            points = {"placement_a": corner, "placement_b": foot}
+            rod = LoopClosure("top", "universe", "distance", f"{k}", distance=length[k], **points)
+            closures.append(rod)
+            continue
+        parent, place = (0, foot) if kind == "b" else (body, corner)
+        ball = model.addJoint(parent, pin.JointModelSpherical(), place, f"ball{k}")
+        model.addFrame(pin.Frame(f"tip{k}", ball, at(length[k]), pin.FrameType.OP_FRAME))
+        other = ("top", corner) if kind == "b" else ("universe", foot)
+        closures.append(LoopClosure(f"tip{k}", other[0], name=f"{k}", placement_b=other[1]))
+    for index in range(1, model.njoints):
+        model.appendBodyToJoint(index, pin.Inertia.Random(), pin.SE3.Identity())
+    return ClosedLoopModel(model, closures, [])
+
+
+def test_legs_of_all_kinds_lead_to_the_same_poses() -> None:
+    """The rods' spins about their lines are idle."""
+    places = []
+    for kinds in ("dddddd", "ddppbb"):
+        mechanism = on_legs(kinds, 7)
+        neutral = pin.neutral(mechanism.model)
+        found = mechanism.assembly_modes(q_guess=neutral, method="all", frames=["top"])
+        assert found.complex_count == 40
+        assert found.certified is not None
+        assert found.certified.all()
+        for q in found.q:
+            assert worst(np.abs(mechanism.system.equations.gaps(q))) < 1e-10
+        places.append(np.array([mechanism.frame_placement(q, "top") for q in found.q]))
+    assert len(places[0]) == len(places[1]) >= 2
+    apart = np.abs(places[0][:, None] - places[1]).max(axis=(2, 3))
+    assert worst(apart.min(axis=0)) < 1e-9
+
+
+def three_rpr(seed: int) -> tuple[ClosedLoopModel, Array]:
+    """A general planar 3-RPR: a platform at the end of leg 1, legs of given lengths."""
+    rng, model = np.random.default_rng(seed), pin.Model()
+    feet, corners = rng.normal(size=(2, 3, 2))
+    for k in range(3):
+        joint = model.addJoint(0, pin.JointModelRZ(), at(*feet[k]), f"foot{k}")
+        joint = model.addJoint(joint, pin.JointModelPX(), at(0.0), f"slide{k}")
+        if k == 0:
+            joint = model.addJoint(joint, pin.JointModelRZ(), at(0.0), "platform")
+            for i in (1, 2):
+                corner = at(*(corners[i] - corners[0]))
+                model.addFrame(pin.Frame(f"c{i}", joint, corner, pin.FrameType.OP_FRAME))
+        model.addFrame(pin.Frame(f"t{k}", joint, at(0.0), pin.FrameType.OP_FRAME))
+    angle, moved = rng.uniform(-np.pi, np.pi), rng.normal(size=2)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    lengths = np.linalg.norm(moved + corners @ turn.T - feet, axis=1)
+    closures = [LoopClosure(f"c{i}", f"t{i}") for i in (1, 2)]
+    return ClosedLoopModel(model, closures, ["slide0", "slide1", "slide2"]), lengths
+
+
+def test_planar_3_rpr_has_six_complex_ones() -> None:
+    """Its real ones with either sign of a slide's direction alike: legs' lengths are positive."""
+    counts = []
+    for seed in range(5):
+        mechanism, lengths = three_rpr(seed)
+        found = mechanism.assembly_modes(lengths, method="all")
+        searched = mechanism.assembly_modes(lengths)
+        assert (found.complex_count, found.paths) == (6, 6)
+        assert found.certified is not None
+        assert found.certified.all()
+        assert len(found.q) == len(searched.q) in (2, 4, 6)
+        apart = np.abs(wrapped_apart(found.q, searched.q)).max(axis=2)
+        assert worst(apart.min(axis=0)) < 1e-7
+        for q in found.q:
+            assert worst(np.abs(mechanism.system.equations.gaps(q))) < 1e-11
+        counts.append(len(found.q))
+    assert len(set(counts)) > 1
+
+
+def wrapped_apart(one: Array, other: Array) -> Array:
+    return np.asarray((one[:, None] - other + np.pi) % (2 * np.pi) - np.pi)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [("four_bar", 2), ("five_bar", 2), ("slider_crank", 2), ("planar_rrr", 6)]
+)
+def test_planar_mechanisms_have_their_known_counts(name: str, count: int) -> None:
+    mechanism, rng = loaded(name), np.random.default_rng(5)
+    system = mechanism.system
+    home = mechanism.home[system.coordinates_of(system.actuated)]
+    for _ in range(3):
+        values = home + 0.2 * rng.uniform(-1, 1, home.size)
+        found = mechanism.assembly_modes(values, method="all", within_limits=False)
+        searched = mechanism.assembly_modes(values, within_limits=False)
+        assert found.complex_count == found.paths == count
+        assert f"{count} is the Bezout number" in found.known
+        assert found.certified is not None
+        assert found.certified.all()
+        assert len(found.q) == len(searched.q)
+        assert worst(np.abs(wrapped_apart(found.q, searched.q)).max(axis=2).min(axis=0)) < 1e-9
+
+
+def test_rps_has_sixteen_complex_ones_and_the_real_ones_of_its_closed_form() -> None:
+    robot, mechanism = RPSRobot.from_preset("sokolov"), loaded("rps")
+    rng = np.random.default_rng(6)
+    for _ in range(5):
+        lengths = rng.uniform(0.4, 0.5, 3)
+        found = mechanism.assembly_modes(lengths, method="all", within_limits=False)
+        assert (found.complex_count, found.singular) == (16, 0)
+        assert found.certified is not None
+        assert found.certified.all()
+        exact = robot.assembly_modes(lengths)
+        places = np.array([mechanism.frame_placement(q, "platform")[:3, 3] for q in found.q])
+        apart = np.linalg.norm(places[:, None] - exact.position, axis=2)
+        assert len(found.q) == len(exact.angle)
+        assert worst(np.concatenate([apart.min(axis=0), apart.min(axis=1)])) < 1e-9
+
+
+def test_two_of_a_delta_are_level_where_three_spheres_meet() -> None:
+    mechanism = loaded("delta")
+    found = mechanism.assembly_modes(method="all", within_limits=False)
+    places = [mechanism.frame_placement(q, "platform") for q in found.q]
+    level = [one for one in places if np.abs(one[:3, :3] - np.eye(3)).max() < 1e-9]
+    assert len(level) == 2
+    # By symmetry, at home, both are on the vertical line.
+    assert worst(np.abs([one[:2, 3] for one in level])) < 1e-9
+
+
 def test_modes_outside_limits_are_counted() -> None:
     mechanism = loaded("stewart")
     everywhere = mechanism.assembly_modes(method="all", within_limits=False)
@@ -216,7 +347,7 @@ def test_modes_outside_limits_are_counted() -> None:
 
 
 def test_generated_code_has_the_same() -> None:
-    mechanism = dietmaier()
+    mechanism = loaded("four_bar")
     found = mechanism.compile().assembly_modes(method="all")
     np.testing.assert_array_equal(found.q, mechanism.assembly_modes(method="all").q)
 

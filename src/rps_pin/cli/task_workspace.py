@@ -71,6 +71,28 @@ TurningSpeedOption = Annotated[
 HoldingOption = Annotated[
     bool, typer.Option("--holding", help="Compute the actuators' forces at rest, too.")
 ]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="Processes that compute blocks of a mechanism's grid, which goes to the file as it is "
+        "computed. Grids of more than two million points do so in any case, by default with a "
+        "thread for each core.",
+    ),
+]
+ResumeOption = Annotated[
+    bool,
+    typer.Option(
+        "--resume",
+        help="Keep the blocks that are computed in the output folder until all are, so that the "
+        "same command goes on after Ctrl-C or a full disk.",
+    ),
+]
+
+#: Points from which a grid goes to the file block by block.
+_LARGE = 2_000_000
+#: Points of a large grid, evenly spaced, of which volume, boundary and figures are made.
+_DRAWN = 1_000_000
 
 
 def workspace_of_task(
@@ -87,6 +109,8 @@ def workspace_of_task(
     ignore_limits: bool = False,
     accuracy: float | None = None,
     turning_speed: float | None = None,
+    workers: int | None = None,
+    resume: bool = False,
     **demands: Any,
 ) -> None:
     """Compute, write and print a workspace; see `rps_pin.cli.workspace`."""
@@ -106,26 +130,64 @@ def workspace_of_task(
     check_outputs([*files, *figures_in(output, drawn)], overwrite, inputs=[file])
     output.mkdir(parents=True, exist_ok=True)
     console = common.text_console(as_json)
-    found = space.workspace(
-        _compiled(task),
-        grid,
-        min_conditioning=min_conditioning,
-        holding=holding,
-        **demands,
-        progress=common.progress_bar(console, "following the assembly mode"),
-    )
-    if not found.inside.any():
-        out = {name: count for name, count in found.counts().items() if count}
-        told = ", ".join(f"{count}: {name}" for name, count in out.items())
-        raise InputError(f"no point of the grid is inside the workspace ({told})")
-    summary = _summary(found, degrees)
+    description = file.read_text("utf-8", "replace")
+    demands |= {"min_conditioning": min_conditioning, "holding": holding}
+    demands["progress"] = common.progress_bar(console, "following the assembly mode")
+    if resume or workers is not None or grid.size > _LARGE:
+        demands |= {"workers": workers, "resume": resume, "description": description}
+        found, summary = _to_file(task, grid, files[0], degrees, demands)
+    else:
+        found = space.workspace(_compiled(task), grid, **demands)
+        _refuse_none_inside(found.counts())
+        space.save_workspace(found, files[0], description=description, overwrite=True)
+        summary = _summary(found, degrees)
     with console.status("writing the results"):
-        files += _write(found, files, drawn, output, file.read_text("utf-8", "replace"))
+        files += _write(found, files, drawn, output)
     if as_json:
         common.print_json(summary | {"files": files})
         return
     console.print(common.table_of(_rows(summary)))
     common.print_files(console, files)
+
+
+def _refuse_none_inside(counts: dict[str, int]) -> None:
+    if not counts["inside"]:
+        told = ", ".join(f"{count}: {name}" for name, count in counts.items() if count)
+        raise InputError(f"no point of the grid is inside the workspace ({told})")
+
+
+def _to_file(
+    task: Task, grid: TaskGrid, path: Path, degrees: bool, given: dict[str, Any]
+) -> tuple[space.TaskWorkspace, dict[str, Any]]:
+    """Compute a workspace block by block; return what is drawn of it, and the summary."""
+    counts = space.workspace_to_file(_compiled(task), path, grid, overwrite=True, **given)
+    _refuse_none_inside(counts.counts)
+    every = math.ceil((grid.size / _DRAWN) ** (1 / len(grid.over)))
+    found = space.load_workspace(path, [slice(None, None, every)] * len(grid.over))
+    if not found.inside.any():
+        raise InputError(
+            f"{counts.inside} points are inside, but none of one in {every} along each axis, which "
+            f"volume and figures are made of: give a narrower grid; {path} has all points"
+        )
+    return found, _summary(found, degrees) | _of_counts(counts, found, degrees, every)
+
+
+def _of_counts(
+    counts: space.TaskCounts, found: space.TaskWorkspace, degrees: bool, every: int
+) -> dict[str, Any]:
+    """Return the part of the summary that is of all points of a large grid."""
+    grid = found.grid
+    angular = dict(zip(grid.coordinates, grid.angular, strict=True))
+    return {
+        "points": counts.points,
+        "inside": counts.inside,
+        "extents": {
+            name: [in_unit(value, angular[name], degrees) for value in ends]
+            for name, ends in counts.extents.items()
+        },
+        "out": {as_asked(n): k for n, k in counts.counts.items() if k and n != "inside"},
+        "drawn_every": every,
+    }
 
 
 def _grid(task: Task, over: Sequence[str], held: Sequence[str], degrees: bool) -> TaskGrid:
@@ -221,13 +283,12 @@ def _fits(found: space.TaskWorkspace) -> bool:
 
 
 def _write(
-    found: space.TaskWorkspace, files: Sequence[Path], drawn: str, folder: Path, description: str
+    found: space.TaskWorkspace, files: Sequence[Path], drawn: str, folder: Path
 ) -> list[Path]:
-    """Write the results; return the files of the figure."""
+    """Write boundary and figure; return the files of the figure."""
     # Slow to import: only for commands that draw.
     from rps_pin import plots
 
-    space.save_workspace(found, files[0], description=description, overwrite=True)
     if len(files) > 1:
         space.save_mesh(space.boundary(found), files[1], overwrite=True)
     if drawn == "slices":
@@ -254,6 +315,13 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
             f"(cells wholly inside: {low:.5g}, partly: {high:.5g})",
         ),
     ]
+    if summary.get("drawn_every", 1) > 1:
+        rows.append(
+            (
+                "volume and figures",
+                f"of one point in {summary['drawn_every']} along each axis; the file has all",
+            )
+        )
     if summary["cut"]:
         rows.append(("ends of the grid", f"reached at {', '.join(summary['cut'])}: it may go on"))
     rows.append(("least conditioning inside", f"{summary['least_conditioning']:.4g}"))

@@ -30,7 +30,7 @@ _DRAWN_POINTS = 18
 _OF_MECHANISMS = (
     *("over", "held", "min_conditioning", "holding", "ignore_limits", "accuracy"),
     *("payload", "payload_centre", "wrench", "force", "moment"),
-    *("speed", "turning_speed"),
+    *("speed", "turning_speed", "workers", "resume"),
 )
 _FIGURES = (
     "assembly_modes",
@@ -57,6 +57,8 @@ def workspace_command(
     held: of_tasks.HeldOption = None,
     min_conditioning: of_tasks.MinConditioningOption = MIN_CONDITIONING,
     holding: of_tasks.HoldingOption = False,
+    workers: of_tasks.WorkersOption = None,
+    resume: of_tasks.ResumeOption = False,
     payload: motions.PayloadOption = None,
     payload_centre: motions.PayloadCentreOption = (0.0, 0.0, 0.0),
     wrench: motions.WrenchOption = None,
@@ -144,6 +146,8 @@ def workspace_command(
             moment=moment,
             speed=speed,
             turning_speed=turning_speed,
+            workers=workers,
+            resume=resume,
         )
         return
     refuse(context, "this option needs a --mechanism", *_OF_MECHANISMS)

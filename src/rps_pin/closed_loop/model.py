@@ -906,10 +906,11 @@ class ClosedLoopModel:
         rule. That is no proof that there are no others.
 
         By ``"all"``, all solutions of the closures over the complex numbers are followed from those
-        of a general mechanism of the kind. The result says how many there are, how that is known,
-        and of which of the real ones it is proven that they exist; see `every`. Of legs that are
-        closed in several ways for one pose of the platform, one way is returned: the nearest to
-        the guess. Other mechanisms are searched, and `known` says so.
+        of a general system of the kind: of platforms on six legs, of platforms on three legs with
+        one hinge each, and of planar mechanisms of hinges and slides. The result says how many
+        there are, how that is known, and of which of the real ones it is proven that they exist;
+        see `every`. Of legs that are closed in several ways for one pose of the platform, one way
+        is returned, near the guess. Other mechanisms are searched, and `known` says so.
 
         Parameters
         ----------
@@ -930,7 +931,7 @@ class ClosedLoopModel:
         seed
             Of the random numbers: the same starts each time.
         starts, seconds
-            Most random starts, and the longest time, s.
+            Most random starts, and the longest time, s, of a search.
         within_limits
             Whether the modes must lie within the joint limits; the starts do then.
         progress

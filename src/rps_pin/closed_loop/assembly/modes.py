@@ -107,9 +107,13 @@ def assembly_modes(
     told = ""
     if method == "all":
         try:
-            return every_mode(system, about, held, same, within_limits)
+            found = every_mode(system, about, held, same, within_limits)
         except NoFormulationError as refusal:
             told = f"searched, not solved as polynomials, since {refusal}"
+        else:
+            if progress is not None:
+                progress(1.0)
+            return found
     search = _Search(system, about, held, equations, same, within_limits)
     stopped = search.run(np.random.default_rng(seed), starts, longest, probability, progress)
     return search.found(stopped)._replace(known=told)

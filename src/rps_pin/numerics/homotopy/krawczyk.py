@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools
 from rps_pin.numerics.intervals import Interval
 
 #: Values (n,) and derivatives (n, n) of a system over a box (n,).
@@ -91,3 +91,13 @@ def _product(matrix: Array, other: Interval) -> Interval:
 def disjoint(one: Interval, other: Interval) -> bool:
     """Return whether two boxes have no point in common."""
     return bool(((one.upper < other.lower) | (other.upper < one.lower)).any())
+
+
+def all_distinct(boxes: list[Interval | None]) -> Bools:
+    """Return which boxes there are that have no point in common with any other one."""
+    found = np.array([box is not None for box in boxes], dtype=bool)
+    for i, one in enumerate(boxes):
+        for j, other in enumerate(boxes[:i]):
+            if one is not None and other is not None and not disjoint(one, other):
+                found[i] = found[j] = False
+    return found

@@ -14,16 +14,23 @@ from rps_pin.closed_loop.assembly.closing import close, close_gaps, is_closed
 from rps_pin.closed_loop.assembly.completion import beyond_limits
 from rps_pin.closed_loop.assembly.every.conditions import conditions, values_at
 from rps_pin.closed_loop.assembly.every.found_modes import FoundModes
+from rps_pin.closed_loop.assembly.every.planar_modes import planar_solutions
 from rps_pin.closed_loop.assembly.every.six_leg_modes import six_leg_solutions
-from rps_pin.closed_loop.assembly.every.solutions import Solutions
+from rps_pin.closed_loop.assembly.every.solutions import NoFormulationError, Solutions
+from rps_pin.closed_loop.assembly.every.three_tips import three_tip_solutions
 from rps_pin.closed_loop.assembly.sameness import Sameness
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
 from rps_pin.errors import ClosureError
 
+_FORMULATIONS = {
+    "platform on six legs": six_leg_solutions,
+    "platform on three tips": three_tip_solutions,
+    "planar mechanism": planar_solutions,
+}
 #: Modes whose places differ by less are one.
 _SAME = 1e-7
 #: Of closing legs within their limits.
-_RESTARTS = 3
+_RESTARTS = 1
 
 
 def every_mode(
@@ -44,7 +51,7 @@ def every_mode(
     within_limits
         Whether the modes must lie within the joint limits.
     """
-    solutions = six_leg_solutions(system, held, about)
+    solutions = _solutions(system, held, about)
     modes: list[Array] = []
     places: list[Array] = []
     certified: list[bool] = []
@@ -81,27 +88,34 @@ def every_mode(
     )
 
 
+def _solutions(system: ConstraintSystem, held: Bools, about: Array) -> Solutions:
+    """Return those of the first formulation that the mechanism is of."""
+    refusals = []
+    for kind, formulation in _FORMULATIONS.items():
+        try:
+            return formulation(system, held, about)
+        except NoFormulationError as refusal:
+            refusals.append(f"it is no {kind} ({refusal})")
+    raise NoFormulationError(" and ".join(refusals))
+
+
 def _closed(
     system: ConstraintSystem, guess: Array, held: Bools, solutions: Solutions, within_limits: bool
 ) -> Array:
     """Return the closed configuration of a solution; within the limits if there is one."""
     fixed = held | solutions.solved
-    if within_limits:
-        try:
-            names = [
-                name for name in list(system.model.names)[1:] if fixed[_own(system, name)].all()
-            ]
-            q = close(system, guess, fixed=names, restarts=_RESTARTS)
-        except ClosureError:
-            pass
-        else:
-            return close_gaps(system, q, held, False)
-    q = close_gaps(system, guess, fixed, False)
-    q = close_gaps(system, q, held, False)
+    q = close_gaps(system, close_gaps(system, guess, fixed, False), held, False)
     if not is_closed(system, q):
         gap = system.equations.largest_gap(system.equations.gaps(q))
         raise ClosureError("the links of a pose that was found do not close", gap)
-    return q
+    if not within_limits or fixed.all() or not beyond_limits(system, q).any():
+        return q
+    joints = list(system.model.names)[1:]
+    names = [name for name in joints if fixed[_own(system, name)].all()]
+    try:  # legs may close within the limits too
+        return close_gaps(system, close(system, q, fixed=names, restarts=_RESTARTS), held, False)
+    except ClosureError:
+        return q
 
 
 def _own(system: ConstraintSystem, name: str) -> slice:

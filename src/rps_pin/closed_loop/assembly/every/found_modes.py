@@ -70,5 +70,6 @@ class FoundModes(NamedTuple):
         told = f"{self.known}; " if self.known else ""
         return (
             f"{told}{self.hits.size} found in {self.starts} random starts, of which {self.closed} "
-            f"closed{rarest}{left_out}. Expected in all: {self.expected:.4g}; {ended}"
+            f"closed{rarest}{left_out}. Expected in all: {self.expected:.4g}, probability that all "
+            f"are found: {self.probability:.3g}; {ended}"
         )

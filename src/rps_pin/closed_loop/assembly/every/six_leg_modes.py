@@ -18,7 +18,7 @@ from rps_pin.closed_loop.assembly.every.study import (
     real_ones,
 )
 from rps_pin.closed_loop.constraints.system import ConstraintSystem
-from rps_pin.numerics.homotopy.krawczyk import disjoint
+from rps_pin.numerics.homotopy.krawczyk import all_distinct
 from rps_pin.numerics.intervals import Interval
 
 
@@ -43,14 +43,14 @@ def six_leg_solutions(system: ConstraintSystem, held: Bools, about: Array) -> So
     exact = Legs(Interval(base), Interval(platform), Interval(length).square())
     boxes = proven(exact, x, np.random.default_rng(0))
     regular = len(poses)
-    guesses = np.array([_with_pose(system, found, about, one, centre, unit) for one in x])
-    joint = system.model.joints[found.joint]
+    guesses = np.array([_with_pose(found, about, one, centre, unit) for one in x])
+    joint = system.model.joints[found.chains.platform]
     solved = np.zeros(system.model.nv, dtype=bool)
     solved[joint.idx_v : joint.idx_v + joint.nv] = True
     return Solutions(
         guesses.reshape(len(x), system.model.nq),
         solved,
-        _distinct(boxes),
+        all_distinct(boxes),
         regular,
         GENERAL,
         GENERAL - regular,
@@ -73,28 +73,10 @@ def _unit(found: SixLegs) -> float:
     return 2.0 ** round(math.log2(size))
 
 
-def _with_pose(
-    system: ConstraintSystem, found: SixLegs, about: Array, x: Array, centre: Array, unit: float
-) -> Array:
+def _with_pose(found: SixLegs, about: Array, x: Array, centre: Array, unit: float) -> Array:
     """Return the configuration with the platform at Study coordinates, shape (nq,)."""
     e, f = x[:4], x[4:]
     # p = 2 vec(f e*) / e.e
     p = 2 * (e[3] * f[:3] - f[3] * e[:3] + np.cross(e[:3], f[:3])) / (e @ e)
     turn = pin.Quaternion(e / np.linalg.norm(e)).toRotationMatrix()
-    model, data = system.model, system.data
-    pin.forwardKinematics(model, data, about)
-    below = data.oMi[model.parents[found.joint]] * model.jointPlacements[found.joint]
-    place = below.actInv(pin.SE3(turn, centre + unit * p))
-    q, joint = about.copy(), model.joints[found.joint]
-    q[joint.idx_q : joint.idx_q + joint.nq] = pin.SE3ToXYZQUAT(place)
-    return q
-
-
-def _distinct(boxes: list[Interval | None]) -> Bools:
-    """Return which boxes there are that have no point in common with any other one."""
-    found = np.array([box is not None for box in boxes], dtype=bool)
-    for i, one in enumerate(boxes):
-        for j, other in enumerate(boxes[:i]):
-            if one is not None and other is not None and not disjoint(one, other):
-                found[i] = found[j] = False
-    return found
+    return found.chains.placed(about, turn, centre + unit * p)

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array, Bools, ComplexArray
-from rps_pin.numerics.homotopy.krawczyk import proven_zero
+from rps_pin.numerics.homotopy.quadrics import proven_solutions
 from rps_pin.numerics.homotopy.tracking import tracked
 from rps_pin.numerics.intervals import Interval
 
@@ -275,30 +275,8 @@ def proven(legs: Legs, x: Array, rng: np.random.Generator) -> list[Interval | No
     charts = rng.normal(size=(_CHARTS, 8))
     size = np.abs(x @ charts.T) / np.linalg.norm(x, axis=1)[:, None]
     chart = charts[int(np.argmax((size / np.linalg.norm(charts, axis=1)).min(axis=0, initial=1.0)))]
-    forms = quadrics(legs)
-
-    def system(box: Interval) -> tuple[Interval, Interval]:
-        by_x = Interval(np.zeros((6, 8)))
-        for k in range(8):
-            by_x = by_x + 2 * forms[:, :, k] * box[k]
-        study = Interval(np.zeros(8))
-        for k in range(8):
-            study = study + 2 * _STUDY[k] * box[k]
-        rows = [*(by_x[i] for i in range(6)), study]
-        values = [_dot(row, box) * 0.5 for row in rows]
-        values.append(_dot(Interval(chart), box) - 1.0)
-        slopes = [*rows, Interval(chart)]
-        return _stacked(values), _stacked(slopes)
-
-    return [proven_zero(system, one / (chart @ one)) for one in x]
-
-
-def _dot(one: Interval, other: Interval) -> Interval:
-    total = Interval(np.zeros(()))
-    for k in range(8):
-        total = total + one[k] * other[k]
-    return total
-
-
-def _stacked(parts: list[Interval]) -> Interval:
-    return Interval(np.array([p.lower for p in parts]), np.array([p.upper for p in parts]))
+    legs_forms = quadrics(legs)
+    forms = Interval(
+        *(np.concatenate([end, _STUDY[None]]) for end in (legs_forms.lower, legs_forms.upper))
+    )
+    return proven_solutions(forms, chart, x)
