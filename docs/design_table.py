@@ -75,22 +75,46 @@ def proven_rps(found: DesignResult, row: int) -> str:
     return "the whole region" if beyond(boxes, [1, 2], 0.1) else _shares(boxes)
 
 
+def proven(found: DesignResult, row: int, low: list[float], high: list[float]) -> CertifiedBoxes:
+    """Prove a box of coordinates of a robot of the front."""
+    values = found.values[found.front[[row]]]
+    q = found.measuring.middles(values)[0]
+    robot = found.measuring.space.robot(values[0], q)  # type: ignore[attr-defined]
+    return certify(robot.task, low, high, undecided=0.01, most_boxes=20_000)
+
+
 def proven_stewart(found: DesignResult, row: int) -> str:
     """Prove the cube of positions with tilts of 0.15 rad about x and y, of a Stewart platform."""
-    robot = found.measuring.space.robot(  # type: ignore[attr-defined]
-        found.values[found.front[row]], found.measuring.middles(found.values[found.front[[row]]])[0]
-    )
     low, high = [-0.06, -0.06, 0.54, -0.15, -0.15, 0.0], [0.06, 0.06, 0.66, 0.15, 0.15, 0.0]
-    return _shares(certify(robot.task, low, high, undecided=0.01, most_boxes=20_000))
+    return _shares(proven(found, row, low, high))
+
+
+def proven_delta(found: DesignResult, row: int) -> str:
+    """Prove the cylinder of a Delta: what is not inside of its box is beyond its radius."""
+    boxes = proven(found, row, [-0.15, -0.15, -0.55], [0.15, 0.15, -0.45])
+    return "the whole region" if beyond(boxes, [0, 1], 0.15) else _shares(boxes)
+
+
+def proven_ankle(found: DesignResult, row: int) -> str:
+    """Prove the range of an ankle."""
+    boxes = proven(found, row, [-0.5, -0.25], [0.4, 0.25])
+    return "the whole region" if not len(boxes.outside) + len(boxes.undecided) else _shares(boxes)
 
 
 def _shares(boxes: CertifiedBoxes) -> str:
-    inside, _, undecided = boxes.volumes
+    inside, outside, undecided = boxes.volumes
     whole = sum(boxes.volumes)
+    if outside == undecided == 0:
+        return "the whole box"
     return f"{inside / whole:.2%} of a box inside, {undecided / whole:.2%} undecided"
 
 
-PROOFS = {"3-RPS": proven_rps, "Stewart": proven_stewart}
+PROOFS = {
+    "3-RPS": proven_rps,
+    "Stewart": proven_stewart,
+    "Delta": proven_delta,
+    "ankle": proven_ankle,
+}
 
 
 def row(name: str) -> str:
@@ -110,7 +134,7 @@ def row(name: str) -> str:
     compared = compare(name, described, found)
     between = next(one for one in found.chosen() if one.name == "between")
     binds = {found.binding(k).requirement for k in range(len(found.front))}
-    proof = PROOFS[name](found, between.row) if name in PROOFS else "-"
+    proof = PROOFS[name](found, between.row)
     bests = " | ".join(
         f"{one.name}: {a:.4g}, grid {b:.4g}"
         for one, a, b in zip(found.objectives, compared.best, compared.grid_best, strict=True)
