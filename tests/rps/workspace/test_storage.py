@@ -267,10 +267,11 @@ def test_a_process_that_is_ended_takes_its_workers_with_it(
             process.kill()
     wait_for_end(workers)
     if number == signal.SIGKILL:  # nobody could clear up: the next one who writes there does
-        (left,) = tmp_path.iterdir()
+        left, lock = sorted(tmp_path.iterdir(), key=lambda one: one.suffix)
         assert left.name.startswith(".space.rps_pin-")
-        save_workspace(space, tmp_path / "other.h5")
-        assert [entry.name for entry in tmp_path.iterdir()] == ["other.h5"]
+        assert lock.name == ".space.h5.lock"
+        save_workspace(space, tmp_path / "space.h5")
+        assert [entry.name for entry in tmp_path.iterdir()] == ["space.h5"]
     else:
         assert process.returncode == 128 + number, errors
         assert errors == ""
