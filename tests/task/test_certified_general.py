@@ -142,7 +142,7 @@ def test_the_general_way_agrees_with_the_closed_form() -> None:
     good = certify_general(one, home - half, home + half, most_boxes=100, **options)
     assert good.verdict == "inside"
     held = np.array([0.3, 0.0, 0.25, 0.0, 0.0, 0.0])
-    wide = certify_general(one, home - held, home + held, most_boxes=30, **options)
+    wide = certify_general(one, home - held, home + held, most_boxes=100, **options)
     assert wide.volumes[0] > 0
     assert wide.volumes[1] > 0
     assert six_ups.inside(drawn(wide.inside, 50_000)).all()
