@@ -1,8 +1,8 @@
 """Dimensions of a robot that may vary, and what each of them moves.
 
-===========  ============  ======================================================================
+============ ============  =====================================================================
 kind         of            what a value does
-===========  ============  ======================================================================
+============ ============  =====================================================================
 ``length``   points        puts the origin at this distance from that of its link, in its direction
 ``radius``   points        puts it at this distance from the link's axis, in its direction
 ``height``   points        puts it at this coordinate along the link's axis
@@ -12,7 +12,7 @@ kind         of            what a value does
 ``stroke``   joints        makes it the way from the lower limit to the upper one
 ``lower``    joints        makes it the lower limit; ``upper`` the upper one
 ``scale``                  multiplies all lengths of the mechanism, and limits of lengths
-===========  ============  ======================================================================
+============ ============  =====================================================================
 
 Points that are given together, as a list within the list, move as one: their middle is moved, and
 they keep their places about it. A link's axis is its z axis unless another is given; it goes

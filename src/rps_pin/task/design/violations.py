@@ -1,8 +1,8 @@
 """By how much candidates fail requirements, each in a unit of its own; and how near they come.
 
-===============  ==========================================================================
+================ ==========================================================================
 requirement      a candidate fails it by
-===============  ==========================================================================
+================ ==========================================================================
 ``reach``        the share of the region's points that it does not reach, and more where the
                  way to the region's middle is not possible
 ``singularity``  the share of the points reached that are singular or beyond a singularity
@@ -12,7 +12,7 @@ requirement      a candidate fails it by
 ``force``        the largest force's excess over its limit, as a share of the limit
 ``speed``        the same of the speeds
 ``stiffness``    the share of the least stiffness that is missing
-===============  ==========================================================================
+================ ==========================================================================
 
 A requirement that could not be measured, as nothing was reached, is failed by 1.
 """
