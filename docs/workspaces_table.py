@@ -1,7 +1,7 @@
-"""Write two tables of docs/workspaces.md: .venv/bin/python docs/workspaces_table.py [--huge].
+"""Write tables of docs/workspaces.md: .venv/bin/python docs/workspaces_table.py [--huge].
 
-Speed in memory, and grids of 10^4 to 10^7 points to a file by two threads; `--huge` adds 10^8, which
-takes minutes.
+Speed in memory, and grids of 10^4 to 10^7 points to a file by two threads; `--huge` adds 10^8,
+which takes minutes.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ def placements(x: Complex) -> tuple[Complex, Complex]:
     return np.array(columns).T, 2 * product(f, back)[:3] / size
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
 def test_a_general_platform_has_forty_complex_poses(seed: int) -> None:
     """All different, of the lengths asked for by R and p alone, and real ones in pairs."""
     base, platform, length = random_legs(seed)
@@ -183,7 +183,7 @@ def test_what_is_no_pose_is_not_proven() -> None:
             assert cosines.max() > 1 - 1e-12, x
 
 
-@pytest.mark.parametrize("name", ["stewart", "linear_delta"])
+@pytest.mark.parametrize("name", ["stewart", pytest.param("linear_delta", marks=pytest.mark.slow)])
 def test_platforms_have_those_that_the_search_finds(name: str) -> None:
     """The search finds 14 of 16 of the linear Delta, and says that it has settled."""
     mechanism = loaded(name)

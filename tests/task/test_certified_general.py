@@ -134,6 +134,7 @@ def test_slopes_hold_those_of_the_task() -> None:
         assert worst(K - one.jacobian(q, x=x)) < 1e-8
 
 
+@pytest.mark.slow
 def test_the_general_way_agrees_with_the_closed_form() -> None:
     one = six_ups.TASK
     half = np.array([0.02, 0.02, 0.02, 0.04, 0.04, 0.04])

@@ -88,6 +88,7 @@ def test_measures_are_those_of_the_closed_form() -> None:
     assert 60 < met < 240
 
 
+@pytest.mark.slow
 def test_the_smallest_delta_is_that_of_a_fine_grid() -> None:
     """Arm and rod of the least sum whose workspace holds a cylinder, and the front."""
     result = design(
@@ -174,7 +175,10 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name != "five_bar" else ()) for name in CASES],
+)
 def test_numbers_are_those_of_the_robot_that_is_written(name: str, tmp_path: Path) -> None:
     """Conditioning, strokes, limits, forces, stiffness, mass: by the Pinocchio engine, to 1e-9."""
     make, region = CASES[name]
@@ -266,7 +270,8 @@ def test_the_same_seed_gives_the_same_front() -> None:
 
 
 def test_two_processes_give_the_same_front() -> None:
-    assert_same(run(), run(workers=2))
+    small = {"candidates": 80, "compiler": "tcc"}
+    assert_same(run(**small), run(workers=2, **small))
 
 
 def test_an_interrupted_run_goes_on(tmp_path: Path) -> None:
@@ -449,6 +454,7 @@ objectives: [conditioning]
 """
 
 
+@pytest.mark.slow
 def test_the_winner_of_a_stewart_platform_is_certified(tmp_path: Path) -> None:
     (tmp_path / "design.yaml").write_text(OF_STEWART)
     found = load_design(tmp_path / "design.yaml")

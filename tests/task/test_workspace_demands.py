@@ -61,7 +61,13 @@ def configurations(one: Task, found: TaskWorkspace) -> tuple[np.ndarray, np.ndar
     return where, one.configuration(x, near, within_limits=False)
 
 
-@pytest.mark.parametrize("name", [*ROBOTS, "tool"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in ("delta", "micro", "tool") else pytest.mark.slow)
+        for name in [*ROBOTS, "tool"]
+    ],
+)
 def test_forces_are_those_of_the_loaded_mechanism(name: str) -> None:
     """By the constrained dynamics of a mechanism with the payload as a body, point by point."""
     one, rng = one_of(name), np.random.default_rng(1)
@@ -136,7 +142,10 @@ def test_speeds_in_all_directions_are_balls_in_the_polytope_of_speeds(name: str)
     assert (found.force_left == 1).all()
 
 
-@pytest.mark.parametrize("name", ["stewart", "rrs", "planar_rrr", "micro"])
+@pytest.mark.parametrize(
+    "name",
+    ["planar_rrr", *(pytest.param(k, marks=pytest.mark.slow) for k in ("stewart", "rrs", "micro"))],
+)
 def test_lengths_and_angles_move_in_all_directions_at_once(name: str) -> None:
     """Of random directions none is faster for an actuator, and one is as fast to 2 %."""
     one, rng = one_of(name), np.random.default_rng(3)

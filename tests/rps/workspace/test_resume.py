@@ -169,6 +169,7 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return found
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_costs_its_blocks_only(tmp_path: Path, pools: list[Any]) -> None:
     right, path = serial(tmp_path), tmp_path / "space.h5"
     workspace_to_file(MICRO, path, GRID, workers=2, progress=killing(pools, {5}))
@@ -188,6 +189,7 @@ def test_workers_that_die_again_and_again_end_the_run_which_goes_on(
     assert same_file(path, right)
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_of_which_a_worker_is_killed(tmp_path: Path) -> None:
     from distributed import Client, LocalCluster
 
