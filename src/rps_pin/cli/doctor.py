@@ -73,6 +73,7 @@ PARTS = (
     Part("imageio", "imageio", "films", "pictures"),
     Part("imageio-ffmpeg", "imageio_ffmpeg", "films as MP4", "pictures"),
     Part("mujoco", "mujoco", "reading MuJoCo's files", "mjcf"),
+    Part("pymoo", "pymoo", "dimensions of robots", "design"),
 )
 
 
