@@ -269,7 +269,9 @@ def _numbers(answer: Any) -> np.ndarray:
         return np.ravel(np.asarray(answer, dtype=float))
     if not isinstance(answer, (tuple, list)):
         answer = [part for part in vars(answer).values() if isinstance(part, np.ndarray)]
-    return np.concatenate([np.zeros(0), *(_numbers(p) for p in answer if not isinstance(p, str))])
+    return np.concatenate(
+        [np.zeros(0), *(_numbers(p) for p in answer if p is not None and not isinstance(p, str))]
+    )
 
 
 def _differ(found: np.ndarray, wanted: np.ndarray) -> float:
