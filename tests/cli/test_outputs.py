@@ -221,6 +221,7 @@ EVERY = {
     "control": ["control", str(ROOT / "docs" / "scenarios" / "micro_helix.yaml"), "-o"],
     "reproduce": ["reproduce", "--quick", "-o"],
     "export c": ["export", "c", "four_bar", "-o"],
+    "design": ["design", str(ROOT / "examples" / "design" / "micro_motion.yaml"), "-o"],
     "png": ["view", "--png"],
     "video": ["view", "--video"],
 }
