@@ -88,7 +88,6 @@ LAYERS = [
         "bounds",
         "files",
         "interruption",
-        "locks",
         "config",
         "moved",
         "plain_text",

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
-from rps_pin.locks import locked
+from rps_pin.numerics.locks import locked
 
 _NAME, _LOCK = "computation.txt", "lock"
 

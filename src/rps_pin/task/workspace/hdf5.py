@@ -20,7 +20,7 @@ import h5py
 from rps_pin.errors import InputError
 from rps_pin.files import whole_file
 from rps_pin.interruption import interruptions_wait
-from rps_pin.locks import only_writer
+from rps_pin.numerics.locks import only_writer
 
 
 class LastingFile:
