@@ -24,10 +24,11 @@ from tests.task.design_examples import (
     rps_parameters,
 )
 
+pytestmark = pytest.mark.slow
+
 #: Candidates; and points of the grid along each dimension, fewer in all than candidates. All four
 #: examples, with more of both: docs/design_table.py.
 SIZES = {"3-RPS": (240, 13), "Delta": (240, 6)}
-NAMES = [pytest.param("3-RPS", marks=pytest.mark.slow), "Delta"]
 #: Least share of the area that a grid's best points dominate.
 LEAST = 0.97
 
@@ -47,7 +48,7 @@ def found(name: str) -> tuple[DescribedDesign, DesignResult]:
     return described, result
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SIZES)
 def test_objectives_are_those_of_closed_forms(name: str) -> None:
     """Of candidates that meet all requirements, and of some that do not."""
     described, result = found(name)
@@ -59,7 +60,7 @@ def test_objectives_are_those_of_closed_forms(name: str) -> None:
     np.testing.assert_allclose(result.scores[met], truth.scores[truth.met], rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SIZES)
 def test_the_front_is_not_worse_than_a_grid(name: str) -> None:
     described, result = found(name)
     truth = judged(EXAMPLES[name], described, grid(described, SIZES[name][1]))
@@ -72,7 +73,7 @@ def test_the_front_is_not_worse_than_a_grid(name: str) -> None:
     assert share > LEAST, share
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SIZES)
 def test_a_robot_that_is_written_does_its_task(name: str, tmp_path: Path) -> None:
     """By the workspace on another grid, and by the checks of paths: nothing of the design's own."""
     described, result = found(name)
@@ -95,7 +96,6 @@ def test_a_robot_that_is_written_does_its_task(name: str, tmp_path: Path) -> Non
         assert check_path(task, path).ok
 
 
-@pytest.mark.slow
 def test_the_region_of_a_3_rps_is_proven() -> None:
     """Between the points too, with the cones of the balls; what is not proven is outside of it."""
     _, result = found("3-RPS")
