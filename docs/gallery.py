@@ -22,6 +22,7 @@ from rps_pin.rps import ActuatorLimits, Payload, force_causes, size_trajectory, 
 from rps_pin.rps.dynamics.motion_run import run_motion
 from rps_pin.rps.workspace import leg_grid, pose_grid, workspace
 from rps_pin.task import size_trajectory as size_of_task
+from rps_pin.task.design import DesignSpace, Dimension, Region, Requirements, design
 from rps_pin.task.workspace import task_grid
 from rps_pin.task.workspace import workspace as workspace_of_task
 from rps_pin.trajectories import circle, point_to_point
@@ -158,6 +159,18 @@ def _plot_slices() -> Figure:
     sides = np.linspace(-0.45, 0.45, 46)
     over = {"x": sides, "y": sides, "z": np.linspace(0.3, 0.95, 40)}
     return plots.plot_slices(workspace_of_task(stewart, task_grid(stewart, over)))
+
+
+@shown("A Delta's rods and arms: the front of size and conditioning")
+def _plot_front() -> Figure:
+    delta = ClosedLoopModel.load("urdf/delta.yaml").task
+    rods = [f"rod_{leg}_{side}" for leg in (1, 2, 3) for side in ("left", "right")]
+    elbows = [[f"rod_{leg}_left.a", f"rod_{leg}_right.a"] for leg in (1, 2, 3)]
+    arm, rod = Dimension("arm", 0.1, 0.4, length=elbows), Dimension("rod", 0.3, 0.9, distance=rods)
+    space = DesignSpace(delta, [arm, rod])
+    region = Region(box={"x": (-0.1, 0.1), "y": (-0.1, 0.1), "z": (-0.55, -0.45)}, points=3)
+    asked, best = Requirements(region, min_conditioning=0.2), ["size", "conditioning"]
+    return plots.plot_front(design(space, asked, best, candidates=400, seed=1))
 
 
 @shown("Distance to a singularity over the tilt")
