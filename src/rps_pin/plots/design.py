@@ -11,7 +11,14 @@ from rps_pin.errors import InputError
 from rps_pin.plots.style import BLUE, COLOURS, GREY, PrintFigure, styled
 from rps_pin.task.design import DesignResult, Objective
 
-_UNITS = {"size": "m", "mass": "kg", "force": "N, N m", "speed": "m/s, rad/s", "stiffness": "N/m"}
+_UNITS = {
+    "conditioning": "1",
+    "size": "m",
+    "mass": "kg",
+    "force": "N, N m",
+    "speed": "m/s, rad/s",
+    "stiffness": "N/m",
+}
 
 
 @styled
