@@ -23,12 +23,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, MechanismError, SingularityError
+from rps_pin.errors import MechanismError, SingularityError
 from rps_pin.numerics.boxes import Bounds, CertifiedBoxes, Progress, bounded, checked_box, prove
 from rps_pin.numerics.intervals import Enclosure, Interval
 from rps_pin.numerics.stumpff import enclosures
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.task.certification.general import certify_general
+from rps_pin.task.certification.general import certify_general, refuse_turns
 from rps_pin.task.point_legs import PointLegs, point_legs
 from rps_pin.task.task import Task
 from rps_pin.validation import real_vector
@@ -37,8 +37,6 @@ Number = Any
 
 #: Margins within this of zero are proven to be neither: the points of the legs are rounded.
 _ROUNDED, _SLACK = 1e-12, 1e-9
-#: Largest size of the rotation vectors of a box, rad: the series of its functions end there.
-LARGEST_TURN = 2.0
 #: A determinant of rows of unit length that is smaller than this has no sign in floats.
 _SIGNED = 1e-9
 
@@ -112,7 +110,7 @@ def certify(
         legs = point_legs(task)
     except MechanismError:
         return certify_general(task, *ends, start=start, free=free, **options)
-    _refuse_turns(*ends)
+    refuse_turns(task, *ends)
     margins = _Margins(task, legs, task.home if start is None else real_vector(start, 6, "start"))
     groups = {
         "lengths": (12, margins.lengths),
@@ -261,12 +259,3 @@ def _dot(a: Any, b: Any) -> Number:
 def _norm(v: list[Number]) -> Number:
     length: Number = _dot(v, v).sqrt()
     return length
-
-
-def _refuse_turns(lower: Array, upper: Array) -> None:
-    turn = float(np.linalg.norm(np.maximum(np.abs(lower), np.abs(upper))[3:]))
-    if turn >= LARGEST_TURN:
-        raise InputError(
-            f"the box has rotation vectors up to {turn:.4g} rad; below {LARGEST_TURN} rad is "
-            "possible"
-        )

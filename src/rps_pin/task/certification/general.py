@@ -6,16 +6,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, MechanismError, RPSPinError, SingularityError, shown
+from rps_pin.errors import InputError, MechanismError, SingularityError
 from rps_pin.numerics.boxes import CertifiedBoxes, Progress
 from rps_pin.task.certification.equations import Equations
 from rps_pin.task.certification.exclusion import Exclusion
 from rps_pin.task.certification.growth import Growth, Start
 from rps_pin.task.certification.margins import Margins
 from rps_pin.task.certification.newton import sheets
-from rps_pin.task.engine import PinocchioEngine
+from rps_pin.task.start import started
 from rps_pin.task.task import Task
-from rps_pin.validation import non_negative_number, numbers, whole_number
+from rps_pin.validation import non_negative_number, whole_number
 
 #: Largest size of the rotation vectors of a box, rad: the series of its functions end there.
 LARGEST_TURN = 2.0
@@ -43,7 +43,7 @@ def certify_general(
         )
     equations = Equations(task)
     if equations.symbols.turn is not None:
-        _refuse_turns(task, lower, upper)
+        refuse_turns(task, lower, upper)
     x, q = _started(task, lower, upper, start)
     z = equations.closed(equations.state(q)[None], x[None])
     first = sheets(equations, z, x[None], np.zeros((1, task.size)))
@@ -70,31 +70,14 @@ def _started(
     task: Task, lower: Array, upper: Array, start: ArrayLike | None
 ) -> tuple[Array, Array]:
     """Return the start's task coordinates (m,) and configuration (nq,)."""
-    m, nq = task.size, task.mechanism.model.nq
-    if start is None:
-        given = np.clip(task.home, lower, upper)
-    else:
-        given = numbers(start, "start", f"{m} task coordinates, or a configuration of {nq} numbers")
-    if given.shape not in ((m,), (nq,)) or not np.isfinite(given).all():
-        raise InputError(
-            f"start = {shown(given)}: it must be {m} finite task coordinates "
-            f"({', '.join(task.coordinates)}), or a configuration of {nq} numbers"
-        )
-    try:
-        if given.shape == (m,):
-            x, q = given, task.configuration(given, within_limits=False)
-        else:
-            q = PinocchioEngine(task.mechanism).closed(given)
-            x = task.at(q)
-    except RPSPinError as error:
-        error.args = (f"the start: {error}", *error.args[1:])
-        raise
+    x, q = started(task, np.clip(task.home, lower, upper) if start is None else start)
     if not ((x >= lower) & (x <= upper)).all():
         raise InputError(f"the start, {x.tolist()}, is not in the box")
     return x, q
 
 
-def _refuse_turns(task: Task, lower: Array, upper: Array) -> None:
+def refuse_turns(task: Task, lower: Array, upper: Array) -> None:
+    """Refuse boxes with rotation vectors beyond what the series of their functions take."""
     most = np.maximum(np.abs(lower), np.abs(upper))[list(task.angular)]
     turn = float(np.linalg.norm(most))
     if turn >= LARGEST_TURN:

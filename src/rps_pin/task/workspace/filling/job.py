@@ -19,16 +19,15 @@ from rps_pin.errors import (
     RPSPinError,
     SingularityError,
     UnreachableError,
-    shown,
 )
-from rps_pin.task.engine import PinocchioEngine
+from rps_pin.task.start import started
 from rps_pin.task.task import Task
 from rps_pin.task.workspace.evaluate import MIN_CONDITIONING, Evaluation, TaskFields, gains_of
 from rps_pin.task.workspace.filling.continuation import continued
 from rps_pin.task.workspace.filling.division import Division
 from rps_pin.task.workspace.filling.flood import Seeds, Work, filled
 from rps_pin.task.workspace.grids import TaskGrid
-from rps_pin.validation import non_negative_number, numbers, real
+from rps_pin.validation import non_negative_number, real
 
 #: Points whose fields are computed at a time.
 _BATCH = 16_384
@@ -163,25 +162,9 @@ def _refuse_other_grid(task: Task, grid: TaskGrid) -> None:
 
 def _started(task: Task, grid: TaskGrid, start: ArrayLike | None) -> tuple[Array, Array]:
     """Return the start's task coordinates (m,) and configuration (nq,)."""
-    home = task.mechanism.home
     if start is None:
-        return task.home, home
-    m, nq = task.size, task.mechanism.model.nq
-    given = numbers(start, "start", f"{m} task coordinates, or a configuration of {nq} numbers")
-    if given.shape not in ((m,), (nq,)) or not np.isfinite(given).all():
-        raise InputError(
-            f"start = {shown(start)}: it must be {m} finite task coordinates "
-            f"({', '.join(task.coordinates)}), or a configuration of {nq} numbers"
-        )
-    try:
-        if given.shape == (m,):
-            x, q = given, task.configuration(given, within_limits=False)
-        else:
-            q = PinocchioEngine(task.mechanism).closed(given)
-            x = task.at(q)
-    except RPSPinError as error:
-        error.args = (f"the start: {error}", *error.args[1:])
-        raise
+        return task.home, task.mechanism.home
+    x, q = started(task, start)
     for name, axis, column in zip(grid.over, grid.axes, grid.columns, strict=True):
         slack = _ROUNDING * float(np.abs(axis).max())
         if not axis[0] - slack <= x[column] <= axis[-1] + slack:
