@@ -66,18 +66,18 @@ def identifiable(rows: Array, opening: Array, tolerance: float = _NONE) -> Ident
     tolerance
         Singular values below this part of the largest are none.
     """
-    _, values, across = _svd(opening)
+    values, across = _svd(opening)
     kept = across[rank(values, tolerance) :]
-    _, values, within = _svd(rows @ kept.T)
+    values, within = _svd(rows @ kept.T)
     count = rank(values, tolerance)
     seen = within[:count] @ kept
     unseen = np.vstack([within[count:] @ kept, across[: len(across) - len(kept)]])
     return Identifiable(count, seen.T, unseen.T, values)
 
 
-def _svd(rows: Array) -> tuple[Array, Array, Array]:
-    """Return the singular value decomposition, with all right vectors."""
+def _svd(rows: Array) -> tuple[Array, Array]:
+    """Return the singular values, and all right vectors as rows."""
     p = rows.shape[1]
     short = np.zeros((max(p - len(rows), 0), p))
-    u, values, across = np.linalg.svd(np.vstack([rows, short]), full_matrices=False)
-    return u, values, across
+    _, values, across = np.linalg.svd(np.vstack([rows, short]), full_matrices=False)
+    return values, across

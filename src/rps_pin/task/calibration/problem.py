@@ -10,7 +10,7 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.errors import UnreachableError
 from rps_pin.task.calibration.information import Identifiable, identifiable, reduced
 from rps_pin.task.calibration.outliers import outliers
-from rps_pin.task.calibration.prediction import CalibrationModel
+from rps_pin.task.calibration.prediction import CalibrationModel, Predicted
 from rps_pin.task.calibration.sensors import Readings
 
 #: Residuals over their deviations where the robust loss begins to count them less, at the end; and
@@ -71,7 +71,9 @@ class Problem:
 
     def weighed(self, x: Array, p: Array) -> Weighed:
         """Return residuals and slopes at task coordinates (poses, m), parameters (p,)."""
-        found = self._model.predict(x, self.q, p)
+        return self._weighed(self._model.predict(x, self.q, p))
+
+    def _weighed(self, found: Predicted) -> Weighed:
         weights = self._weights[..., None]
         return Weighed(
             (self._values - found.readings) * self._weights,
@@ -111,9 +113,10 @@ class Problem:
 
     def identifiable(self) -> Identifiable:
         """Return which combinations of parameters the readings, and priors, determine."""
-        _, A, B = self.weighed(self.x, self.p)
-        opening = self._model.predict(self.x, self.q, self.p).opening / self._model.units
-        return identifiable(np.vstack([*reduced(A, B), self._prior]), np.vstack([*opening]))
+        found = self._model.predict(self.x, self.q, self.p)
+        _, A, B = self._weighed(found)
+        opening = np.vstack([*(found.opening / self._model.units)])
+        return identifiable(np.vstack([*reduced(A, B), self._prior]), opening)
 
     def fit(self, seen: Identifiable, scale: float = np.inf) -> None:
         """Correct the poses, and the combinations that are seen, by the readings in use.
