@@ -111,6 +111,22 @@ def test_control_and_reproduce(tmp_path: Path) -> None:
         (tmp_path / name).unlink()
 
 
+def test_robots_of_a_design_are_checked_before_the_search(tmp_path: Path) -> None:
+    described = ROOT / "examples" / "design" / "micro_motion.yaml"
+    for name in (
+        "least_base_radius_and_platform_radius.yaml",
+        "most_stiffness.urdf",
+        "front_3.urdf",
+    ):
+        file = tmp_path / f"of_{name}" / name
+        file.parent.mkdir()
+        file.write_text("PRECIOUS")
+        ended = rps_pin("design", str(described), "-o", str(file.parent))
+        assert ended.stderr == f"error: {file} exists; --overwrite replaces it\n"
+        assert [*file.parent.iterdir()] == [file]
+        assert file.read_text() == "PRECIOUS"
+
+
 def test_an_input_is_never_replaced(tmp_path: Path) -> None:
     mine, circle = tmp_path / "mine.yaml", tmp_path / "dynamics.csv"
     shutil.copy(PRESET, mine)

@@ -11,6 +11,8 @@ from rps_pin.cli import console as common
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
 from rps_pin.plain_text import short
 from rps_pin.task import design as of_tasks
+from rps_pin.task.design.requirements import objectives_of
+from rps_pin.task.design.result import possible_names
 
 #: Robots of the front that are written, and columns of the printed table, at most.
 _ROBOTS = 5
@@ -51,8 +53,10 @@ def design_command(
     - `rps-pin design design.yaml --candidates 100 -o chosen`
     """
     described = of_tasks.load_design(file)
+    names = possible_names(objectives_of(described.objectives), _ROBOTS)
+    robots = [one for name in names for one in described.space.files(output, name)]
     check_outputs(
-        [output / "front.csv", output / "sheet.txt", *figures_in(output, "front")],
+        [output / "front.csv", output / "sheet.txt", *robots, *figures_in(output, "front")],
         overwrite,
         inputs=[file, *described.files],
     )
@@ -71,7 +75,6 @@ def design_command(
         progress=common.progress_bar(console, "generations"),
     )
     chosen = found.chosen(_ROBOTS)
-    check_outputs(found.files(output, chosen), overwrite, inputs=[file, *described.files])
     files = found.write(output, chosen)
     # Slow to import: only for commands that draw.
     from rps_pin import plots

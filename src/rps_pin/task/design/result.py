@@ -118,9 +118,7 @@ class DesignResult:
         scores = self._small(self.scores[self.front])
         found: list[Chosen] = []
         for k, objective in enumerate(self.objectives):
-            word = "most" if objective.maximised else "least"
-            name = "_".join([word, *objective.name.replace("+", "and").split()])
-            self._add(found, Chosen(name, int(np.argmin(scores[:, k]))))
+            self._add(found, Chosen(_best_in(objective), int(np.argmin(scores[:, k]))))
         span = np.ptp(scores, axis=0)
         share = (scores - scores.min(axis=0)) / np.where(span > 0, span, 1.0)
         self._add(found, Chosen("between", int(np.argmin(np.linalg.norm(share, axis=1)))))
@@ -220,3 +218,15 @@ class DesignResult:
         if not 0 <= row < len(self.front):
             raise InputError(f"row {row}: the front has {len(self.front)}")
         return dict(zip(self.names, self.values[self.front[row]].tolist(), strict=True))
+
+
+def possible_names(objectives: Sequence[Objective], most: int) -> list[str]:
+    """Return the names that `DesignResult.chosen` may give to at most so many robots."""
+    spread = [f"front_{k}" for k in range(1, 2 * most + 1)]
+    return [*map(_best_in, objectives), "between", *spread]
+
+
+def _best_in(objective: Objective) -> str:
+    """Return the name of the robot that is best in an objective."""
+    word = "most" if objective.maximised else "least"
+    return "_".join([word, *objective.name.replace("+", "and").split()])
