@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import itertools
+from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rps_pin.errors import InputError
 from rps_pin.plots.style import BLUE, COLOURS, GREY, PrintFigure, styled
-from rps_pin.task.design import DesignResult, Objective
+
+if TYPE_CHECKING:
+    from rps_pin.task.design import DesignResult, Objective
 
 _UNITS = {
     "conditioning": "1",

@@ -1,12 +1,14 @@
 """What candidates are measured by: all of them at all points of the region, in generated code.
 
 From the middle of the region each point is reached on the straight line, in the assembly mode of
-the middle (`rps_pin.task.workspace.continuation`); a motion is followed from sample to sample.
+the middle (`rps_pin.task.workspace.filling`); a motion is followed from sample to sample.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -113,7 +115,9 @@ class Measuring:
         given = self.requirements
         parts = [self.points, *(part for one in self.motions for part in one[1:])]
         numbers_ = given.min_conditioning, given.limit_margin, given.min_stiffness, self._stiffness
-        found = hashlib.sha256(f"{self.space.identity()} {numbers_} {self._compiler}".encode())
+        with _generated_code():
+            identity = self.space.identity()
+        found = hashlib.sha256(f"{identity} {numbers_} {self._compiler}".encode())
         for part in (*parts, *self._most):
             found.update(np.ascontiguousarray(part).tobytes())
         return found.hexdigest()
@@ -151,7 +155,7 @@ class Measuring:
         """Generated code of the extended mechanism and of the mechanism, for its forces."""
         task, groups = self.space.task, self.space.groups
         options: dict[str, Any] = {"compiler": self._compiler, "batches": True}
-        try:
+        with _generated_code():
             by_task = task.extended.compile(
                 parameters=groups, functions=("kinematics", "closing"), **options
             )
@@ -163,10 +167,6 @@ class Measuring:
                 parameters=own, functions=("dynamics",), **options
             )
             by_actuators.wait()
-        except ImportError as error:
-            raise CompileError(
-                f"a design needs generated code: pip install rps-pin[compile] ({error})", ""
-            ) from error
         return by_task, by_actuators
 
     def __call__(self, values: Array) -> Measures:
@@ -320,6 +320,17 @@ class Measuring:
         values = np.linalg.svd(np.where(there[..., None, None], rooted, 0.0), compute_uv=False)
         least = np.where(there, values[..., -1] ** 2, np.inf).min(axis=1)
         return _where(some & np.asarray(there.any(axis=1)), least)
+
+
+@contextmanager
+def _generated_code() -> Iterator[None]:
+    """Say what to install where a part of the block is missing."""
+    try:
+        yield
+    except ImportError as error:
+        raise CompileError(
+            f"a design needs generated code: pip install rps-pin[compile] ({error})", ""
+        ) from error
 
 
 def _where(some: Bools, values: Array) -> Array:

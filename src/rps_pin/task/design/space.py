@@ -16,8 +16,6 @@ import pinocchio as pin
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.constraints.closures import joint_id
-from rps_pin.codegen.engine.applied import with_parameters
-from rps_pin.codegen.engine.identity import digest
 from rps_pin.errors import InputError, MechanismError, did_you_mean, few
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.design.bodies import projector, stretched
@@ -305,12 +303,16 @@ class DesignSpace:
 
     def identity(self) -> str:
         """Return a digest of all that decides the numbers of candidates."""
+        from rps_pin.codegen.engine.identity import digest  # noqa: PLC0415 (needs CasADi)
+
         return digest(self.task.extended.system, [repr(self.dimensions)])
 
     # Robots ---------------------------------------------------------------------------------------
 
     def robot(self, values: Array, q: Array | None = None, name: str = "") -> ClosedLoopModel:
         """Return a candidate (d,) as a mechanism, its home closed from a configuration (nq,)."""
+        from rps_pin.codegen.engine.applied import with_parameters  # noqa: PLC0415 (needs CasADi)
+
         one, mechanism = self.candidates(np.asarray(values)[None]), self.task.mechanism
         of_task = self._points[OUTPUT].group if self.task.frame is not None else ""
         groups = [group for group in self.groups if group != of_task]

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rps_pin.arrays import Array
-from rps_pin.codegen.calls import LARGE_BATCH
 from rps_pin.errors import (
     CompileError,
     InputError,
@@ -144,6 +143,8 @@ def settle(task: Task, options: Mapping[str, Any]) -> None:
     """
     if not task.compiled:
         return
+    from rps_pin.codegen.calls import LARGE_BATCH  # noqa: PLC0415 (only with generated code)
+
     q, x = (np.tile(one, (LARGE_BATCH, 1)) for one in (task.mechanism.home, task.home))
     continued(task, q, x, x)
     Evaluation(task, 1.0, 0.0, **options).fields(q, x)
