@@ -633,6 +633,33 @@ class ClosedLoopModel:
         options = self._options()
         return type(self)(model, self.closures, self.actuated, home=self._home, **options)
 
+    def with_numbers(
+        self, model: pin.Model, closures: Sequence[Closure], home: ArrayLike
+    ) -> ClosedLoopModel:
+        """Return the same mechanism with other numbers: another model of its joints, its closures.
+
+        Parameters
+        ----------
+        model
+            The tree, its joints those of this mechanism.
+        closures
+            All closures.
+        home
+            A closed configuration, shape (nq,).
+
+        Raises
+        ------
+        MechanismError
+            If the model has other joints, or a closure cannot be made.
+        """
+        same = self.with_model(model)
+        return type(self)(same.model, closures, self.actuated, home=home, **self._options())
+
+    def for_task(self, task: Mapping[str, Any]) -> ClosedLoopModel:
+        """Return the same mechanism for a task: the arguments of a `rps_pin.task.Task`."""
+        options = self._options() | {"task": dict(task)}
+        return type(self)(self.model, self.closures, self.actuated, home=self._home, **options)
+
     def without_effects(self) -> ClosedLoopModel:
         """Return the same mechanism without damping, friction and springs of joints."""
         options = self._options() | {"effects": None}

@@ -19,9 +19,9 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 
-_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-_LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-_ANGLES = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180}
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180}
 _OVER = {"": "", "_rate": "_per_s", "_acceleration": "_per_s2"}
 #: Coordinates that are rotation vectors, which are less than a whole turn long.
 _ROTATIONS = ("tilt_x", "tilt_y", "rx", "ry", "rz")
@@ -71,8 +71,8 @@ class Columns:
         others = frozenset(getattr(task, "actuator_columns", ()))
         others |= {in_degrees(name) for name in others}
         columns = cls(tuple(task.coordinates), tuple(map(bool, task.angular)), others)
-        counts = [len(_TIMES)]
-        counts += [3 * len(_ANGLES if one else _LENGTHS) for one in columns.angular]
+        counts = [len(TIMES)]
+        counts += [3 * len(ANGLES if one else LENGTHS) for one in columns.angular]
         if len(columns.read) < sum(counts):
             raise InputError(
                 f"coordinates {', '.join(columns.coordinates)}: a column's name would mean two of "
@@ -94,8 +94,8 @@ class Columns:
     def units(self) -> Mapping[str, Mapping[str, float]]:
         """The units of each quantity, and their values in SI."""
         known = dict(zip(self.coordinates, self.angular, strict=True))
-        return {"time": _TIMES} | {
-            name + suffix: {u + over: si for u, si in (_ANGLES if turns else _LENGTHS).items()}
+        return {"time": TIMES} | {
+            name + suffix: {u + over: si for u, si in (ANGLES if turns else LENGTHS).items()}
             for suffix, over in _OVER.items()
             for name, turns in known.items()
         }

@@ -43,7 +43,8 @@ MOST_LINES = 2_000_000
 LONGEST_LINE = 100_000
 
 _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs"}
-_POINT = "; numbers are written with a point, 0.5 and not 0,5"
+#: What is said of a comma in a number.
+POINT = "; numbers are written with a point, 0.5 and not 0,5"
 
 
 @refuses_other_kinds
@@ -98,7 +99,7 @@ def read_csv(
         positive_number(max_step, "max_step", "seconds")
     columns = OF_RPS if task is None else Columns.of_task(task)
     with opened(path, "trajectory file") as file:
-        table = _table(_lines(file, os.fspath(path)), os.fspath(path), columns)
+        table = _table(lines_of(file, os.fspath(path)), os.fspath(path), columns)
     _refuse_few(table, FEWEST_POSES if ends == "free" else 2)
     _refuse_times(table, max_step)
     _refuse_implausible(table)
@@ -157,7 +158,7 @@ class _Table:
         return self.written(quantity) * self.factor(quantity)
 
 
-def _lines(file: BinaryIO, origin: str) -> Iterator[tuple[int, str]]:
+def lines_of(file: BinaryIO, origin: str) -> Iterator[tuple[int, str]]:
     """Yield the lines that are neither blank nor comments, with their numbers, from 1."""
     number = 0
     while raw := file.readline(LONGEST_LINE + 1):
@@ -182,18 +183,15 @@ def _table(lines: Iterator[tuple[int, str]], origin: str, columns: Columns) -> _
     if not number:
         raise InputError(f"{origin} is empty: its first line must name the columns")
     try:
-        used = [mark for mark in _DELIMITERS if mark in header] or [","]
-        if len(used) > 1:
-            marks = " and ".join(_DELIMITERS[mark] for mark in used)
-            raise InputError(f"{marks} in the header; one of them may separate the cells")
-        names = [cell.strip() for cell in _cells(header, used[0])]
+        mark = delimiter_of(header)
+        names = [cell.strip() for cell in cells_of(header, mark)]
         positions = columns.positions(names)
     except InputError as error:
         raise InputError(f"{origin}, line {number}: {error}") from None
     numbers, values = array("q", [number]), array("d")
     for number, line in lines:
         try:
-            values.extend(_row(line, used[0], names))
+            values.extend(_row(line, mark, names))
         except InputError as error:
             raise InputError(f"{origin}, line {number}: {error}") from None
         numbers.append(number)
@@ -201,7 +199,23 @@ def _table(lines: Iterator[tuple[int, str]], origin: str, columns: Columns) -> _
     return _Table(names, positions, rows, numbers, origin, columns)
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
+def delimiter_of(header: str) -> str:
+    """Return what separates the cells of a header.
+
+    Raises
+    ------
+    InputError
+        If there are two such marks.
+    """
+    used = [mark for mark in _DELIMITERS if mark in header] or [","]
+    if len(used) > 1:
+        marks = " and ".join(_DELIMITERS[mark] for mark in used)
+        raise InputError(f"{marks} in the header; one of them may separate the cells")
+    return used[0]
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """Return the cells of a line, quoted or not."""
     if '"' not in line:
         return line.split(delimiter)
     try:
@@ -212,12 +226,12 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 def _row(line: str, delimiter: str, names: Sequence[str]) -> list[float]:
     """Return the numbers of a line."""
-    cells = _cells(line, delimiter)
+    cells = cells_of(line, delimiter)
     if len(cells) != len(names):
         comma = delimiter == "," and len(cells) > len(names) and all(map(is_number, cells))
         raise InputError(
             f"{len(cells)} cell{'s' if cells[1:] else ''}, where the header names {len(names)} "
-            f"columns{_POINT if comma else ''}"
+            f"columns{POINT if comma else ''}"
         )
     try:
         found = [float(cell) for cell in cells]
@@ -233,7 +247,7 @@ def _fault(name: str, cell: str) -> str:
     if not cell.strip():
         return f"{name} is empty: every sample needs all values"
     if not is_number(cell):
-        point = _POINT if "," in cell else ""
+        point = POINT if "," in cell else ""
         return f"{name} = {shown(cell.strip())}: it must be a number{point}"
     return "" if math.isfinite(float(cell)) else f"{name} = {float(cell)}: it must be finite"
 

@@ -1,20 +1,51 @@
 """Calibration: a mechanism's lengths, placements and sensors from readings at poses.
 
-`CalibrationModel` says which numbers are parameters and what is read, `readings` what was read, and
-`calibrate` finds the parameters that explain it best, with their covariance.
+`CalibrationModel` says which numbers are parameters and what is read, `readings` what was read (or
+`read_readings`, of a CSV file), and `calibrate` finds the parameters that explain it best, with
+their covariance. `write_calibrated` writes the mechanism with these, and `plan_poses` finds the
+poses to measure.
 """
 
+from rps_pin.task.calibration.checks import (
+    CrossValidation,
+    Explained,
+    by_kind,
+    by_pose,
+    by_sensor,
+    cross_validate,
+)
+from rps_pin.task.calibration.description import calibrated_mechanism, write_calibrated
 from rps_pin.task.calibration.information import Identifiable
-from rps_pin.task.calibration.prediction import CalibrationModel, Predicted
+from rps_pin.task.calibration.instruments import BallBar, Height, Inclinometer, Tracker
+from rps_pin.task.calibration.instruments_file import load_instruments
+from rps_pin.task.calibration.measured_file import read_readings
+from rps_pin.task.calibration.prediction import CalibrationModel, Predicted, geometric_groups
 from rps_pin.task.calibration.sensors import Readings, readings
 from rps_pin.task.calibration.solve import Calibration, calibrate
+from rps_pin.task.calibration.words import unseen_in_words
 
 __all__ = [
+    "BallBar",
     "Calibration",
     "CalibrationModel",
+    "CrossValidation",
+    "Explained",
+    "Height",
     "Identifiable",
+    "Inclinometer",
     "Predicted",
     "Readings",
+    "Tracker",
+    "by_kind",
+    "by_pose",
+    "by_sensor",
     "calibrate",
+    "calibrated_mechanism",
+    "cross_validate",
+    "geometric_groups",
+    "load_instruments",
+    "read_readings",
     "readings",
+    "unseen_in_words",
+    "write_calibrated",
 ]

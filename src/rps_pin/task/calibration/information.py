@@ -28,13 +28,25 @@ class Identifiable(NamedTuple):
     unseen: Array
     """Combinations that are not, or that would open the loops, shape (p, p - rank)."""
     singular_values: Array
-    """Of the residuals by the combinations that open no loop, falling."""
+    """Of the residuals by the combinations that open no loop, falling; over a length, 1/m."""
+    opening: int = 0
+    """How many combinations open loops: the last of those that are not seen."""
+    weak: int = 0
+    """How many are seen, but by less than was asked for: the first of those that are not seen."""
 
     @property
     def condition(self) -> float:
         """The largest singular value over the least of a combination that is seen."""
         values = self.singular_values[: self.rank]
         return float(values[0] / values[-1]) if self.rank else 1.0
+
+    def within(self, widest: float) -> Identifiable:
+        """Return it with combinations whose deviation is larger, m, taken as not seen."""
+        kept = int(np.count_nonzero(self.singular_values[: self.rank] * widest >= 1.0))
+        unseen = np.hstack([self.seen[:, kept:], self.unseen])
+        return self._replace(
+            rank=kept, seen=self.seen[:, :kept], unseen=unseen, weak=self.rank - kept
+        )
 
 
 def reduced(by_pose: Array, by_parameters: Array) -> Array:
@@ -72,7 +84,7 @@ def identifiable(rows: Array, opening: Array, tolerance: float = _NONE) -> Ident
     count = rank(values, tolerance)
     seen = within[:count] @ kept
     unseen = np.vstack([within[count:] @ kept, across[: len(across) - len(kept)]])
-    return Identifiable(count, seen.T, unseen.T, values)
+    return Identifiable(count, seen.T, unseen.T, values, len(across) - len(kept))
 
 
 def _svd(rows: Array) -> tuple[Array, Array]:

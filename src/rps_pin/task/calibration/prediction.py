@@ -16,14 +16,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array, Bools, Indices
+from rps_pin.closed_loop import ClosedLoopModel
+from rps_pin.closed_loop.constraints.frame_coordinates import ANGULAR, LINEAR
 from rps_pin.errors import InputError
-from rps_pin.task.calibration.sensors import sensor_columns
+from rps_pin.task.calibration.instruments import Instrument, sensors_of
+from rps_pin.task.calibration.sensors import possible_sensors, sensor_columns
+from rps_pin.task.coordinates import of_frame
 from rps_pin.task.task import Task
 
 #: Groups of numbers that decide positions; see `rps_pin.codegen.expressions.parameters`.
 _GEOMETRY = ("placement", "closure", "distance")
 #: Singular values of the closures' Jacobian below this part of the largest are none.
 _REDUNDANT = 1e-8
+#: Last parts of labels of angles.
+_TURNS = ("roll", "pitch", "yaw", *ANGULAR)
 
 
 class Predicted(NamedTuple):
@@ -42,6 +48,23 @@ class Predicted(NamedTuple):
     shape (poses, rows, p): empty unless the closures have redundant rows."""
 
 
+class _Frame(NamedTuple):
+    """Where a frame's x, y, z, rx, ry, rz stand in q and v."""
+
+    q: Indices
+    v: Indices
+
+
+class _Use(NamedTuple):
+    instrument: Instrument
+    frame: _Frame
+    sensors: list[int]
+    """Which sensors it gives, and which of its readings they are."""
+    rows: list[int]
+    own: slice
+    """Its parameters."""
+
+
 class CalibrationModel:
     """A mechanism with parameters, and sensors that have an offset and a scale.
 
@@ -50,11 +73,15 @@ class CalibrationModel:
     task
         The task of the mechanism as it is believed to be.
     groups
-        Groups of geometric numbers that are parameters: ``placement:JOINT``, ``closure:NAME``.
+        Groups of geometric numbers that are parameters: ``placement:JOINT``, ``closure:NAME``,
+        ``distance:NAME``; `geometric_groups` returns all.
     sensors
         What is read, as in `Readings`.
     offsets, scales
         Sensors whose offset, or scale, is a parameter.
+    instruments
+        What reads points, distances or angles of frames: `Tracker`, `BallBar`, `Height`,
+        `Inclinometer`.
     options
         Of `ClosedLoopModel.compile`.
 
@@ -80,6 +107,7 @@ class CalibrationModel:
         sensors: Sequence[str],
         offsets: Sequence[str] = (),
         scales: Sequence[str] = (),
+        instruments: Sequence[Instrument] = (),
         **options: Any,
     ) -> None:
         for group in groups:
@@ -88,24 +116,43 @@ class CalibrationModel:
                     f"{group!r} is no group of geometric parameters; these are "
                     + ", ".join(f"{kind}:NAME" for kind in _GEOMETRY)
                 )
-        self.task, self.sensors = task, tuple(sensors)
-        columns = sensor_columns(task, self.sensors)
+        self.task, self.groups, self.sensors = task, tuple(groups), tuple(sensors)
+        self.instruments = tuple(instruments)
+        of_instruments = sensors_of(self.instruments)
+        plain = [k for k, name in enumerate(self.sensors) if name not in of_instruments]
+        columns = sensor_columns(task, [self.sensors[k] for k in plain])
+        self._plain = np.array(plain, dtype=np.intp)
         self._read, self._moved = columns.q, columns.v
         self._offsets, self._scales = (_places(self.sensors, one) for one in (offsets, scales))
         options.setdefault("functions", ("kinematics", "closing"))
-        self._engine = task.extended.compile(parameters=list(groups), **options)
+        mechanism, frames = _with_frames(task, self.instruments)
+        self.mechanism = mechanism
+        self._engine = mechanism.compile(parameters=list(groups), **options)
         own = self._engine.parameters
         self._count = len(own)
-        self.labels = (
-            *own,
-            *(f"offset:{self.sensors[k]}" for k in self._offsets),
-            *(f"scale:{self.sensors[k]}" for k in self._scales),
-        )
-        none, one = np.zeros(self._offsets.size), np.ones(self._scales.size)
-        self.nominal = np.concatenate([self._engine.nominal_parameters, none, one])
+        labels, nominal = list(own), [self._engine.nominal_parameters]
+        self._uses = []
+        for one in self.instruments:
+            where = [k for k, name in enumerate(self.sensors) if name in one.sensors]
+            rows = [one.sensors.index(self.sensors[k]) for k in where]
+            first = len(labels)
+            labels += one.labels
+            nominal.append(one.nominal)
+            self._uses.append(_Use(one, frames[one.frame], where, rows, slice(first, len(labels))))
+        self._first = len(labels)
+        labels += [f"offset:{self.sensors[k]}" for k in self._offsets]
+        labels += [f"scale:{self.sensors[k]}" for k in self._scales]
+        twice = [name for name in labels if labels.count(name) > 1]
+        if twice:
+            raise InputError(f"two parameters are called {twice[0]!r}: rename an instrument")
+        self.labels: tuple[str, ...] = tuple(labels)
+        none, ones = np.zeros(self._offsets.size), np.ones(self._scales.size)
+        self.nominal = np.concatenate([*nominal, none, ones])
+        kinds = possible_sensors(task) | of_instruments
+        self.angular = tuple(kinds[name] for name in self.sensors)
         self.units = self._units()
-        independent = task.extended.actuated_indices
-        self._dependent = np.setdiff1d(np.arange(task.extended.model.nv), independent)
+        independent = mechanism.actuated_indices
+        self._dependent = np.setdiff1d(np.arange(mechanism.model.nv), independent)
 
     @property
     def engine(self) -> Any:
@@ -114,7 +161,7 @@ class CalibrationModel:
 
     def home(self, x: Array, p: Array) -> Array:
         """Return configurations at task coordinates (n, m), continued from home, (n, nq)."""
-        return self.closed(x, np.broadcast_to(self.task.extended.home, (len(x), self._nq)), p)
+        return self.closed(x, np.broadcast_to(self.mechanism.home, (len(x), self._nq)), p)
 
     def continued(self, x: Array, q: Array, p: Array) -> tuple[Array, Bools]:
         """Return configurations at task coordinates (n, m), near others, and which are reached."""
@@ -141,24 +188,52 @@ class CalibrationModel:
         q = self.closed(x, q, p)
         own = self._own(p)
         T = np.asarray(self._engine.motion_basis(q, parameters=own))
-        values = q[:, self._read]
+        shape = len(q), len(self.sensors)
+        values, by_pose = np.empty(shape), np.zeros((*shape, self.task.size))
+        by_parameters = np.zeros((*shape, p.size))
+        moved, opening = self._sensitivity(q, own)
+        values[:, self._plain] = q[:, self._read]
+        by_pose[:, self._plain] = T[:, self._moved]
+        by_parameters[:, self._plain, : self._count] = moved[:, self._moved]
+        for use in self._uses:
+            seen = use.instrument.read(q[:, use.frame.q], p[use.own])
+            slopes = seen.by_frame[:, use.rows]
+            values[:, use.sensors] = seen.values[:, use.rows]
+            by_pose[:, use.sensors] = slopes @ T[:, use.frame.v]
+            by_parameters[:, use.sensors, : self._count] = slopes @ moved[:, use.frame.v]
+            by_parameters[:, use.sensors, use.own] = seen.by_own[:, use.rows]
         offset, scale = self._sensor_numbers(p)
         readings = (values - offset) / scale
-        by_parameters = np.zeros((*readings.shape, p.size))
-        moved, opening = self._sensitivity(q, own)
-        by_parameters[:, :, : self._count] = moved[:, self._moved]
-        first, second = self._count, self._count + self._offsets.size
-        by_parameters[:, self._offsets, first + np.arange(self._offsets.size)] = -1.0
+        second = self._first + self._offsets.size
+        by_parameters[:, self._offsets, self._first + np.arange(self._offsets.size)] = -1.0
         by_parameters[:, self._scales, second + np.arange(self._scales.size)] = -readings[
             :, self._scales
         ]
         each = scale[:, None]
-        by_pose = T[:, self._moved] / each
-        return Predicted(q, readings, by_pose, by_parameters / each, opening)
+        return Predicted(q, readings, by_pose / each, by_parameters / each, opening)
+
+    def frames(self, q: Array, instrument: Instrument) -> Array:
+        """Return the coordinates of an instrument's frame at configurations (n, nq), (n, 6)."""
+        use = next(one for one in self._uses if one.instrument is instrument)
+        return np.asarray(q[:, use.frame.q])
+
+    def actuators_by_parameters(self, x: Array, q: Array, p: Array) -> tuple[Array, Array]:
+        """Return the actuators' slopes by the pose, (n, na, m), and by the parameters, (n, na, p).
+
+        Of the positions themselves, not of what sensors read, at task coordinates x (n, m).
+        """
+        q, own = self.closed(x, q, p), self._own(p)
+        model = self.mechanism.model
+        names = self.task.mechanism.actuated
+        columns = [model.joints[model.getJointId(name)].idx_v for name in names]
+        moved, _ = self._sensitivity(q, own)
+        slopes = np.zeros((len(q), len(columns), p.size))
+        slopes[:, :, : self._count] = moved[:, columns]
+        return np.asarray(self._engine.motion_basis(q, parameters=own))[:, columns], slopes
 
     def _sensitivity(self, q: Array, own: Array | None) -> tuple[Array, Array]:
         """Return dq/dp with the task's coordinates held, (n, nv, p), and what opens the loops."""
-        found = np.zeros((len(q), self.task.extended.model.nv, self._count))
+        found = np.zeros((len(q), self.mechanism.model.nv, self._count))
         none = np.zeros((len(q), 0, len(self.labels)))
         if not self._count:
             return found, none
@@ -178,32 +253,24 @@ class CalibrationModel:
     def _sensor_numbers(self, p: Array) -> tuple[Array, Array]:
         """Return offsets and scales of all sensors."""
         offset, scale = np.zeros(len(self.sensors)), np.ones(len(self.sensors))
-        first, second = self._count, self._count + self._offsets.size
-        offset[self._offsets], scale[self._scales] = p[first:second], p[second:]
+        second = self._first + self._offsets.size
+        offset[self._offsets], scale[self._scales] = p[self._first : second], p[second:]
         return offset, scale
 
     def _units(self) -> Array:
         length = self.task.characteristic_length
-        angular = dict(zip(self.task.coordinates, self.task.angular, strict=True))
-        turning = self.task.extended.system.equations.angular_velocities
         found = []
         for label in self.labels:
             kind, _, name = label.partition(":")
-            if kind == "scale":
-                found.append(length)
-            elif kind == "offset":
-                k = self.sensors.index(name)
-                turns = angular.get(name, bool(turning[self._moved[k]]))
-                found.append(length if turns else 1.0)
-            else:
-                found.append(
-                    length if label.rpartition(".")[2] in ("roll", "pitch", "yaw") else 1.0
-                )
+            turns = label.rpartition(".")[2] in _TURNS
+            if kind == "offset":
+                turns = self.angular[self.sensors.index(name)]
+            found.append(length if turns or kind == "scale" else 1.0)
         return np.array(found)
 
     @property
     def _nq(self) -> int:
-        return int(self.task.extended.model.nq)
+        return int(self.mechanism.model.nq)
 
 
 def _places(sensors: Sequence[str], chosen: Sequence[str]) -> Indices:
@@ -212,3 +279,31 @@ def _places(sensors: Sequence[str], chosen: Sequence[str]) -> Indices:
         if name not in sensors:
             raise InputError(f"{name!r} is not read; the sensors are {', '.join(sensors)}")
     return np.array([sensors.index(name) for name in chosen], dtype=np.intp)
+
+
+def geometric_groups(task: Task) -> tuple[str, ...]:
+    """Return all groups of geometric numbers of a task's mechanism.
+
+    The placements of its joints, its closures' ends and the lengths of its rods.
+    """
+    mechanism = task.mechanism
+    names = {closure.name for closure in mechanism.closures if hasattr(closure, "frame_a")}
+    rods = [one.name for one in mechanism.closures if getattr(one, "distance", None) is not None]
+    return (
+        *(f"placement:{name}" for name in list(mechanism.model.names)[1:]),
+        *(f"closure:{one.name}" for one in mechanism.closures if one.name in names),
+        *(f"distance:{name}" for name in rods),
+    )
+
+
+def _with_frames(
+    task: Task, instruments: Sequence[Instrument]
+) -> tuple[ClosedLoopModel, dict[str, _Frame]]:
+    """Return the extended mechanism with the coordinates of the instruments' frames, too."""
+    mechanism, found = task.extended, {}
+    for frame in dict.fromkeys(one.frame for one in instruments):
+        extension = of_frame(mechanism, frame, (*LINEAR, *ANGULAR), "universe", None)
+        mechanism = extension.mechanism.with_actuated(mechanism.actuated)
+        last = mechanism.model.nv - extension.added
+        found[frame] = _Frame(extension.idx_q, last + np.arange(extension.added))
+    return mechanism, found

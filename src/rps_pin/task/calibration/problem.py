@@ -9,6 +9,7 @@ import numpy as np
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import UnreachableError
 from rps_pin.task.calibration.information import Identifiable, identifiable, reduced
+from rps_pin.task.calibration.instruments import Tracker
 from rps_pin.task.calibration.outliers import outliers
 from rps_pin.task.calibration.prediction import CalibrationModel, Predicted
 from rps_pin.task.calibration.sensors import Readings
@@ -81,9 +82,10 @@ class Problem:
             found.by_parameters * weights / self._model.units,
         )
 
-    def begin(self, start: Array | None) -> None:
-        """Find the poses with the believed parameters, from about `start` (poses, m)."""
+    def begin(self, start: Array | None, p: Array | None = None) -> None:
+        """Find the poses from about `start` (poses, m), with the believed parameters or others."""
         task, sensors = self._model.task, self._model.sensors
+        self.p = self.p if p is None else p.copy()
         home = np.tile(task.home, (len(self._values), 1))
         guess = home.copy() if start is None else start.copy()
         for i, name in enumerate(task.coordinates):
@@ -92,13 +94,47 @@ class Problem:
                 guess[:, i] = np.where(self._known[:, k], self._values[:, k], guess[:, i])
         self.x, self.q = home, self._model.home(home, self.p)
         self._move_poses(guess - home)
+        if p is None:
+            self._place_trackers()
+        self._find_poses(self._known)
+
+    def find_poses(self) -> None:
+        """Leave outliers out, and correct the poses, with the parameters as they are."""
+        self.leave_out()
+        self._find_poses(self.used)
+
+    def _find_poses(self, used: Bools) -> None:
+        """Correct the poses by some readings, with the parameters as they are."""
+        task = self._model.task
         least = _POSE_CHANGE * task.characteristic_length
         for _ in range(_POSE_STEPS):
             r, A, _ = self.weighed(self.x, self.p)
-            step = (np.linalg.pinv(A) @ r[..., None])[..., 0]
+            A = A * used[..., None]
+            step = (np.linalg.pinv(A) @ (r * used)[..., None])[..., 0]
             self._move_poses(step / task.scale)
             if np.abs(step).max() < least:
                 return
+
+    def _place_trackers(self) -> None:
+        """Find where trackers stand of which it is not known, with the poses by the others."""
+        lost = [
+            one
+            for one in self._model.instruments
+            if isinstance(one, Tracker) and one.placement is None
+        ]
+        if not lost:
+            return
+        told = {name for one in lost for name in one.sensors}
+        others = np.array([name not in told for name in self._model.sensors])
+        self._find_poses(self._known & others)
+        for one in lost:
+            read = np.full((len(self._values), len(one.sensors)), np.nan)
+            for k, name in enumerate(one.sensors):
+                if name in self._model.sensors:
+                    at = self._model.sensors.index(name)
+                    read[:, k] = np.where(self._known[:, at], self._values[:, at], np.nan)
+            first = self._model.labels.index(one.labels[0])
+            self.p[first : first + 6] = one.placed(self._model.frames(self.q, one), read)
 
     def _move_poses(self, step: Array) -> None:
         """Move poses, (poses, m), half as far where that is not reached, and so on."""

@@ -10,7 +10,7 @@ with an offset and a scale that may be among the parameters of a calibration.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +44,10 @@ class Readings(NamedTuple):
 
 
 def readings(
-    task: Task, values: Mapping[str, ArrayLike], deviations: Mapping[str, ArrayLike]
+    task: Task,
+    values: Mapping[str, ArrayLike],
+    deviations: Mapping[str, ArrayLike],
+    more: Iterable[str] = (),
 ) -> Readings:
     """Return readings of sensors, checked.
 
@@ -57,6 +60,8 @@ def readings(
         m or rad; NaN where nothing was read.
     deviations
         By sensor: the standard deviation of its noise, one number or one for each pose.
+    more
+        Names of sensors besides joints and coordinates: those of instruments.
 
     Raises
     ------
@@ -68,7 +73,8 @@ def readings(
     if not values:
         raise InputError("there are no readings")
     names = tuple(values)
-    sensor_columns(task, names)
+    other = set(more)
+    sensor_columns(task, [name for name in names if name not in other])
     columns = [
         numbers(values[name], f"readings of {name}", "one number for each pose") for name in names
     ]
@@ -105,6 +111,20 @@ def readings(
     return Readings(names, array, spread)
 
 
+def possible_sensors(task: Task) -> dict[str, bool]:
+    """Return what a sensor can read, and whether that is an angle.
+
+    The task's coordinates first, then the joints of one coordinate.
+    """
+    turning = task.extended.system.equations.angular_velocities
+    model = task.extended.model
+    found = dict(zip(task.coordinates, map(bool, task.angular), strict=True))
+    for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True):
+        if joint.nq == joint.nv == 1 and name not in task.extended.actuated:
+            found.setdefault(name, bool(turning[joint.idx_v]))
+    return found
+
+
 class SensorColumns(NamedTuple):
     """Where the values that sensors read stand in the extended mechanism's q and v."""
 
@@ -122,21 +142,15 @@ def sensor_columns(task: Task, names: Sequence[str]) -> SensorColumns:
     """
     model = task.extended.model
     held = dict(zip(task.coordinates, task.extended.actuated, strict=True))
-    single = [
-        name
-        for joint, name in zip(list(model.joints)[1:], list(model.names)[1:], strict=True)
-        if joint.nq == joint.nv == 1
-    ]
+    known = possible_sensors(task)
     found = []
     for name in names:
-        joint = held.get(name, name)
-        if joint not in single:
-            known = (*held, *(one for one in single if one not in held.values()))
+        if name not in known:
             raise InputError(
                 f"no joint of one coordinate, and no coordinate of the task, is called {name!r}"
                 f"{did_you_mean(name, known)}; there are: {', '.join(known)}"
             )
-        found.append(model.joints[model.getJointId(joint)])
+        found.append(model.joints[model.getJointId(held.get(name, name))])
     return SensorColumns(
         np.array([joint.idx_q for joint in found], dtype=np.intp),
         np.array([joint.idx_v for joint in found], dtype=np.intp),

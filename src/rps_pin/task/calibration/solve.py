@@ -29,6 +29,8 @@ _ROUNDS = 10
 _SURE, _MANY = 5.0, 0.2
 #: A parameter is determined alone if no unseen combination of length 1 has more of it.
 _ALONE = 1e-6
+#: Share of the characteristic length beyond which a deviation is too large to be of use.
+_WIDEST = 0.01
 
 
 class Calibration(NamedTuple):
@@ -54,6 +56,16 @@ class Calibration(NamedTuple):
     """Readings that were left out, shape (poses, sensors)."""
     freedom: int
     """Readings that were used, less what was fitted."""
+    read: Readings
+    """What it was found from."""
+    units: Array
+    """What a unit of each parameter counts for as a length, shape (p,), m."""
+
+    @property
+    def correlations(self) -> Array:
+        """Of the parameters that are known alone, shape (p, p); NaN of the others."""
+        spread = np.where(self.alone, np.sqrt(np.maximum(np.diag(self.covariance), 0.0)), np.nan)
+        return np.asarray(self.covariance / np.outer(spread, spread))
 
     @property
     def deviations(self) -> Array:
@@ -73,6 +85,12 @@ class Calibration(NamedTuple):
         share = self.outliers.sum() / np.isfinite(self.residuals).sum()
         if share > _MANY:
             found.append(f"{share:.0%} of the readings are outliers")
+        if self.identifiable.weak:
+            found.append(
+                f"{self.identifiable.weak} combinations of parameters are seen so weakly that "
+                "their deviation would be larger than an error that is thought possible: they stay "
+                "as believed; measure more or other poses, or give priors"
+            )
         return tuple(found)
 
     @property
@@ -87,6 +105,7 @@ def calibrate(
     *,
     priors: Mapping[str, float] | None = None,
     start: ArrayLike | None = None,
+    widest: float | None = None,
 ) -> Calibration:
     """Return the parameters that explain readings best.
 
@@ -102,6 +121,10 @@ def calibrate(
     start
         Task coordinates at the poses, about, shape (poses, m); left out, they follow from what is
         read.
+    widest
+        Deviation of a combination of parameters, m, beyond which it is left as believed; a
+        hundredth of the task's characteristic length if left out. Such a combination changes no
+        reading by more than its deviation while it is off by less.
 
     Raises
     ------
@@ -116,9 +139,11 @@ def calibrate(
             f"the readings are of {', '.join(read.sensors)}; the model's sensors are "
             f"{', '.join(model.sensors)}"
         )
-    problem = Problem(model, read, _prior(model, priors or {}))
+    problem = Problem(model, read, prior_of(model, priors or {}))
     problem.begin(None if start is None else _start(model, read, start))
-    seen = problem.identifiable()
+    if widest is None:
+        widest = _WIDEST * model.task.characteristic_length
+    seen = problem.identifiable().within(positive_number(widest, "widest", "m"))
     wanted = seen.rank + problem.x.size
     if wanted >= read.total + problem.priors:
         raise InputError(
@@ -151,10 +176,12 @@ def calibrate(
         problem.residuals(),
         known & ~problem.used,
         freedom,
+        read,
+        model.units,
     )
 
 
-def _prior(model: CalibrationModel, given: Mapping[str, float]) -> Array:
+def prior_of(model: CalibrationModel, given: Mapping[str, float]) -> Array:
     """Return the deviation of each parameter about the believed one; infinite if free."""
     found = np.full(len(model.labels), np.inf)
     for name, deviation in given.items():

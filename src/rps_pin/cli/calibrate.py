@@ -1,0 +1,346 @@
+"""``rps-pin calibrate``: a mechanism's geometry from readings, and its new description."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from rps_pin.cli import console as common
+from rps_pin.cli import mechanism_options as options
+from rps_pin.cli.completion import mechanism_names, names_or_files
+from rps_pin.cli.outputs import OverwriteOption, check_outputs
+from rps_pin.cli.task_options import load_task_and_file
+from rps_pin.errors import InputError, few
+from rps_pin.files import write_text
+from rps_pin.plain_text import short
+from rps_pin.task import calibration as of_tasks
+from rps_pin.task.calibration.instruments import sensors_of
+from rps_pin.task.calibration.words import units_of
+from rps_pin.task.task import Task
+
+#: Rows of the printed table of parameters, and of other lists, at most.
+_ROWS, _LISTED = 40, 12
+#: Correlations from here on are told.
+_CORRELATED = 0.9
+
+
+def calibrate_command(
+    data: Annotated[
+        Path,
+        typer.Argument(metavar="DATA.csv", help="Readings, a row for each pose."),
+    ],
+    mechanism: Annotated[
+        Path,
+        typer.Option(
+            "--mechanism",
+            "-m",
+            metavar="FILE|NAME",
+            help="The mechanism with a task, as it is believed to be: a description, or parameters "
+            "of a 3-RPS.",
+            show_default=False,
+            autocompletion=names_or_files(mechanism_names),
+        ),
+    ],
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="GROUP",
+            help="What may be wrong: **placement:JOINT**, **closure:NAME**, **distance:NAME**; "
+            "several times. Default: all.",
+            show_default=False,
+        ),
+    ] = None,
+    offsets: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--offset",
+            metavar="SENSOR",
+            help="A sensor whose offset is a parameter; several times. Default: the actuators' "
+            "that are read. **none**: no sensor's.",
+            show_default=False,
+        ),
+    ] = None,
+    scales: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--scale",
+            metavar="SENSOR",
+            help="A sensor whose scale is a parameter; several times. Default: none.",
+            show_default=False,
+        ),
+    ] = None,
+    deviations: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--deviation",
+            metavar="SENSOR=VALUE",
+            help="A sensor's standard deviation, m or rad, if the file has no column of it.",
+            show_default=False,
+        ),
+    ] = None,
+    priors: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--prior",
+            metavar="PARAMETER=VALUE",
+            help="Standard deviation of a parameter, or of a group of them, about what is "
+            "believed, m or rad: that of a tolerance.",
+            show_default=False,
+        ),
+    ] = None,
+    instruments: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="What else was read: trackers, ball bars, heights, inclinometers; YAML.",
+        ),
+    ] = None,
+    folds: Annotated[
+        int, typer.Option(min=0, help="Parts of the poses for cross-validation; 0: none.")
+    ] = 5,
+    output: common.FolderOption = Path("calibration"),
+    overwrite: OverwriteOption = False,
+    as_json: common.JsonOption = False,
+) -> None:
+    """Find a mechanism's lengths, placements and sensors' offsets from readings at many poses.
+
+    A column of the file is a sensor with its unit, **left_joint_deg** or **x_mm**: a joint, or a
+    coordinate of the task. Its standard deviation is a column **x_deviation_um**, or given with
+    --deviation. An empty cell was not read.
+
+    Output: the calibrated mechanism (**NAME_calibrated.urdf** and **.yaml**, with a comment on what
+    changed), which every other command takes; **parameters.csv** and **residuals.csv**. What the
+    readings cannot tell is printed, and stays as it was.
+
+    Exit status: 0 done; 1 an error; 2 wrong usage.
+
+    Examples:
+
+    - `rps-pin calibrate readings.csv --mechanism five_bar --deviation x=3e-5`
+    """
+    task, file = load_task_and_file(mechanism)
+    name = f"{file.stem}_calibrated"
+    files = [
+        *(output / f"{name}{suffix}" for suffix in (".urdf", ".yaml")),
+        *(output / f"{one}.csv" for one in ("parameters", "residuals")),
+    ]
+    check_outputs(files, overwrite, inputs=[data, file])
+    others = of_tasks.load_instruments(instruments, task) if instruments else ()
+    given = options.by_joint(deviations or (), "--deviation")
+    read = of_tasks.read_readings(data, task, given, sensors_of(others))
+    model = of_tasks.CalibrationModel(
+        task,
+        parameters or of_tasks.geometric_groups(task),
+        read.sensors,
+        _offsets(task, read, offsets),
+        scales or (),
+        others,
+    )
+    console = common.text_console(as_json)
+    known = options.by_joint(priors or (), "--prior")
+    with console.status("calibrating"):
+        found = of_tasks.calibrate(model, read, priors=known)
+    crossed = None
+    if folds:
+        bar = common.progress_bar(console, "cross-validation")
+        crossed = of_tasks.cross_validate(model, read, folds=folds, priors=known, progress=bar)
+    output.mkdir(parents=True, exist_ok=True)
+    notes = _write(model, found, files, file)
+    summary = _summary(model, found, crossed)
+    if as_json:
+        common.print_json(summary | {"notes": notes, "files": files})
+        return
+    _print(console, model, found, summary)
+    options.print_notes([*found.doubts, *notes])
+    common.print_files(console, files)
+
+
+def _offsets(task: Task, read: of_tasks.Readings, given: Sequence[str] | None) -> Sequence[str]:
+    if given is None:
+        return [name for name in task.mechanism.actuated if name in read.sensors]
+    if "none" in given and len(given) > 1:
+        raise InputError("--offset none: leave out the others")
+    return [] if "none" in given else given
+
+
+def _write(
+    model: of_tasks.CalibrationModel,
+    found: of_tasks.Calibration,
+    files: Sequence[Path],
+    source: Path,
+) -> list[str]:
+    """Write all files; return what the formats do not have."""
+    urdf, _, parameters, residuals = files
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        shapes, notes = options.shapes_of(source, model.task.mechanism)
+        of_tasks.write_calibrated(model, found, urdf, shapes=shapes, overwrite=True)
+    units = units_of(model)
+    rows = [
+        (label, units[k] or "1", *map(repr, map(float, values)), "yes" if found.alone[k] else "no")
+        for k, (label, *values) in enumerate(
+            zip(found.labels, found.before, found.parameters, found.deviations, strict=True)
+        )
+    ]
+    header = ("parameter", "unit", "before", "after", "deviation", "known_alone")
+    write_text(parameters, _csv([header, *rows]))
+    names = [f"{name}_{what}" for name in model.sensors for what in ("residual", "outlier")]
+    cells = [
+        [
+            str(pose),
+            *(
+                cell
+                for k in range(len(model.sensors))
+                for cell in (
+                    "" if math.isnan(row[k]) else repr(float(row[k])),
+                    str(int(found.outliers[pose, k])),
+                )
+            ),
+        ]
+        for pose, row in enumerate(found.residuals)
+    ]
+    write_text(residuals, _csv([["pose", *names], *cells]))
+    return list(dict.fromkeys([*notes, *(str(one.message) for one in told)]))
+
+
+def _csv(rows: Sequence[Sequence[str]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def _summary(
+    model: of_tasks.CalibrationModel,
+    found: of_tasks.Calibration,
+    crossed: of_tasks.CrossValidation | None,
+) -> dict[str, Any]:
+    units = units_of(model)
+    return {
+        "poses": len(found.x),
+        "readings": found.read.total,
+        "outliers": [
+            {"pose": int(i), "sensor": model.sensors[k], "residual": float(found.residuals[i, k])}
+            for i, k in np.argwhere(found.outliers)
+        ],
+        "parameters": len(found.labels),
+        "identifiable": found.identifiable.rank + found.identifiable.weak,
+        "fitted": found.identifiable.rank,
+        "condition": found.identifiable.condition,
+        "unseen": of_tasks.unseen_in_words(model, found.identifiable),
+        "changes": [
+            {
+                "parameter": label,
+                "unit": units[k],
+                "before": float(found.before[k]),
+                "after": float(found.parameters[k]),
+                "deviation": float(found.deviations[k]) if found.alone[k] else None,
+            }
+            for k, label in enumerate(found.labels)
+            if found.alone[k] or abs(found.parameters[k] - found.before[k]) > 1e-12
+        ],
+        "correlated": [
+            {"parameters": [found.labels[i], found.labels[k]], "correlation": float(value)}
+            for i, k, value in _correlated(found)
+        ],
+        "residual_ratio": math.sqrt(found.chi_squared / found.freedom),
+        "by_sensor": [_told(one) for one in of_tasks.by_sensor(model, found)],
+        "by_kind": [_told(one) for one in of_tasks.by_kind(model, found)],
+        "by_pose": [None if math.isnan(x) else float(x) for x in of_tasks.by_pose(found)],
+        "cross_validation_ratio": None if crossed is None else crossed.ratio,
+        "doubts": found.doubts,
+    }
+
+
+def _told(one: of_tasks.Explained) -> dict[str, Any]:
+    return {
+        name: None if isinstance(value, float) and math.isnan(value) else value
+        for name, value in one._asdict().items()
+    }
+
+
+def _correlated(found: of_tasks.Calibration) -> list[tuple[int, int, float]]:
+    """Return pairs of parameters that are known alone and strongly correlated, the most first."""
+    C = np.triu(np.nan_to_num(found.correlations), 1)
+    pairs = [(int(i), int(k), float(C[i, k])) for i, k in np.argwhere(np.abs(C) > _CORRELATED)]
+    return sorted(pairs, key=lambda one: -abs(one[2]))
+
+
+def _print(
+    console: Any,
+    model: of_tasks.CalibrationModel,
+    found: of_tasks.Calibration,
+    summary: dict[str, Any],
+) -> None:
+    changes = summary["changes"]
+    rows = [
+        (
+            one["parameter"],
+            short(one["after"] - one["before"]),
+            "not known alone" if one["deviation"] is None else f"{one['deviation']:.2g}",
+            one["unit"],
+        )
+        for one in changes[:_ROWS]
+    ]
+    console.print(common.table_of(rows, "parameter", "change", "deviation", "unit"))
+    if len(changes) > _ROWS:
+        console.print(f"and {len(changes) - _ROWS} more: see parameters.csv")
+    for key in ("by_kind", "by_sensor"):
+        console.print(common.table_of(_explained(summary[key]), *_EXPLAINED))
+    console.print(common.table_of(_rows(model, found, summary)))
+    if summary["unseen"]:
+        console.print("What the readings do not tell:")
+    for one in summary["unseen"]:
+        console.print(f"- {one}")
+
+
+_EXPLAINED = "readings of", "there are", "outliers", "residual over deviation", "residual"
+
+
+def _explained(given: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
+    return [
+        (
+            one["name"],
+            str(one["readings"]),
+            str(one["outliers"]),
+            "" if one["ratio"] is None else f"{one['ratio']:.3g}",
+            "" if one["size"] is None else f"{one['size']:.3g} {one['unit']}",
+        )
+        for one in given
+    ]
+
+
+def _rows(
+    model: of_tasks.CalibrationModel, found: of_tasks.Calibration, summary: dict[str, Any]
+) -> list[tuple[str, str]]:
+    told = [f"pose {one['pose']}: {one['sensor']}" for one in summary["outliers"]]
+    by_pose = of_tasks.by_pose(found)
+    worst = [int(i) for i in np.argsort(-np.nan_to_num(by_pose))[:3]]
+    correlated = [
+        f"{one['parameters'][0]} and {one['parameters'][1]} ({one['correlation']:+.3f})"
+        for one in summary["correlated"]
+    ]
+    crossed = summary["cross_validation_ratio"]
+    return [
+        ("poses, readings", f"{summary['poses']}, {summary['readings']}"),
+        ("outliers, left out", few(told, _LISTED) or "none"),
+        (
+            "combinations known",
+            f"{summary['fitted']} of {summary['parameters']} parameters, condition "
+            f"{summary['condition']:.3g}",
+        ),
+        ("residuals over what deviations say", f"{summary['residual_ratio']:.3g}"),
+        *([] if crossed is None else [("the same of poses left out", f"{crossed:.3g}")]),
+        (
+            "poses with the largest residuals",
+            ", ".join(f"{i} ({by_pose[i]:.3g})" for i in worst),
+        ),
+        ("strongly correlated", few(correlated, _LISTED) or "none"),
+    ]
