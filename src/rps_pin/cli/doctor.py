@@ -74,6 +74,7 @@ PARTS = (
     Part("imageio-ffmpeg", "imageio_ffmpeg", "films as MP4", "pictures"),
     Part("mujoco", "mujoco", "reading MuJoCo's files", "mjcf"),
     Part("pymoo", "pymoo", "dimensions of robots", "design"),
+    Part("SALib", "SALib", "Sobol indices of tolerances", "tolerances"),
 )
 
 

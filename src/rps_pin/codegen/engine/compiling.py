@@ -40,8 +40,9 @@ def compile_mechanism(
         they are first named, which takes seconds.
     functions
         What is built now, of ``"dynamics"``, ``"kinematics"``, ``"closing"``, ``"forces"``,
-        ``"simulation"`` and ``"derivatives"``; with parameters also ``"parameters"``, the
-        derivatives by them. The rest is built when it is first called.
+        ``"simulation"`` and ``"derivatives"``; with parameters also ``"parameters"`` and
+        ``"geometry"``, the derivatives by them, of forces and of gaps. The rest is built when it is
+        first called.
     batches
         Whether code for several samples at once (in the processor's vectors) is built now. It takes
         as long again; left out, it is built in the background when the first large batch comes,

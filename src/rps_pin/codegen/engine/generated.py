@@ -55,11 +55,8 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
 }
 #: And with parameters.
 OF_PARAMETERS: Mapping[str, tuple[str, ...]] = {
-    "parameters": (
-        "gaps_by_parameters",
-        "inverse_dynamics_by_parameters",
-        "forward_dynamics_by_parameters",
-    ),
+    "geometry": ("gaps_by_parameters",),
+    "parameters": ("inverse_dynamics_by_parameters", "forward_dynamics_by_parameters"),
 }
 _ALL = {**GROUPS, **OF_PARAMETERS}
 #: Loops over rows gain by GCC's highest optimisation, and all of it by fused multiply-add; other
