@@ -163,24 +163,9 @@ class DynamicsDerivatives:
         self, motion: tuple[Array, Array, Array], multipliers: Array, wrenches: Wrenches | None
     ) -> tuple[tuple[Array, Array, Array], derivatives.ClosureDerivatives]:
         """Return F_q, F_v and M (nv, nv), lambda held, and the closures' derivatives."""
-        system, equations = self._system, self._equations
-        model, on_frames = equations.model, system.by_frame(wrenches)
-        on_closures = closure_wrenches(equations, motion[0], multipliers)
-        motions = derivatives.FrameMotions(equations, motion)
+        motions = derivatives.FrameMotions(self._equations, motion)
         rows = derivatives.closure_derivatives(motions)
-        beyond = derivatives.closure_force_slope(motions, multipliers)
-        beyond += derivatives.external_force_slope(motions, on_frames)
-        forces = forces_on_joints(equations, on_closures, on_frames)
-        by_q, by_v, mass = (
-            np.array(part).reshape(model.nv, model.nv)
-            for part in pin.computeRNEADerivatives(model, equations.data, *motion, forces)
-        )
-        by_q -= beyond
-        if system.effects is not None:
-            by_v += np.diag(system.effects.slopes(motion[1]))
-        if system.springs is not None:
-            by_q += system.springs.slope(motion[0])
-        return (by_q, by_v, mass), rows
+        return force_derivatives(self._system, motions, multipliers, wrenches), rows
 
     def _solution(self, q: Array, chosen: Indices) -> tuple[Solved, IdleSlopes]:
         """Return a solver of J x = b at q, and the slopes of what the chosen velocities leave open.
@@ -204,6 +189,34 @@ class DynamicsDerivatives:
             return x
 
         return solved, IdleSlopes.none(system)
+
+
+def force_derivatives(
+    system: ConstraintSystem,
+    motions: derivatives.FrameMotions,
+    multipliers: Array,
+    wrenches: Wrenches | None,
+) -> tuple[Array, Array, Array]:
+    """Return F_q, F_v and M, shape (nv, nv) each, lambda held, at a motion.
+
+    The equations of `motions` are the system's, or those of its tree with some joints split.
+    """
+    equations, motion = motions.equations, motions.motion
+    model, on_frames = equations.model, system.by_frame(wrenches)
+    on_closures = closure_wrenches(equations, motion[0], multipliers)
+    beyond = derivatives.closure_force_slope(motions, multipliers)
+    beyond += derivatives.external_force_slope(motions, on_frames)
+    forces = forces_on_joints(equations, on_closures, on_frames)
+    by_q, by_v, mass = (
+        np.array(part).reshape(model.nv, model.nv)
+        for part in pin.computeRNEADerivatives(model, equations.data, *motion, forces)
+    )
+    by_q -= beyond
+    if system.effects is not None:
+        by_v += np.diag(system.effects.slopes(motion[1]))
+    if system.springs is not None:
+        by_q += system.springs.slope(motion[0])
+    return by_q, by_v, mass
 
 
 def following(
