@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -13,9 +12,7 @@ from rps_pin.closed_loop.dynamics.wrenches import closure_wrenches, forces_on_jo
 from rps_pin.errors import SingularityError
 from rps_pin.task.stiffness.elastic import Loads
 from rps_pin.task.stiffness.equilibrium import Tangent
-
-if TYPE_CHECKING:
-    from rps_pin.task.stiffness.model import StiffnessModel
+from rps_pin.task.stiffness.mechanism import ElasticMechanism
 
 #: Share of the largest reaction in which a closure that is not determined must take part.
 _PART = 1e-9
@@ -112,7 +109,7 @@ class Deflection:
         return np.asarray(inverse * np.outer(scale, scale))
 
 
-def deflection_of(model: StiffnessModel, q0: Array, tangent: Tangent, loads: Loads) -> Deflection:
+def deflection_of(model: ElasticMechanism, q0: Array, tangent: Tangent, loads: Loads) -> Deflection:
     """Return the results at an equilibrium."""
     A = model.output_jacobian(tangent.q)
     omega, shapes = tangent.vibrations()
@@ -146,7 +143,7 @@ def deflection_of(model: StiffnessModel, q0: Array, tangent: Tangent, loads: Loa
     )
 
 
-def _undetermined(model: StiffnessModel, tangent: Tangent) -> tuple[str, ...]:
+def _undetermined(model: ElasticMechanism, tangent: Tangent) -> tuple[str, ...]:
     """Return the closures that have a part in reactions that nothing determines."""
     if not tangent.undetermined.size:
         return ()
@@ -159,7 +156,7 @@ def _undetermined(model: StiffnessModel, tangent: Tangent) -> tuple[str, ...]:
 
 
 def _joint_wrenches(
-    model: StiffnessModel, q: Array, closures: dict[str, Array], loads: Loads
+    model: ElasticMechanism, q: Array, closures: dict[str, Array], loads: Loads
 ) -> dict[str, Array]:
     """Return the wrench that each joint of the rigid mechanism carries."""
     tree, data = model.model, model.system.data
