@@ -310,9 +310,10 @@ class CompiledMechanism:
         """Return the closed configurations in which some joints have given values, (..., nq).
 
         As `ClosedLoopModel.complete`; generated code where the values are those of the actuated
-        joints, and these determine the motion. It divides the way into up to 64 parts; where
-        Newton's steps do not contract in these, the Pinocchio engine follows it. A batch of values
-        is an array (..., na) of the actuated joints'; by name, one value for each joint.
+        joints, and these determine the motion. It halves its steps along the way where Newton's
+        steps do not contract; where a step would be less than 1/64 of what is left, the Pinocchio
+        engine follows it. A batch of values is an array (..., na) of the actuated joints'; by name,
+        one value for each joint.
         """
         ordered: Any = values
         whole_number(restarts, "restarts", 0)
@@ -355,8 +356,8 @@ class CompiledMechanism:
         """Return what `complete` finds by generated code alone, (n, nq), and of which samples.
 
         Closed configurations (n, nq) are continued to the actuated joints' values (n, na). Samples
-        where Newton's steps do not contract cost some 20 us, not the Pinocchio engine's 50 ms; what
-        is returned of them has no meaning.
+        that are not reached cost some microseconds, not the Pinocchio engine's 50 ms; what is
+        returned of them has no meaning.
         """
         at, system = self._actuated_coordinates, self.mechanism.system
         if at is None or not (system.actuated.size == at.size and self._is_actuated):

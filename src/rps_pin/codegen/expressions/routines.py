@@ -27,10 +27,11 @@ _NEWTON_STEPS = 20
 #: As in `rps_pin.closed_loop.assembly.continuation`: the squared ratio of corrections, and the
 #: largest motion in a step, here all together, rad or characteristic lengths.
 _CONTRACTION, _REACH = 1 / 16, 0.3
-#: Squared, the largest relative change of A in a part.
+#: Squared, the largest relative change of A in a step.
 _CHANGE = 1 / 4
-#: Most parts that a path is divided into.
-_PARTS = 64
+#: A step is at least this part of what is left of a way, and what is left is this part of the way;
+#: and most tries.
+_PARTS, _LEAST_REST, _TRIES = 64, 1e-7, 1000
 
 
 def routines(functions: MechanismFunctions, names: Iterable[str]) -> tuple[Routine, ...]:
@@ -122,11 +123,13 @@ def _newton(functions: MechanismFunctions, name: str, kernel: str) -> Routine:
 
 
 def _completed(functions: MechanismFunctions) -> Routine:
-    """In 1, 2, 4, ... parts, until Newton's steps contract in each as a continuation's must.
+    """In steps along the way, halved where Newton's steps do not contract as a continuation's must.
 
-    And keep the sign of det A, A the closures' Jacobian by the others: where it changes, a
-    singularity lies between, and Newton's steps led into another assembly mode. Where A is not
-    square, |A^-1| times the motion in a part, which bounds the change of A, must be at most a half.
+    A step that is taken after another one is twice as long. The way is given up where a step would
+    be less than 1/64 of what is left of it. Steps also keep the sign of det A, A the closures'
+    Jacobian by the others: where it changes, a singularity lies between, and Newton's steps led into
+    another assembly mode. Where A is not square, |A^-1| times the motion in a step, which bounds the
+    change of A, must be at most a half.
     """
     x = functions.expressions
     model, extra = x.tree.model, _extra(functions, False)
@@ -139,7 +142,7 @@ def _completed(functions: MechanismFunctions) -> Routine:
     ]
     squares = [f"way += SQUARE((given[{i}] - q[{i}]) * CONST({1 / by!r}));" for i, by in simple]
     moves = [
-        f"at[{i}] = s == n ? given[{i}] : q[{i}] + share * (given[{i}] - q[{i}]);"
+        f"at[{i}] = SELECT(LE(CONST(1), aim), given[{i}], q[{i}] + aim * (given[{i}] - q[{i}]));"
         for i, _ in simple
     ]
     lengths = [
@@ -147,7 +150,7 @@ def _completed(functions: MechanismFunctions) -> Routine:
     ]
     length = x.system.equations.length
     away = [
-        f"moving += SQUARE((at[{i}] - begin[{i}]) * CONST({by / length!r}));"
+        f"moving += SQUARE((at[{i}] - q_closed[{i}]) * CONST({by / length!r}));"
         for i, by in enumerate(x.system.arcs.tolist())
     ]
     most = _CHANGE / GROWTH**2
@@ -156,52 +159,59 @@ def _completed(functions: MechanismFunctions) -> Routine:
         kept = f"LE(growth[0] * moving, CONST({most!r}))"
     body = f"""
     REAL at[{model.nq}], moved[{model.nq}], dv[{model.nv}], gap[1], growth[1];
-    REAL begin[{model.nq}], turn[1], moving, side = CONST(0);
-    REAL way = CONST(0), done = CONST(0), good, before, length, worst, share;
-    int i, k, n, s;
+    REAL turn[1], side = CONST(0), way = CONST(0), good, again = CONST(0), going;
+    REAL share = CONST(0), aim = CONST(0), step, longest, before, length, worst, moving;
+    int i, k, n;
     #define SQUARE(x) ((x) * (x))
-    for (i = 0; i < {model.nq}; ++i) q_closed[i] = q[i];
-    check[1] = CONST(0);
     {" ".join(squares)}
-    for (n = 1; n <= {_PARTS}; n += n) {{
-        good = LE(way, CONST({reach!r}) * CONST(n) * CONST(n));
-        worst = CONST(0);
-        if (!ANY(AND(good, NOT(done)))) continue;
-        for (i = 0; i < {model.nq}; ++i) at[i] = q[i];
-        for (s = 0; s <= n; ++s) {{ /* the first closes the guess to rounding error */
-            share = CONST(s) / CONST(n);
-            if (s) {{ {" ".join(moves)} }}
-            before = CONST({reach!r});
-            for (k = 0; k < {_NEWTON_STEPS}; ++k) {{
-                {_call("continuing_step", ["at"], extra, "dv", "gap", "growth", "turn")}
-                length = CONST(0);
-                {" ".join(lengths)}
-                worst = FMAX(worst, growth[0]);
-                good = AND(good, OR(LT(gap[0], {_LAST}), LE(length, before)));
-                before = CONST({_CONTRACTION!r}) * length;
-                if (!ANY(AND(good, LT({_CLOSED}, gap[0])))) break;
-                {_call("integrate", ["at", "dv"], extra, "moved")}
-                for (i = 0; i < {model.nq}; ++i) at[i] = moved[i];
-                if (!ANY(LT({_LAST_OF_ALL}, gap[0]))) break;
-            }}
-            good = AND(good, LE(gap[0], {_LAST}));
-            if (s) {{
-                moving = CONST(0);
-                {" ".join(away if x.orientation is None else [])}
-                good = AND(good, {kept});
-            }}
-            else side = turn[0];
-            if (!ANY(AND(good, NOT(done)))) break;
-            for (i = 0; i < {model.nq}; ++i) begin[i] = at[i];
+    longest = FMIN(CONST(1), SQRT(CONST({reach!r}) / FMAX(way, CONST(1e-30))));
+    step = longest;
+    check[1] = CONST(0);
+    for (i = 0; i < {model.nq}; ++i) q_closed[i] = q[i];
+    for (n = 0; n < {_TRIES}; ++n) {{ /* the first closes the guess to rounding error */
+        for (i = 0; i < {model.nq}; ++i) at[i] = q_closed[i];
+        if (n) {{
+            aim = share + step;
+            aim = SELECT(LT(aim, CONST({1 - _LEAST_REST!r})), aim, CONST(1));
+            {" ".join(moves)}
         }}
-        good = AND(good, NOT(done));
+        good = LE(CONST(0), way);
+        worst = CONST(0);
+        before = CONST({reach!r});
+        for (k = 0; k < {_NEWTON_STEPS}; ++k) {{
+            {_call("continuing_step", ["at"], extra, "dv", "gap", "growth", "turn")}
+            length = CONST(0);
+            {" ".join(lengths)}
+            worst = FMAX(worst, growth[0]);
+            good = AND(good, OR(LT(gap[0], {_LAST}), LE(length, before)));
+            before = CONST({_CONTRACTION!r}) * length;
+            if (!ANY(AND(good, LT({_CLOSED}, gap[0])))) break;
+            {_call("integrate", ["at", "dv"], extra, "moved")}
+            for (i = 0; i < {model.nq}; ++i) at[i] = moved[i];
+            if (!ANY(LT({_LAST_OF_ALL}, gap[0]))) break;
+        }}
+        good = AND(good, LE(gap[0], {_LAST}));
+        if (n) {{
+            moving = CONST(0);
+            {" ".join(away if x.orientation is None else [])}
+            good = AND(AND(good, going), {kept});
+            share = SELECT(good, aim, share);
+            step = SELECT(good, SELECT(again, FMIN(longest, step + step), step),
+                          step * CONST(0.5));
+            again = good;
+        }}
+        else {{
+            side = turn[0];
+            going = good;
+        }}
         for (i = 0; i < {model.nq}; ++i) q_closed[i] = SELECT(good, at[i], q_closed[i]);
-        check[1] = SELECT(good, worst, check[1]);
-        done = OR(done, good);
-        if (!ANY(NOT(done))) break;
+        check[1] = SELECT(good, FMAX(check[1], worst), check[1]);
+        going = AND(going, AND(LT(CONST({_LEAST_REST!r}), CONST(1) - share),
+                               LE((CONST(1) - share) * CONST({1 / _PARTS!r}), step)));
+        if (!ANY(going)) break;
     }}
     #undef SQUARE
-    check[0] = SELECT(done, CONST(0), CONST(2));
+    check[0] = SELECT(LE(CONST(1), share), CONST(0), CONST(2));
 """
     outputs = (("q_closed", model.nq), ("check", 2))
     given = (("q", model.nq), ("given", model.nq), *extra)
