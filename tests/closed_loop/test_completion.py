@@ -81,7 +81,7 @@ def test_any_actuators_get_the_forces_of_the_null_space(planar: bool) -> None:
 def test_least_squares_and_factors_give_the_same_forces() -> None:
     """Passive velocities that meet all rows; units differ where joints slide."""
     errors, scaled = [], 0
-    for seed in range(120):
+    for seed in range(60):
         c = case(seed, effects=seed % 2 == 0)
         m = with_actuators(c, some_actuators(c, seed)[:2])
         m.inverse_dynamics(c.q, c.v, c.a)  # which chooses velocities
@@ -96,7 +96,7 @@ def test_least_squares_and_factors_give_the_same_forces() -> None:
         assert found[3] is not None and wanted[3] is not None
         size = np.linalg.norm(force)
         errors += [worst(*(one - other for one, other in zip(found, wanted, strict=True))) / size]
-    assert len(errors) > 15 and scaled > 5
+    assert len(errors) > 7 and scaled > 2
     assert worst(errors) < 1e-10
 
 

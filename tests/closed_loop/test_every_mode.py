@@ -337,6 +337,7 @@ def test_two_of_a_delta_are_level_where_three_spheres_meet() -> None:
     assert worst(np.abs([one[:2, 3] for one in level])) < 1e-9
 
 
+@pytest.mark.slow
 def test_modes_outside_limits_are_counted() -> None:
     mechanism = loaded("stewart")
     everywhere = mechanism.assembly_modes(method="all", within_limits=False)

@@ -18,6 +18,7 @@ from tests.closed_loop.random_mechanisms import Case, case, random_placement
 from tests.closed_loop.test_derivatives import check_forward, check_inverse
 from tests.codegen.engines import ALL, check
 from tests.codegen.test_compiled_random import compiled, motions
+from tests.quick import quick
 from tests.worst import worst
 
 Array = NDArray[np.float64]
@@ -92,7 +93,7 @@ def test_derivatives_at_offsets_are_those_of_central_differences(kind: str) -> N
     check_forward(c)
 
 
-@pytest.mark.parametrize("kind", ["spherical", "rigid", "universal"])
+@pytest.mark.parametrize("kind", quick(["spherical", "rigid", "universal"], ["universal"]))
 def test_generated_code_takes_offsets(kind: str) -> None:
     c = seen_from_elsewhere(case(1, kinds=[kind]))
     groups = tuple(g for g in ALL if g != "derivatives" or kind == "rigid")
