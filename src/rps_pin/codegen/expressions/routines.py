@@ -127,9 +127,9 @@ def _completed(functions: MechanismFunctions) -> Routine:
 
     A step that is taken after another one is twice as long. The way is given up where a step would
     be less than 1/64 of what is left of it. Steps also keep the sign of det A, A the closures'
-    Jacobian by the others: where it changes, a singularity lies between, and Newton's steps led into
-    another assembly mode. Where A is not square, |A^-1| times the motion in a step, which bounds the
-    change of A, must be at most a half.
+    Jacobian by the others: where it changes, a singularity lies between, and Newton's steps led
+    into another assembly mode. Where A is not square, |A^-1| times the motion in a step, which
+    bounds the change of A, must be at most a half.
     """
     x = functions.expressions
     model, extra = x.tree.model, _extra(functions, False)
