@@ -23,6 +23,7 @@ from rps_pin.rps.dynamics.motion_run import run_motion
 from rps_pin.rps.workspace import leg_grid, pose_grid, workspace
 from rps_pin.task import size_trajectory as size_of_task
 from rps_pin.task.design import DesignSpace, Dimension, Region, Requirements, design
+from rps_pin.task.stiffness import Compliances, StiffnessModel, stiffness_map
 from rps_pin.task.workspace import task_grid
 from rps_pin.task.workspace import workspace as workspace_of_task
 from rps_pin.trajectories import circle, point_to_point
@@ -171,6 +172,16 @@ def _plot_front() -> Figure:
     region = Region(box={"x": (-0.1, 0.1), "y": (-0.1, 0.1), "z": (-0.55, -0.45)}, points=3)
     asked, best = Requirements(region, min_conditioning=0.2), ["size", "conditioning"]
     return plots.plot_front(design(space, asked, best, candidates=400, seed=1))
+
+
+@shown("A Delta's least stiffness against a force, of its drives, over a plane")
+def _plot_stiffness_map() -> Figure:
+    delta = ClosedLoopModel.load("urdf/delta.yaml").task
+    drives = dict.fromkeys(delta.mechanism.actuated, 5e3)  # N m/rad
+    model = StiffnessModel(delta, Compliances(actuators=drives))
+    over = np.linspace(-0.2, 0.2, 13)
+    x = np.stack(np.meshgrid(over, over, [-0.5], indexing="ij"), axis=-1)[:, :, 0]
+    return plots.plot_stiffness_map(stiffness_map(model, x))
 
 
 @shown("Distance to a singularity over the tilt")

@@ -51,7 +51,7 @@ def test_axes_have_units_no_text_collides_and_matplotlib_is_left_as_it_was(
     assert figure.get_figwidth() in (plots.COLUMN, plots.PAGE)
     assert not faults(figure)
     unit = re.compile(
-        r"\((mm|m|N|s|rad|rad, m|µm|µrad|N m|rad/s|mm/s|m/s|J|1|°|degrees)\)|\(0 singular"
+        r"\((mm|m|N|s|rad|rad, m|µm|µrad|N m|rad/s|mm/s|m/s|J|N/µm|Hz|1|°|degrees)\)|\(0 singular"
     )
     for axes in figure.axes:
         if name == "plot_assembly_modes":  # of one scale, without axes

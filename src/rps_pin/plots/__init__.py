@@ -11,6 +11,7 @@ from rps_pin.plots.design import plot_front
 from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
 from rps_pin.plots.motion import plot_forces, plot_length_phase, plot_lengths, plot_path
 from rps_pin.plots.simulation import plot_simulation
+from rps_pin.plots.stiffness import plot_stiffness_map
 from rps_pin.plots.style import (
     COLOURS,
     COLUMN,
@@ -49,6 +50,7 @@ __all__ = [
     "plot_sizing",
     "plot_slices",
     "plot_space",
+    "plot_stiffness_map",
     "plot_theoretical",
     "plot_tilt_conditioning",
     "plot_tracking",

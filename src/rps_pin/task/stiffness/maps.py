@@ -1,0 +1,142 @@
+"""Stiffness and frequencies over a workspace."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rps_pin.arrays import Array, Bools
+from rps_pin.closed_loop.dynamics.wrenches import Wrenches
+from rps_pin.codegen.engine.batches import Errors
+from rps_pin.errors import ClosureError, InputError, SingularityError, UnreachableError
+from rps_pin.task.stiffness.model import StiffnessModel
+from rps_pin.validation import choice, numbers, refuse_not_finite, whole_number
+
+
+@dataclass(frozen=True, eq=False)
+class StiffnessMap:
+    """Stiffness and frequencies at poses of a task; NaN where there is none.
+
+    Attributes
+    ----------
+    coordinates : tuple of str
+        Of the task.
+    x : array
+        The poses, shape (..., m).
+    output : tuple of str
+        Names of the output's directions.
+    compliance : array
+        C at each, shape (..., p, p).
+    displacement : array
+        Under the loads, shape (..., p), m and rad.
+    frequencies : array
+        The lowest at each, shape (..., k), Hz.
+    """
+
+    coordinates: tuple[str, ...]
+    x: Array
+    output: tuple[str, ...]
+    compliance: Array
+    displacement: Array
+    frequencies: Array
+
+    @property
+    def reached(self) -> Bools:
+        """Where there is an equilibrium, shape (...)."""
+        return np.asarray(~np.isnan(self.displacement[..., 0]))
+
+    @property
+    def softest(self) -> Array:
+        """Least stiffness against a force in any direction, shape (...), N/m.
+
+        One over the largest eigenvalue of the compliance's part of shifts and forces; of a task of
+        joints one over the largest of the whole.
+        """
+        shifts = [k for k, name in enumerate(self.output) if name in ("x", "y", "z")]
+        part = self.compliance[..., shifts, :][..., shifts] if shifts else self.compliance
+        found = np.full(self.x.shape[:-1], np.nan)
+        some = self.reached
+        found[some] = 1 / np.linalg.eigvalsh(part[some])[..., -1]
+        return found
+
+    def summary(self) -> str:
+        """Return the least and largest stiffness and frequency, in a line each."""
+        some = self.reached
+        lines = [f"{int(some.sum())} of {some.size} poses"]
+        if some.any():
+            for name, unit, values in (
+                ("least stiffness", "N/m", self.softest[some]),
+                ("lowest frequency", "Hz", self.frequencies[some][:, 0]),
+            ):
+                lines.append(f"{name}: {values.min():.4g} to {values.max():.4g} {unit}")
+        return "\n".join(lines)
+
+
+def stiffness_map(
+    model: StiffnessModel,
+    x: ArrayLike,
+    wrench: ArrayLike | None = None,
+    *,
+    wrenches: Wrenches | None = None,
+    frequencies: int = 3,
+    errors: Errors = "mask",
+    progress: Callable[[Iterable[int]], Iterable[int]] = iter,
+) -> StiffnessMap:
+    """Return stiffness and frequencies at poses of a task, in the assembly mode of home.
+
+    Parameters
+    ----------
+    model
+        The mechanism and what gives way.
+    x
+        Task coordinates, shape (..., m).
+    wrench, wrenches
+        As for `StiffnessModel.deflection`: the same at all poses.
+    frequencies
+        How many are kept, the lowest.
+    errors
+        ``"mask"``: poses that are not reached, singular, or without a stable equilibrium are NaN;
+        ``"raise"``: the first one's error.
+    progress
+        Wraps the loop over the poses, for a progress bar.
+
+    Raises
+    ------
+    InputError
+        If an array does not fit.
+    RPSPinError
+        As `StiffnessModel.deflection`, with ``errors="raise"``.
+    """
+    choice(errors, "errors", ("raise", "mask"))
+    count, m, p = whole_number(frequencies, "frequencies"), model.task.size, len(model.output)
+    poses = numbers(x, "x", f"numbers of shape (..., {m})")
+    if poses.shape[-1:] != (m,):
+        raise InputError(f"x has shape {poses.shape}; expected (..., {m})")
+    refuse_not_finite(poses, "x")
+    flat = poses.reshape(-1, m)
+    C = np.full((len(flat), p, p), np.nan)
+    moved, lowest = np.full((len(flat), p), np.nan), np.full((len(flat), count), np.nan)
+    options: dict[str, Any] = {"wrenches": wrenches}
+    for k in progress(range(len(flat))):
+        try:
+            found = model.at(flat[k], wrench, **options)
+        except (ClosureError, SingularityError, UnreachableError):
+            if errors == "raise":
+                raise
+            continue
+        C[k], moved[k] = found.compliance, found.displacement
+        some = found.frequencies[:count]
+        lowest[k, : some.size] = some
+    batch = poses.shape[:-1]
+    return StiffnessMap(
+        model.task.coordinates,
+        poses,
+        model.output,
+        C.reshape(*batch, p, p),
+        moved.reshape(*batch, p),
+        lowest.reshape(*batch, count),
+    )
