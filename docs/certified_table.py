@@ -23,6 +23,7 @@ PAGE = DOCS / "workspaces.md"
 BOXES: dict[str, tuple[Any, Any, dict[str, Any]]] = {
     "micro": ((0.19, -0.3, -0.3), (0.26, 0.3, 0.3), {"undecided": 0.01}),
     "stewart": ((-0.4, -0.4, 0.35, 0, 0, 0), (0.4, 0.4, 1.05, 0, 0, 0), {"undecided": 0.05}),
+    "delta": ((-0.25, -0.25, -0.7), (0.25, 0.25, -0.4), {"undecided": 0.05}),
     "five_bar": ((-0.8, -0.8), (1.2, 0.8), {"undecided": 0.1}),
 }
 

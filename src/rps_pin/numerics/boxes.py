@@ -61,6 +61,17 @@ class CertifiedBoxes:
     parts: Array
     """Shares of each undecided box that are proven inside and outside, by planes, shape (n, 2)."""
 
+    def __repr__(self) -> str:
+        counts = (len(self.inside), len(self.outside), len(self.undecided))
+        whole = sum(self.volumes)
+        told = ", ".join(
+            f"{name} {share / whole:.3%} ({count:,} boxes)"
+            for name, share, count in zip(
+                ("inside", "outside", "undecided"), self.volumes, counts, strict=True
+            )
+        )
+        return f"<CertifiedBoxes {self.lower.tolist()} to {self.upper.tolist()}: {told}>"
+
     @property
     def inside(self) -> Array:
         """Boxes proven inside, shape (n, 2, m): their least and greatest coordinates."""
