@@ -24,6 +24,7 @@ from rps_pin.rps.workspace import leg_grid, pose_grid, workspace
 from rps_pin.task import size_trajectory as size_of_task
 from rps_pin.task.design import DesignSpace, Dimension, Region, Requirements, design
 from rps_pin.task.stiffness import Compliances, StiffnessModel, stiffness_map
+from rps_pin.task.tolerances import tolerance
 from rps_pin.task.workspace import task_grid
 from rps_pin.task.workspace import workspace as workspace_of_task
 from rps_pin.trajectories import circle, point_to_point
@@ -182,6 +183,29 @@ def _plot_stiffness_map() -> Figure:
     over = np.linspace(-0.2, 0.2, 13)
     x = np.stack(np.meshgrid(over, over, [-0.5], indexing="ij"), axis=-1)[:, :, 0]
     return plots.plot_stiffness_map(stiffness_map(model, x))
+
+
+@shown("Tolerances of a 3-RPS: which of them the errors of its pose come from")
+def _plot_tolerance_shares() -> Figure:
+    drawing = {
+        "placement:leg_*_revolute.[xyz]": "0.05 mm",
+        "placement:leg_*_revolute.??*": "0.2 mrad",
+        "offset:*": "0.01 mm",
+    }
+    return plots.plot_tolerance_shares(tolerance(sokolov, drawing, [0.4, 0.1, 0.0]))
+
+
+@shown("Errors of a five-bar's tip over its workspace, by tolerances of lengths and encoders")
+def _plot_tolerance_map() -> Figure:
+    task = ClosedLoopModel.load("urdf/five_bar.yaml").task.compile()
+    axes = {"x": np.linspace(-0.3, 0.7, 81), "z": np.linspace(0.2, 0.7, 41)}
+    inside = workspace_of_task(task, task_grid(task, axes))
+    drawing = {
+        "placement:*joint.[xz]": "0.05 mm",
+        "closure:tips.?.x": "0.05 mm",
+        "offset:*": "0.2 mrad",
+    }
+    return plots.plot_tolerance_map(tolerance(task, drawing, inside))
 
 
 @shown("Distance to a singularity over the tilt")

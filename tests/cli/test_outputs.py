@@ -238,6 +238,10 @@ EVERY = {
     "reproduce": ["reproduce", "--quick", "-o"],
     "export c": ["export", "c", "four_bar", "-o"],
     "design": ["design", str(ROOT / "examples" / "design" / "micro_motion.yaml"), "-o"],
+    "tolerance": [
+        *("tolerance", str(ROOT / "examples" / "tolerances" / "five_bar.yaml")),
+        *("-m", "five_bar", "-o"),
+    ],
     "png": ["view", "--png"],
     "video": ["view", "--video"],
 }

@@ -9,6 +9,7 @@ from rps_pin.plots.conditioning import plot_height_conditioning, plot_tilt_condi
 from rps_pin.plots.control import plot_loop_forces, plot_tracking
 from rps_pin.plots.design import plot_front
 from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
+from rps_pin.plots.machine.tolerances import plot_tolerance_map, plot_tolerance_shares
 from rps_pin.plots.motion import plot_forces, plot_length_phase, plot_lengths, plot_path
 from rps_pin.plots.simulation import plot_simulation
 from rps_pin.plots.stiffness import plot_stiffness_map
@@ -53,6 +54,8 @@ __all__ = [
     "plot_stiffness_map",
     "plot_theoretical",
     "plot_tilt_conditioning",
+    "plot_tolerance_map",
+    "plot_tolerance_shares",
     "plot_tracking",
     "plot_views",
     "save_figure",

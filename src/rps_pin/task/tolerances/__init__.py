@@ -11,7 +11,7 @@ from rps_pin.task.tolerances.compute import names, tolerance
 from rps_pin.task.tolerances.monte_carlo import MonteCarlo, monte_carlo
 from rps_pin.task.tolerances.sobol import SobolIndices, sobol
 from rps_pin.task.tolerances.specification import Tolerance, load_tolerances, tolerances
-from rps_pin.task.tolerances.table import table_text, write_table
+from rps_pin.task.tolerances.table import table_text, write_indices, write_poses, write_table
 
 __all__ = [
     "MonteCarlo",
@@ -26,5 +26,7 @@ __all__ = [
     "table_text",
     "tolerance",
     "tolerances",
+    "write_indices",
+    "write_poses",
     "write_table",
 ]

@@ -82,11 +82,7 @@ def tolerance(
     opens = slopes.opening > _CLOSED
     out = tuple(label for label, one in zip(found.labels, opens, strict=True) if one)
     if out and opening == "raise":
-        raise InputError(
-            f"errors of {few(out, 8)} open loops, as closures are redundant: what they do to the "
-            "pose, rigid links cannot tell. Give the joint that lets the machine assemble "
-            "(a spherical one in place of a revolute one), or opening='leave out'"
-        )
+        raise InputError(opening_told(out, "opening='leave out' does without them"))
     if opens.all():
         raise InputError("errors of all of these numbers open loops")
     kept = found.of(~opens)
@@ -116,6 +112,15 @@ def names(of: Any, *, held: Sequence[str] | None = None) -> dict[str, str]:
           reading.
     """
     return dict(output_of(task_of(of), None, held).kinds)
+
+
+def opening_told(numbers: Sequence[str], remedy: str) -> str:
+    """Return why errors of some numbers are refused, and what to do."""
+    return (
+        f"errors of {few(numbers, 8)} open loops, as closures are redundant: what they do to the "
+        "pose, rigid links cannot tell. Give the mechanism the joint that lets it be assembled (a "
+        f"ball in place of a hinge); {remedy}"
+    )
 
 
 def task_of(of: Any) -> Task:

@@ -13,6 +13,7 @@ from rps_pin.arrays import Array
 from rps_pin.files import write_text
 from rps_pin.plain_text import plain
 from rps_pin.task.tolerances.analysis import SHOWN_PART, Part, ToleranceAnalysis
+from rps_pin.task.tolerances.sobol import SobolIndices
 
 #: Units of a workshop, by kind: name and factor from SI.
 _SHOWN = {"length": ("mm", 1e3), "angle": ("mrad", 1e3), "ratio": ("ppm", 1e6)}
@@ -100,6 +101,35 @@ def heads_as_rows(heads: Sequence[tuple[str, str]]) -> list[list[str]]:
 def write_table(found: ToleranceAnalysis, path: str | os.PathLike[str]) -> None:
     """Write the table as CSV, units in the names of the columns."""
     columns, table = rows(found)
+    _write(path, columns, table)
+
+
+def write_poses(found: ToleranceAnalysis, path: str | os.PathLike[str]) -> None:
+    """Write the poses with the errors of each coordinate as CSV: 3 sigma, and the largest ones."""
+    task, units = found.model.task, ("m", "rad")
+    columns = [
+        f"{n}_{units[turns]}" for n, turns in zip(task.coordinates, task.angular, strict=True)
+    ]
+    for what in ("three_sigma", "worst"):
+        each = zip(found.coordinates, found.model.angular, strict=True)
+        columns += [f"{name}_{what}_{units[int(turns)]}" for name, turns in each]
+    values = np.hstack([found.poses.x, 3 * found.deviations, found.worst])
+    _write(path, columns, values.tolist())
+
+
+def write_indices(found: SobolIndices, path: str | os.PathLike[str]) -> None:
+    """Write Sobol indices as CSV, the largest total first."""
+    columns = ("number", "first", "first_half_width", "total", "total_half_width")
+    values = np.stack([found.first, found.first_bounds, found.total, found.total_bounds], axis=1)
+    order = np.argsort(-found.total, kind="stable")
+    _write(path, columns, [(found.labels[k], *values[k].tolist()) for k in order])
+
+
+def _write(
+    path: str | os.PathLike[str],
+    columns: Sequence[str],
+    table: Sequence[Sequence[str | float]],
+) -> None:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)

@@ -1,0 +1,1 @@
+"""Figures of a machine as it is built."""
