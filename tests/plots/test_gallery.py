@@ -19,7 +19,7 @@ NAMES = [name for name in plots.__all__ if name.startswith("plot_")]
 #: Those of the page: all of these, and more of some.
 SHOWN = re.findall(r"images/gallery/(\w+)\.png", (DOCS / "gallery.md").read_text("utf-8"))
 #: Axes that count, or name things.
-WITHOUT_UNIT = {"status"}
+WITHOUT_UNIT = {"number", "status"}
 
 
 @pytest.fixture(scope="module")

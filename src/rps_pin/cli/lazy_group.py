@@ -21,6 +21,11 @@ SETTINGS: dict[str, Any] = {
     "pretty_exceptions_enable": False,
     "context_settings": {"help_option_names": ["-h", "--help"]},
 }
+#: Help of Typer's own options in one line each, so that all commands fit a screen.
+_SHORT = {
+    "install_completion": "Install completion for the shell.",
+    "show_completion": "Show completion for the shell.",
+}
 
 
 class LazyGroup(TyperGroup):
@@ -38,6 +43,13 @@ class LazyGroup(TyperGroup):
 
         command.stands_for = name  # type: ignore[attr-defined]
         return command
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the options; those of completion, which Typer adds, with help of one line."""
+        params: list[Any] = super().get_params(ctx)
+        for one in params:
+            one.help = _SHORT.get(one.name, one.help)
+        return params
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find a command by its name, and import it if it has not been."""

@@ -68,6 +68,7 @@ def plot_tolerance_shares(
     label = f"{name}, 3 sigma ({_UNITS[name]})\ndashed: all together"
     axes.set(xlim=(0, 1.08 * max(whole, *bars)), xlabel=label)
     axes.set_yticks(places, labels)
+    axes.set_ylabel("number")
     axes.invert_yaxis()
     axes.grid(visible=False, axis="y")
     axes.tick_params(axis="y", length=0)
