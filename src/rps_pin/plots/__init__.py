@@ -9,10 +9,10 @@ from rps_pin.plots.conditioning import plot_height_conditioning, plot_tilt_condi
 from rps_pin.plots.control import plot_loop_forces, plot_tracking
 from rps_pin.plots.design import plot_front
 from rps_pin.plots.dynamics import plot_force_causes, plot_sizing
+from rps_pin.plots.machine.stiffness import plot_stiffness_map
 from rps_pin.plots.machine.tolerances import plot_tolerance_map, plot_tolerance_shares
 from rps_pin.plots.motion import plot_forces, plot_length_phase, plot_lengths, plot_path
 from rps_pin.plots.simulation import plot_simulation
-from rps_pin.plots.stiffness import plot_stiffness_map
 from rps_pin.plots.style import (
     COLOURS,
     COLUMN,
