@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from rps_pin import ClosedLoopModel, ClosureError, InputError, Task
+from rps_pin.cli.app import app
 from rps_pin.task.stiffness import (
     Beam,
     Compliances,
@@ -139,3 +142,24 @@ def test_a_map_has_what_each_pose_has() -> None:
     assert "3 of 4 poses" in found.summary()
     with pytest.raises(ClosureError):
         stiffness_map(model, x, load, errors="raise")
+
+
+def test_the_command_prints_what_the_model_has(tmp_path: Path) -> None:
+    path = written(tmp_path, FILE)
+    load = ["0", "50", "-100", "0", "0", "1"]
+    words = ["stiffness", str(path), "-m", "four_bar", "--frame", "coupler_tip", "--wrench", *load]
+    run = CliRunner().invoke(app, [*words, "--json"])
+    assert run.exit_code == 0, run.output
+    told = json.loads(run.stdout)
+    model = StiffnessModel(
+        four_bar(), load_compliances(path, four_bar().mechanism), frame="coupler_tip"
+    )
+    found = model.deflection(four_bar().mechanism.home, [float(one) for one in load])
+    assert told["displacement"] == pytest.approx(found.displacement.tolist())
+    assert told["compliance"] == pytest.approx(found.compliance.tolist())
+    knee = told["closures"]["knee"]
+    assert list(knee.values()) == pytest.approx(found.closure_wrenches["knee"].tolist())
+    assert told["frequencies_Hz"] == pytest.approx(found.frequencies.tolist())
+    table = CliRunner().invoke(app, words).stdout
+    for name in (*found.output, "crank_joint", "knee", "Frequencies"):
+        assert name in table

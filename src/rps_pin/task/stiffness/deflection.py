@@ -28,6 +28,8 @@ class Deflection:
     ----------
     output : tuple of str
         Names of the output's directions.
+    angular : tuple of bool
+        Which of them are turns.
     displacement : array
         Of the output from its nominal place, shape (p,): shift (m) and rotation vector (rad) of a
         frame in world axes, or joints' positions.
@@ -62,6 +64,7 @@ class Deflection:
     """
 
     output: tuple[str, ...]
+    angular: tuple[bool, ...]
     displacement: Array
     compliance: Array
     springs: tuple[str, ...]
@@ -88,9 +91,7 @@ class Deflection:
         SingularityError
             If the output cannot move in some direction: there its stiffness is infinite.
         """
-        scale = np.array(
-            [self.length if name in ("rx", "ry", "rz") else 1.0 for name in self.output]
-        )
+        scale = np.where(self.angular, self.length, 1.0)
         values, vectors = np.linalg.eigh(self.compliance * np.outer(scale, scale))
         if values[0] <= _RIGID * values[-1]:
             parts = np.abs(vectors[:, 0])
@@ -125,6 +126,7 @@ def deflection_of(model: ElasticMechanism, q0: Array, tangent: Tangent, loads: L
     driven |= dict(zip(model.springs[:count], (-forces[:count]).tolist(), strict=True))
     return Deflection(
         model.output,
+        model.angular,
         model.output_motion(tangent.q, q0),
         tangent.compliance(A),
         model.springs,

@@ -52,6 +52,8 @@ class ElasticMechanism:
         )
         self.system.equations.accept(rigid.equations.open_limit)
         self.output = DIRECTIONS if output else task.coordinates
+        turns = tuple(name.startswith("r") for name in DIRECTIONS)
+        self.angular = turns if output else task.angular
         driven = dict(compliances.actuators)
         actuated = dict(zip(mechanism.actuated, self.system.actuated, strict=True))
         of_springs = [actuated[one] for one in driven], tree.spring_v

@@ -47,6 +47,8 @@ class StiffnessModel(ElasticMechanism):
         Its equations.
     output : tuple of str
         Names of the output's directions: ``x`` to ``rz`` of a frame (world axes), or joints.
+    angular : tuple of bool
+        Which of them are turns.
     springs : tuple of str
         Names of the springs, actuators first: ``leg``, ``hinge.x``, ``knee.ry``, ``arm[2].rz``.
     stiffness : array
