@@ -159,7 +159,8 @@ def test_the_command_prints_what_the_model_has(tmp_path: Path) -> None:
     assert np.allclose(told["compliance"], found.compliance, rtol=1e-9, atol=0.0)
     knee = told["closures"]["knee"]
     assert list(knee.values()) == pytest.approx(found.closure_wrenches["knee"].tolist())
-    assert told["frequencies_Hz"] == pytest.approx(found.frequencies.tolist())
+    finite = found.frequencies[np.isfinite(found.frequencies)]
+    assert told["frequencies_Hz"] == pytest.approx(finite.tolist())
     table = CliRunner().invoke(app, words).stdout
     for name in (*found.output, "crank_joint", "knee", "Frequencies"):
         assert name in table

@@ -51,7 +51,8 @@ class Deflection:
         Closures whose wrench the springs do not determine: rigid parts are held more than once. The
         smallest is returned.
     frequencies : array
-        Of free vibrations about the equilibrium, Hz, smallest first; actuators' positions held.
+        Of free vibrations about the equilibrium, Hz, smallest first; commanded positions held. inf
+        for motions without mass.
     modes : array
         How the output moves in each, shape (p, k), as a share of the largest motion of a joint or
         spring (m or rad).
