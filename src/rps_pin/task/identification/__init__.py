@@ -5,7 +5,11 @@ base parameters with their covariance, and physically possible parameters beside
 """
 
 from rps_pin.task.identification.base import BaseParameters
+from rps_pin.task.identification.description import write_identified
+from rps_pin.task.identification.excitation import ExcitingMotion, exciting_motion
+from rps_pin.task.identification.fourier import FourierMotion
 from rps_pin.task.identification.log import Log, force_log
+from rps_pin.task.identification.log_file import read_log
 from rps_pin.task.identification.model import DynamicsModel, States
 from rps_pin.task.identification.physical import Possible
 from rps_pin.task.identification.result import Identification, Prediction, with_parameters
@@ -14,12 +18,17 @@ from rps_pin.task.identification.solve import identify
 __all__ = [
     "BaseParameters",
     "DynamicsModel",
+    "ExcitingMotion",
+    "FourierMotion",
     "Identification",
     "Log",
     "Possible",
     "Prediction",
     "States",
+    "exciting_motion",
     "force_log",
     "identify",
+    "read_log",
     "with_parameters",
+    "write_identified",
 ]

@@ -209,15 +209,18 @@ class DynamicsModel:
             size * unit * rng.uniform(-1, 1, (count, task.size))
             for size in (_SPREAD, _RATE, _ACCELERATION)
         )
-        x += task.home
+        return self.states_of_task(task.home + x, rate, acceleration)
+
+    def states_of_task(self, x: Array, rate: Array, acceleration: Array) -> States:
+        """Return the states of task coordinates (n, m) that are reached from home, and regular."""
+        task = self.task
         q = task.configuration(x, within_limits=False, errors="mask")
         known = np.isfinite(q).all(axis=1)
         q, v, a = task.motion(q[known], rate[known], acceleration[known], x=x[known], errors="mask")
         basis = self._engine.motion_basis(q, errors="mask")
         found = (q, v, a, basis)
-        regular = np.all(
-            [np.isfinite(one.reshape(len(q), -1)).all(axis=1) for one in found], axis=0
-        )
+        finite = [np.isfinite(one.reshape(len(q), -1)).all(axis=1) for one in found]
+        regular = np.all(finite, axis=0)
         return States(*(one[regular] for one in found))
 
     @cached_property
