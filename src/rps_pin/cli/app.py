@@ -35,6 +35,7 @@ for _panel, _name, _line in (
     (_ANY, "calibrate", "Lengths and offsets from readings."),
     (_ANY, "tolerance", "Errors of the pose from tolerances."),
     (_ANY, "stiffness", "Deflection, stiffness and frequencies."),
+    (_ANY, "identify", "Masses and friction from logs of forces."),
     (_ANY, "check", "Singularities and limits along a path."),
     (_ANY, "control", "A control loop on a simulated robot."),
     (_ANY, "describe", "Joints, closures, rank, mobility, actuation."),

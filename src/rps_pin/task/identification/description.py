@@ -73,12 +73,14 @@ def write_identified(
 
 
 def changes_in_words(found: Identification) -> dict[str, str]:
-    """Return what changed, by group (``inertia:JOINT``, ``damping:JOINT``): what it is and was."""
+    """Return what changed, by group (``inertia:JOINT``, ``damping:JOINT``), in words."""
     told: dict[str, list[str]] = {}
     assert found.possible is not None
     for label, before, after in zip(
         found.model.labels, found.model.nominal, found.possible.parameters, strict=True
     ):
+        if short(after) == short(before):
+            continue
         kind, _, name = label.partition(":")
         group, part = (label.rpartition(".")[::2]) if kind == "inertia" else (label, name)
         told.setdefault(group, []).append(f"{part} {short(after)}, was {short(before)}")

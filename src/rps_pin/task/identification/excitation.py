@@ -124,8 +124,8 @@ def exciting_motion(
     best, lowest = search.random(rng), np.inf
     for _ in progress(range(whole_number(starts, "starts"))):
         shape = search.random(rng)
-        if (found := search.cost(shape)) < lowest:
-            best, lowest = shape, found
+        if (cost := search.cost(shape)) < lowest:
+            best, lowest = shape, cost
     begun = search.measures(search.motion(best))
     found = minimize(
         search.cost,
@@ -220,7 +220,7 @@ class _Search:
 
     def _excess(self, motion: FourierMotion, states: States, tau: Array) -> float:
         """Return the sum of squares by which limits are left, over the limits."""
-        model, actuated = self.model, self.model.mechanism.actuated_indices
+        actuated = self.model.mechanism.actuated_indices
         away = np.abs(motion.sample(self.times).pose - self.start) / self.amplitude
         forces = np.abs(tau) / (_ROOM * self.force)
         speeds = np.abs(states.v[:, actuated]) / (_ROOM * self.speed)

@@ -65,6 +65,6 @@ class FourierMotion:
 
 
 def free_coefficients(harmonics: int) -> tuple[Array, Array]:
-    """Return bases of the c_k and of the s_k that start at rest, (harmonics, harmonics - 1) each."""
+    """Return bases of the c_k, and of the s_k, that start at rest, (harmonics, harmonics - 1)."""
     k = np.arange(1, harmonics + 1)[None].astype(np.float64)
     return null_space(k**2 / np.linalg.norm(k**2)), null_space(k / np.linalg.norm(k))
