@@ -152,7 +152,8 @@ def test_an_exciting_motion_keeps_limits_and_tells_more() -> None:
     base = rows[..., model.base.independent].reshape(-1, model.believed.size)
     assert 0.3 < condition_of(base) / found.condition < 3
     same = exciting_motion(model, iterations=2, period=4.0, seed=1, **options)
-    assert np.array_equal(same.trajectory.sines, found.trajectory.sines)
+    # To rounding, which differences of the search make larger.
+    assert worst(same.trajectory.sines - found.trajectory.sines) < 1e-5 * 0.06
     with pytest.raises(InputError, match="amplitude = 0"):
         exciting_motion(model, amplitude=0.0)
     with pytest.raises(InputError, match="start = "):
