@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import warnings
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +14,7 @@ import pytest
 
 from rps_pin import ClosedLoopModel, InputError, MechanismError, RPSRobot, Task, UnreachableError
 from rps_pin.arrays import Array
+from rps_pin.errors import AccuracyWarning
 from rps_pin.task.tolerances import (
     ToleranceAnalysis,
     load_tolerances,
@@ -256,6 +259,7 @@ def test_first_order_is_enough_at_the_tolerances_of_a_workshop(of: Any) -> None:
     found = of()
     machines = monte_carlo(found, 2000)
     assert machines.failures == 0
+    assert not machines.doubts
     for part in found.parts:
         assert abs(machines.ratio(part.name) - 1) < 0.05
         assert 0 < machines.remainder(part.name) < 0.01
@@ -328,6 +332,11 @@ def test_machines_that_cannot_be_closed_are_counted() -> None:
     machines = monte_carlo(found, 300)
     assert 50 < machines.failures < 200
     assert np.isnan(machines.errors[~machines.reached]).all()
+    assert np.isfinite(machines.errors[machines.reached]).all()
+    assert 0 < machines.spread("position") < 0.2
+    too_large, lost = machines.doubts
+    assert "take those of the machines" in too_large
+    assert f"{machines.failures} of 300 machines cannot be closed" in lost
     with pytest.raises(UnreachableError, match="machines do not reach"):
         sobol(found, samples=16)
 
@@ -350,6 +359,24 @@ def test_errors_that_open_loops_are_refused_or_named() -> None:
     assert "would open loops" in table_text(found)
     with pytest.raises(InputError, match="all of these numbers open loops"):
         tolerance(task, {"placement:*joint.y": 1e-3, "closure:tips.?.y": 1e-3}, opening="leave out")
+
+
+def test_a_file_with_rounded_numbers(tmp_path: Path) -> None:
+    """An axis that is off by 2e-5 rad: what opens loops is told from that, and nothing else."""
+    text = Path("urdf/five_bar.urdf").read_text()
+    place = '<origin xyz="0.4 0 0"/>'
+    assert place in text
+    rounded = text.replace(place, '<origin xyz="0.4 0 0" rpy="1e-5 0 2e-5"/>')
+    (tmp_path / "five_bar.urdf").write_text(rounded)
+    shutil.copy("urdf/five_bar.yaml", tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyWarning)
+        model = ClosedLoopModel.load(tmp_path / "five_bar.yaml")
+        given = {"placement:*joint.?": "0.05 mm", "closure:tips.?.x": "0.05 mm"}
+        found = tolerance(model, given, POSES, opening="leave out")
+    assert [one.rpartition(".")[2] for one in found.left_out] == ["y"] * 4
+    at = [five_bar().labels.index(label) for label in found.labels]
+    assert worst(found.slopes - five_bar().slopes[..., at]) < 1e-4
 
 
 def test_numbers_that_change_nothing_are_named() -> None:

@@ -169,9 +169,7 @@ def _told(found: of_tasks.ToleranceAnalysis, exact: of_tasks.MonteCarlo | None) 
         f"{exact.remainder(part.name):.2%} of it"
         for part in found.parts
     ]
-    if exact.failures:
-        lines.append(f"{exact.failures} of them cannot be closed at all poses")
-    return lines
+    return [*lines, *(f"note: {one}" for one in exact.doubts)]
 
 
 def _summary(

@@ -18,7 +18,8 @@ from rps_pin.validation import choice
 
 Given = Mapping[str, Any] | Sequence[Tolerance] | str | os.PathLike[str]
 
-#: How far a unit of a number may open loops, as a part of it, by rounding errors.
+#: How far a unit of a number may open loops, as a part of it, by rounding errors; those of a file
+#: may be larger, as the rule of its rank says.
 _CLOSED = 1e-6
 
 
@@ -79,7 +80,8 @@ def tolerance(
     at = poses_of(task, poses)
     nominal = model.nominal(at.q, at.x)
     slopes = model.slopes(nominal)
-    opens = slopes.opening > _CLOSED
+    rule = output.extension.mechanism.system.rule
+    opens = slopes.opening > (max(_CLOSED, rule.tolerance) if rule.rounding else _CLOSED)
     out = tuple(label for label, one in zip(found.labels, opens, strict=True) if one)
     if out and opening == "raise":
         raise InputError(opening_told(out, "opening='leave out' does without them"))

@@ -27,7 +27,8 @@ from rps_pin.task.task import Task
 
 _TURNS = ("roll", "pitch", "yaw")
 _GEOMETRY = ("placement", "closure", "distance")
-_SENSORS = ("offset", "scale")
+#: In which errors grow, of machines that are not closed at once.
+_STEPS = 10
 
 
 class Nominal(NamedTuple):
@@ -260,12 +261,31 @@ class ToleranceModel:
             actuators[:, :, actuator] += errors[:, None, k] * by
         own = self._own(errors)
         rows = machines * poses
-        q = np.tile(at.q, (machines, 1))
+        start = np.tile(at.q, (machines, 1)), np.tile(at.actuators, (machines, 1))
         wanted = actuators.reshape(rows, -1)
         each = None if own is None else np.repeat(own, poses, axis=0)
-        q, reached = self.engine.continued(wanted, q, each)
+        q, reached = self.engine.continued(wanted, start[0], each)
+        missed = ~reached
+        if missed.any():
+            from_ = start[0][missed], start[1][missed]
+            to = wanted[missed], None if each is None else each[missed]
+            q[missed], reached[missed] = self._by_steps(from_, to)
         x = np.where(reached[:, None], q[:, self._x], np.nan)
         return x.reshape(machines, poses, -1), reached.reshape(machines, poses)
+
+    def _by_steps(
+        self, start: tuple[Array, Array], to: tuple[Array, Array | None]
+    ) -> tuple[Array, Bools]:
+        """Return configurations (r, nq) of machines whose errors grow in steps, as `continued`."""
+        (q, actuators), (wanted, own) = start, to
+        nominal = self._model.nominal
+        reached = np.ones(len(q), dtype=bool)
+        for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
+            now = None if own is None else nominal + part * (own - nominal)
+            found, ok = self.engine.continued(actuators + part * (wanted - actuators), q, now)
+            reached &= ok
+            q = np.where(reached[:, None], found, q)
+        return q, reached
 
     def _own(self, errors: Array) -> Any:
         """Return parameters of generated code, (s, ...), of errors (s, p); None without any."""

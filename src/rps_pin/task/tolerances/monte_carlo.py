@@ -14,11 +14,17 @@ from rps_pin.task.tolerances.analysis import ToleranceAnalysis
 from rps_pin.task.tolerances.draws import Progress, errors_of, poses_of_machines
 from rps_pin.validation import numbers, whole_number
 
+#: What first order may leave of errors.
+_ENOUGH = 0.05
+
 
 @refuses_other_kinds
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
-    """Errors of s machines at n poses: the same numbers of a machine are wrong at all of them."""
+    """Errors of s machines at n poses: the same numbers of a machine are wrong at all of them.
+
+    Means and deviations are of the machines that reach a pose; see `failures`.
+    """
 
     analysis: ToleranceAnalysis
     """What they are compared with."""
@@ -86,10 +92,25 @@ class MonteCarlo:
         off = (self.errors - self.linear)[..., columns]
         return float(np.sqrt(np.nanmean((off**2).sum(axis=-1)))) / self.rms(part)
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What a reader should know of, in sentences."""
+        found = [
+            f"first order leaves {left:.1%} of errors of {part.name}: take those of the machines"
+            for part in self.analysis.parts
+            if (left := self.remainder(part.name)) > _ENOUGH
+        ]
+        if self.failures:
+            found.append(
+                f"{self.failures} of {len(self.numbers)} machines cannot be closed at all poses; "
+                "errors are those of the others"
+            )
+        return tuple(found)
+
     def spread(self, part: str) -> float:
         """Return the standard deviation of `ratio` from the number of machines."""
-        squares = np.nanmean(self.sizes(part) ** 2, axis=1)
-        good = squares[np.isfinite(squares)]
+        some = self.reached.any(axis=1)
+        good = np.nanmean(self.sizes(part)[some] ** 2, axis=1)
         deviation = np.std(good) / np.sqrt(good.size)
         return float(deviation / (2 * np.mean(good)) * self.ratio(part))
 
