@@ -12,10 +12,18 @@ import pytest
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from rps_pin import ClosedLoopModel, InputError, JointEffects, SingularityError, Task
+from rps_pin import (
+    ClosedLoopModel,
+    InputError,
+    JointEffects,
+    LoopClosure,
+    SingularityError,
+    Task,
+)
 from rps_pin.arrays import Array
 from rps_pin.errors import MechanismError
 from rps_pin.task.stiffness import Beam, Compliances, Deflection, Material, Section, StiffnessModel
+from rps_pin.task.stiffness.compliances import DIRECTIONS
 from tests.task import robots
 from tests.task.frame_elements import Frame
 from tests.worst import worst
@@ -111,6 +119,54 @@ def test_weight_vibration_and_buckling_converge_with_the_segments() -> None:
     coarse, fine = np.abs(errors)
     assert (fine < [3e-3, 1e-3, 0.1]).all()
     assert np.allclose(coarse / fine, 4.0, rtol=0.2)
+
+
+# Bearings -----------------------------------------------------------------------------------------
+
+
+def test_bearings_in_a_row_add_their_compliances() -> None:
+    """A drive, its slide's bearing, and that of a closure whose frame b is turned."""
+    rng = np.random.default_rng(5)
+    pin.seed(5)
+    errors = []
+    for _ in range(5):
+        slide, foot, tip = (pin.SE3.Random() for _ in range(3))
+        model = pin.Model()
+        first = model.addJoint(0, pin.JointModelPX(), slide, "slide")
+        second = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
+        kind = pin.FrameType.OP_FRAME
+        mount = pin.SE3.Random()
+        model.addFrame(pin.Frame("mount", first, 0, mount, kind))
+        model.addFrame(pin.Frame("foot", second, 0, foot, kind))
+        model.addFrame(pin.Frame("tip", second, 0, tip, kind))
+        closure = LoopClosure("mount", "foot", "rigid", name="weld")
+        start = pin.neutral(model)
+        start[1:] = pin.SE3ToXYZQUAT(slide * mount * foot.inverse())
+        mechanism = ClosedLoopModel(model, [closure], ["slide"], home=start)
+        axis = "xyz"[int(np.argmax(np.abs(slide.rotation[:, 0])))]
+        k, joint, weld = 10 ** rng.uniform(4, 6), *10 ** rng.uniform(4, 6, (2, 6))
+        given = Compliances(
+            actuators={"slide": k},
+            joints={"slide": dict(zip(DIRECTIONS[1:], joint[1:], strict=True))},
+            closures={"weld": dict(zip(DIRECTIONS, weld, strict=True))},
+        )
+        task = Task(mechanism, "tip", [axis])
+        found = StiffnessModel(task, given).deflection(mechanism.home).compliance
+        joint[0] = k
+        at = slide * mount * foot.inverse() * tip
+        expected = sum(
+            moved_to(at, frame) @ np.diag(1 / values) @ moved_to(at, frame).T
+            for frame, values in ((slide, joint), (slide * mount, weld))
+        )
+        errors.append(np.abs(found - expected).max() / np.abs(expected).max())
+    assert worst(*errors) < 1e-9
+
+
+def moved_to(place: pin.SE3, frame: pin.SE3) -> Array:
+    """Return the matrix that takes twists of a frame to those of a place in world axes."""
+    turn = frame.rotation
+    lever = frame.translation - place.translation
+    return np.block([[turn, pin.skew(lever) @ turn], [np.zeros((3, 3)), turn]])
 
 
 # The overconstrained four-bar ---------------------------------------------------------------------
