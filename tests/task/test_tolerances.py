@@ -14,6 +14,7 @@ import pytest
 
 from rps_pin import ClosedLoopModel, InputError, MechanismError, RPSRobot, Task, UnreachableError
 from rps_pin.arrays import Array
+from rps_pin.codegen.build import tcc
 from rps_pin.errors import AccuracyWarning
 from rps_pin.task.tolerances import (
     ToleranceAnalysis,
@@ -22,10 +23,10 @@ from rps_pin.task.tolerances import (
     names,
     sobol,
     table_text,
-    tolerance,
     tolerances,
     write_table,
 )
+from rps_pin.task.tolerances import tolerance as analysed
 from rps_pin.task.tolerances.table import rows
 from rps_pin.task.workspace import task_grid, workspace
 from rps_pin.trajectories import point_to_point
@@ -41,6 +42,11 @@ FIVE_BAR: dict[str, Any] = {
     "scale:*": "200 ppm",
 }
 POSES = np.array([[0.19, 0.545], [0.25, 0.5], [0.12, 0.58]])
+
+
+def tolerance(*given: Any, **options: Any) -> ToleranceAnalysis:
+    """As it is called, with the compiler that is quick."""
+    return analysed(*given, compiler="tcc" if tcc.is_here() else "auto", **options)
 
 
 @cache
@@ -308,7 +314,9 @@ def test_sobol_indices_of_a_product() -> None:
 
 
 def test_poses_of_motions_grids_and_workspaces() -> None:
-    task = ClosedLoopModel.load("urdf/five_bar.yaml").task.compile()
+    task = ClosedLoopModel.load("urdf/five_bar.yaml").task.compile(
+        compiler="tcc" if tcc.is_here() else "auto"
+    )
     motion = point_to_point(task.home, [0.22, 0.52], duration=0.4)
     found = tolerance(task, FIVE_BAR, motion)
     assert worst(found.poses.x[[0, -1]] - [task.home, [0.22, 0.52]]) < 1e-12
@@ -372,9 +380,8 @@ def test_a_file_with_rounded_numbers(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AccuracyWarning)
         model = ClosedLoopModel.load(tmp_path / "five_bar.yaml")
-        given = {"placement:*joint.?": "0.05 mm", "closure:tips.?.x": "0.05 mm"}
-        found = tolerance(model, given, POSES, opening="leave out")
-    assert [one.rpartition(".")[2] for one in found.left_out] == ["y"] * 4
+        found = tolerance(model, {"placement:left_joint.?": 1e-4}, POSES, opening="leave out")
+    assert found.left_out == ("placement:left_joint.y",)
     at = [five_bar().labels.index(label) for label in found.labels]
     assert worst(found.slopes - five_bar().slopes[..., at]) < 1e-4
 

@@ -1580,7 +1580,7 @@ class ClosedLoopModel:
         CompileError
             If CasADi is not installed; see there for others.
         """
-        return _of_codegen("compile_mechanism")(self, **options)
+        return of_codegen("compile_mechanism")(self, **options)
 
     def to_casadi(self, **options: Any) -> Any:
         """Return the mechanism's quantities as CasADi functions; see `rps_pin.codegen.to_casadi`.
@@ -1592,7 +1592,7 @@ class ClosedLoopModel:
         CompileError
             If CasADi is not installed; see there for others.
         """
-        return _of_codegen("to_casadi")(self, **options)
+        return of_codegen("to_casadi")(self, **options)
 
     # Arguments and lazily made parts --------------------------------------------------------------
 
@@ -1624,10 +1624,10 @@ class ClosedLoopModel:
         return derivatives.DynamicsDerivatives(self.system)
 
 
-def _of_codegen(name: str) -> Any:
-    """Return a function of `rps_pin.codegen`, which an extra has to be installed for."""
+def of_codegen(name: str, module: str = "rps_pin.codegen") -> Any:
+    """Return what a module of `rps_pin.codegen` has, which an extra has to be installed for."""
     try:
-        return getattr(import_module("rps_pin.codegen"), name)
+        return getattr(import_module(module), name)
     except ModuleNotFoundError as error:
         raise CompileError(
             f"code is generated with {error.name}, which is not installed: "

@@ -20,6 +20,7 @@ import numpy as np
 from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.constraints.frame_coordinates import ANGULAR, LINEAR
+from rps_pin.closed_loop.model import of_codegen
 from rps_pin.errors import InputError, MechanismError, RPSPinError
 from rps_pin.task.calibration.prediction import CalibrationModel
 from rps_pin.task.coordinates import Extended, of_frame
@@ -121,20 +122,19 @@ def _names(
     mechanism: ClosedLoopModel, extension: Extended
 ) -> tuple[dict[str, str], dict[str, str]]:
     """Return kinds of the geometric numbers by name, and their names in generated code."""
-    from rps_pin.codegen.expressions.parameters import Parameters  # noqa: PLC0415 - CasADi
-
+    of_groups = of_codegen("Parameters", "rps_pin.codegen.expressions.parameters")
     system = extension.mechanism.system
     held = {f"placement:{name}" for name in extension.mechanism.model.names} - {
         f"placement:{name}" for name in mechanism.model.names
     }
     groups = [
         group
-        for group in Parameters(system).possible
+        for group in of_groups(system).possible
         if group.partition(":")[0] in _GEOMETRY and group not in held
     ]
     named = {closure.name for closure in mechanism.closures}
     kinds, own = {}, {}
-    for label in Parameters(system, groups).labels:
+    for label in of_groups(system, groups).labels:
         name = label
         kind, _, rest = label.partition(":")
         if kind == "closure" and (parts := rest.rsplit(".", 2))[0] not in named:
