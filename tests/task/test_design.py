@@ -232,7 +232,7 @@ def test_numbers_are_those_of_the_robot_that_is_written(name: str, tmp_path: Pat
 
 def test_a_stretched_bar_is_a_longer_bar() -> None:
     """A thin rod and a plate: m l^2 / 3 about the end, and m (a^2 + b^2) / 12."""
-    from rps_pin.task.design.bodies import projector, stretched
+    from rps_pin.task.design.geometry.bodies import projector, stretched
 
     rod = np.array([[2.0, 0.5, 0, 0, 0, 0, 2.0 * 0.25 / 3, 0, 0, 2.0 * 0.25 / 3]])
     longer = stretched(rod, *projector([1.0, 0, 0]), np.array([3.0]))[0]
@@ -362,7 +362,7 @@ def test_two_requirements_that_contradict_each_other_are_named() -> None:
 def test_violations_fall_as_candidates_come_nearer() -> None:
     rods = np.linspace(0.3, 0.5, 21)
     found = measuring()(np.stack([np.full(21, 0.1), rods], axis=-1))
-    assert (np.diff(violations(found, Requirements(CYLINDER))["reach"]) <= 1e-12).all()
+    assert (np.diff(violations(found, Requirements(CYLINDER), 1.0)["reach"]) <= 1e-12).all()
     assert found.unreached[0] > 1 > found.unreached[-1]
 
 

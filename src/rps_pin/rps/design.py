@@ -20,8 +20,8 @@ from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.robot_file import load_robot
 from rps_pin.rps.urdf import LEGS
 from rps_pin.task import Task
-from rps_pin.task.design.dimensions import Dimension
 from rps_pin.task.design.file import DimensionEntry, dimension_of
+from rps_pin.task.design.geometry.dimensions import Dimension
 from rps_pin.task.design.space import Candidates, DesignSpace
 from rps_pin.validation import LARGEST
 

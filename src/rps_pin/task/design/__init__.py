@@ -6,8 +6,9 @@ meet `Requirements` and are best in one to three `Objective` s.
 """
 
 from rps_pin.task.design.compute import design
-from rps_pin.task.design.dimensions import Dimension
 from rps_pin.task.design.file import DescribedDesign, load_design
+from rps_pin.task.design.geometry.dimensions import Dimension
+from rps_pin.task.design.geometry.rods import Rod
 from rps_pin.task.design.measures import Measures
 from rps_pin.task.design.region import Region, RoundPart
 from rps_pin.task.design.requirements import Objective, Requirements
@@ -26,6 +27,7 @@ __all__ = [
     "Objective",
     "Region",
     "Requirements",
+    "Rod",
     "RoundPart",
     "Space",
     "design",

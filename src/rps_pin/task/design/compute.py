@@ -137,7 +137,7 @@ class _Run:
         self._measures: list[Measures] = []
         nothing = Measures(*(np.empty(0) for _ in Measures._fields))
         #: Names of the requirements.
-        self.requirements = tuple(violations(nothing, measuring.requirements))
+        self.requirements = tuple(violations(nothing, measuring.requirements, measuring.length))
 
     def one(self, generation: int) -> None:
         """Measure a generation, or take it from the store, and tell the search."""
@@ -149,7 +149,7 @@ class _Run:
                 self._kept.put(generation, {"values": values} | measures._asdict())
         self._values.append(values)
         self._measures.append(measures)
-        failed = violations(measures, self._measuring.requirements)
+        failed = violations(measures, self._measuring.requirements, self._measuring.length)
         self.search.tell(
             self._scores(values, measures, small=True), np.stack([*failed.values()], axis=-1)
         )
@@ -176,7 +176,7 @@ class _Run:
         """Return what was found."""
         values = np.concatenate(self._values)
         measures = Measures(*(np.concatenate(part) for part in zip(*self._measures, strict=True)))
-        failed = violations(measures, self._measuring.requirements)
+        failed = violations(measures, self._measuring.requirements, self._measuring.length)
         worst = np.max([*failed.values()], axis=0)
         met = np.flatnonzero(worst <= 0)
         if not met.size:

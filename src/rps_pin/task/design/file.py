@@ -32,7 +32,8 @@ from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.config import Entry, Faults, Finite, Positive, Text, Three, YamlFile, read_config
 from rps_pin.errors import InputError, MechanismError, RPSPinError, shown
 from rps_pin.files import is_there
-from rps_pin.task.design.dimensions import Dimension
+from rps_pin.task.design.geometry.dimensions import Dimension
+from rps_pin.task.design.geometry.rods import Rod, RodClearances
 from rps_pin.task.design.region import Region, RoundPart
 from rps_pin.task.design.requirements import Objective, Requirements
 from rps_pin.task.design.space import DesignSpace, Space
@@ -84,6 +85,13 @@ class RegionEntry(Entry):
     points: int = 5
 
 
+class RodEntry(Entry):
+    """See `Rod`."""
+
+    ends: Annotated[Names, Field(min_length=2, max_length=2)]
+    radius: Finite = 0.0
+
+
 class RequirementsEntry(Entry):
     """See `Requirements`."""
 
@@ -94,6 +102,8 @@ class RequirementsEntry(Entry):
     samples: int = 41
     stiffness: Positive | dict[Text, Positive] | list[Positive] | None = None
     min_stiffness: Positive | None = None
+    rods: dict[Text, RodEntry] = Field(default_factory=dict)
+    min_clearance: Finite | None = None
 
 
 class ObjectiveEntry(Entry):
@@ -261,6 +271,11 @@ def _requirements(
                 )
             none = np.full(len(names), np.nan)
             stiffness = numbers_by_name(part, ("stiffness",), stiffness, names, none, "actuators")
+    rods: dict[str, Rod] = {}
+    for name, rod in entry.rods.items():
+        with faults, part.at("rods", name):
+            rods[name] = Rod((rod.ends[0], rod.ends[1]), rod.radius)
+            RodClearances.check(task, rods[name])
     files = [folder / name for name in entry.motions]
     if region is None or faults.count > before:
         return None, files
@@ -274,6 +289,8 @@ def _requirements(
                 entry.samples,
                 stiffness,
                 entry.min_stiffness,
+                rods or None,
+                entry.min_clearance,
             ),
             files,
         )

@@ -16,6 +16,7 @@ import numpy as np
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import CompileError, InputError, MechanismError, SingularityError
+from rps_pin.task.design.geometry.rods import RodClearances
 from rps_pin.task.design.requirements import Motion, Requirements
 from rps_pin.task.design.space import Candidates, Space
 from rps_pin.task.design.start import packed, started
@@ -55,6 +56,8 @@ class Measures(NamedTuple):
     """The longest way of an actuator, m or rad."""
     stiffness: Array
     """The least, N/m."""
+    clearance: Array
+    """The least of two rods, m."""
     mass: Array
     """kg."""
     size: Array
@@ -95,7 +98,10 @@ class Measuring:
         self.points = requirements.region.grid(task)
         self.motions: list[Motion] = requirements.sampled(task)
         self._side = self._home_side()
+        #: Characteristic length of the file's robot, m.
+        self.length = task.characteristic_length
         self._stiffness = self._of_actuators(requirements.stiffness)
+        self._rods = RodClearances(task, requirements.rods) if requirements.rods else None
         model = mechanism.model
         v = mechanism.actuated_indices
         self._most = np.asarray(model.effortLimit)[v], np.asarray(model.velocityLimit)[v]
@@ -115,9 +121,10 @@ class Measuring:
         given = self.requirements
         parts = [self.points, *(part for one in self.motions for part in one[1:])]
         numbers_ = given.min_conditioning, given.limit_margin, given.min_stiffness, self._stiffness
+        rods = given.rods, given.min_clearance
         with _generated_code():
             identity = self.space.identity()
-        found = hashlib.sha256(f"{identity} {numbers_} {self._compiler}".encode())
+        found = hashlib.sha256(f"{identity} {numbers_} {rods} {self._compiler}".encode())
         for part in (*parts, *self._most):
             found.update(np.ascontiguousarray(part).tobytes())
         return found.hexdigest()
@@ -213,6 +220,7 @@ class Measuring:
             *forces,
             _where(some, (ends[0] - ends[1]).max(axis=1)),
             self._least_stiffness(K, reached, some),
+            self._clearance(candidates, numbers, q, reached, some),
             candidates.mass,
             candidates.size,
         )
@@ -320,6 +328,15 @@ class Measuring:
         values = np.linalg.svd(np.where(there[..., None, None], rooted, 0.0), compute_uv=False)
         least = np.where(there, values[..., -1] ** 2, np.inf).min(axis=1)
         return _where(some & np.asarray(there.any(axis=1)), least)
+
+    def _clearance(
+        self, candidates: Candidates, numbers: Array, q: Array, reached: Bools, some: Bools
+    ) -> Array:
+        """Return the least clearance of two rods, m."""
+        if self._rods is None:
+            return np.full(len(q), np.nan)
+        found = self._rods.least(self.engines[0], candidates.numbers, numbers, q)
+        return _where(some, np.where(reached, found, np.inf).min(axis=1))
 
 
 @contextmanager

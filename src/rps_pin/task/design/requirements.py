@@ -12,14 +12,17 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, did_you_mean
 from rps_pin.other_kinds import refuses_other_kinds
+from rps_pin.task.design.geometry.rods import Rod
 from rps_pin.task.design.region import Region
 from rps_pin.task.task import Task
 from rps_pin.trajectories.path import Trajectory
 from rps_pin.validation import finite_number, non_negative_number, positive_number, whole_number
 
-Measure = Literal["size", "mass", "conditioning", "force", "speed", "stroke", "stiffness"]
+Measure = Literal[
+    "size", "mass", "conditioning", "force", "speed", "stroke", "stiffness", "clearance"
+]
 #: Measures that are best when they are large.
-_LARGE = ("conditioning", "stiffness")
+_LARGE = ("conditioning", "stiffness", "clearance")
 
 
 @refuses_other_kinds
@@ -48,11 +51,17 @@ class Requirements:
     min_stiffness
         The least that it must be in any direction of the region, in N/m: angles count as arcs of
         the characteristic length.
+    rods
+        Links that must not collide in the region, as capsules, by name. Rods that share an end may
+        touch.
+    min_clearance
+        The least distance of the surfaces of two rods, m; 0 if rods are given without it.
 
     Raises
     ------
     InputError
-        If a number is not possible, or a least stiffness has no stiffness of the actuators.
+        If a number is not possible, a least stiffness has no stiffness of the actuators, or a
+        least clearance no rods.
     """
 
     region: Region
@@ -62,6 +71,8 @@ class Requirements:
     samples: int = 41
     stiffness: ArrayLike | None = None
     min_stiffness: float | None = None
+    rods: Mapping[str, Rod] | None = None
+    min_clearance: float | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= finite_number(self.min_conditioning, "min_conditioning") < 1:
@@ -73,6 +84,10 @@ class Requirements:
             positive_number(self.min_stiffness, "min_stiffness", "N/m")
             if self.stiffness is None:
                 raise InputError("min_stiffness needs the stiffness of the actuators")
+        if self.min_clearance is not None:
+            finite_number(self.min_clearance, "min_clearance", "m")
+            if not self.rods:
+                raise InputError("min_clearance needs rods")
         if self.stiffness is not None:
             given = np.asarray(self.stiffness, dtype=np.float64)
             if not (np.isfinite(given) & (given > 0)).all():
@@ -113,9 +128,11 @@ class Objective:
         A measure: ``size`` (m), ``mass`` (kg), ``conditioning`` (the worst in the region),
         ``force`` and ``speed`` (the largest of an actuator in the motions, N or N m, m/s or rad/s),
         ``stroke`` (the longest way of an actuator in the region, m or rad), ``stiffness`` (the
-        least in the region, N/m); or the name of a dimension, or several with weights.
+        least in the region, N/m), ``clearance`` (the least of two rods in the region, m); or the
+        name of a dimension, or several with weights.
     largest
-        Whether it is to be large; left out: conditioning and stiffness are, all others not.
+        Whether it is to be large; left out: conditioning, stiffness and clearance are, all
+        others not.
 
     Raises
     ------
@@ -157,6 +174,8 @@ class Objective:
                 )
         if self.of in ("force", "speed") and not requirements.motions:
             raise InputError(f"objective {self.of!r} needs motions")
+        if self.of == "clearance" and not requirements.rods:
+            raise InputError("objective 'clearance' needs rods")
         if self.of == "stiffness" and requirements.stiffness is None:
             raise InputError("objective 'stiffness' needs the stiffness of the actuators")
 

@@ -143,7 +143,16 @@ class DesignResult:
         at = range(len(self.front)) if rows is None else rows
         columns = [*self.names]
         columns += [one.name for one in self.objectives if one.name not in columns]
-        more = ["size", "mass", "conditioning", "stroke", "force", "speed", "stiffness"]
+        more = [
+            "size",
+            "mass",
+            "conditioning",
+            "stroke",
+            "force",
+            "speed",
+            "stiffness",
+            "clearance",
+        ]
         found = self.measures._asdict()
         more = [n for n in more if n not in columns and np.isfinite(found[n][self.front]).all()]
         columns += [*more, "binding", "margin"]

@@ -16,7 +16,7 @@ import numpy as np
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.numerics.block_runs import Workers
-from rps_pin.task.design.dimensions import Dimension
+from rps_pin.task.design.geometry.dimensions import Dimension
 from rps_pin.task.design.measures import Measures, Measuring
 
 #: Candidates that are measured as one batch.

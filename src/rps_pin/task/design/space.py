@@ -18,8 +18,8 @@ from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.constraints.closures import joint_id
 from rps_pin.errors import InputError, MechanismError, did_you_mean, few
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.task.design.bodies import projector, stretched
-from rps_pin.task.design.dimensions import (
+from rps_pin.task.design.geometry.bodies import projector, stretched
+from rps_pin.task.design.geometry.dimensions import (
     KINDS,
     OF_LIMITS,
     OF_POINTS,
@@ -28,7 +28,7 @@ from rps_pin.task.design.dimensions import (
     move,
     together,
 )
-from rps_pin.task.design.points import OUTPUT, Moved, Points
+from rps_pin.task.design.geometry.points import OUTPUT, Moved, Points
 from rps_pin.task.task import Task
 
 

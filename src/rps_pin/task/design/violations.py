@@ -12,6 +12,7 @@ requirement      a candidate fails it by
 ``force``        the largest force's excess over its limit, as a share of the limit
 ``speed``        the same of the speeds
 ``stiffness``    the share of the least stiffness that is missing
+``clearance``    the clearance of two rods that is missing, in characteristic lengths
 ================ ==========================================================================
 
 A requirement that could not be measured, as nothing was reached, is failed by 1.
@@ -30,8 +31,11 @@ WITHOUT_ROOM = ("reach", "singularity", "motions")
 _SLACK = 1e-12
 
 
-def violations(measures: Measures, requirements: Requirements) -> dict[str, Array]:
-    """Return by how much candidates fail each requirement, (n,); at most 0 where they meet it."""
+def violations(measures: Measures, requirements: Requirements, length: float) -> dict[str, Array]:
+    """Return by how much candidates fail each requirement, (n,); at most 0 where they meet it.
+
+    `length` is the characteristic length of the file's robot, m.
+    """
     found = {
         "reach": measures.unreached,
         "singularity": measures.beyond,
@@ -45,6 +49,8 @@ def violations(measures: Measures, requirements: Requirements) -> dict[str, Arra
         found["speed"] = measures.speed_share - 1.0
     if requirements.min_stiffness is not None:
         found["stiffness"] = 1.0 - measures.stiffness / requirements.min_stiffness
+    if requirements.rods:
+        found["clearance"] = ((requirements.min_clearance or 0.0) - measures.clearance) / length
     return {name: np.where(np.isnan(value), 1.0, value) for name, value in found.items()}
 
 

@@ -34,7 +34,7 @@ from scipy.spatial.transform import Rotation
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, shown
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.task.design.points import Moved, Points
+from rps_pin.task.design.geometry.points import Moved, Points
 from rps_pin.validation import finite_number, fixed_array, positive_number
 
 #: Names of points that move as one.

@@ -1,0 +1,1 @@
+"""What dimensions change of a mechanism: points, rods between them, bodies."""
