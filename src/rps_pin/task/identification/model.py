@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array, Indices
+from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.errors import InputError, MechanismError, RPSPinError
 from rps_pin.numerics.linear_algebra import singular_values
@@ -242,8 +242,3 @@ def _named(kind: str, columns: Columns) -> list[str]:
     """Return the joints that have an effect."""
     start = f"{kind}:"
     return [label.removeprefix(start) for label in columns.labels if label.startswith(start)]
-
-
-def places(names: Sequence[str], chosen: Sequence[str]) -> Indices:
-    """Return where names are among others."""
-    return np.array([list(names).index(one) for one in chosen], dtype=np.intp)
