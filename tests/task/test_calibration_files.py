@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.linalg import null_space
 
 from rps_pin import ClosedLoopModel, InputError
 from rps_pin.arrays import Array
@@ -20,9 +21,12 @@ from rps_pin.task.calibration import (
     Tracker,
     calibrate,
     calibrated_mechanism,
+    candidate_poses,
     cross_validate,
     geometric_groups,
     load_instruments,
+    plan_poses,
+    pose_deviations,
     read_readings,
     readings,
     unseen_in_words,
@@ -312,6 +316,76 @@ def test_instruments_of_a_file(tmp_path: Path) -> None:
     path.write_text("heights:\n  gauge: {frame: platform, axis: 1}\n")
     with pytest.raises(InputError, match="unknown key 'axis'"):
         load_instruments(path, task)
+
+
+# Planning -----------------------------------------------------------------------------------------
+
+
+def test_planned_poses() -> None:
+    """Better than any random set and than any exchange of one; what is predicted comes true."""
+    model, task = five_bar().model, five_bar().task
+    ranges = {"x": (0.05, 0.35), "z": (0.4, 0.6)}
+    x = candidate_poses(task, ranges, 60, seed=3)
+    plan = plan_poses(model, x, 12, DEVIATIONS, widest=0.05)
+    assert (x[plan.chosen] == plan.x).all()
+    assert len(set(plan.chosen)) == 12
+    assert (plan.random[:, 0] > plan.deviation).all()
+    assert min(plan.factors) > 1.2
+    # log det of the information about what all candidates tell, anew from the residuals' slopes.
+    spread = np.array(list(DEVIATIONS.values()))
+    slopes = model.predict(x, model.home(x, model.nominal), model.nominal)
+    blocks = []
+    for A, B in zip(slopes.by_pose, slopes.by_parameters, strict=True):
+        own = B / spread[:, None] / model.units
+        free = null_space((A / spread[:, None]).T).T @ own
+        blocks.append(free.T @ free)
+    opening = np.vstack([*(slopes.opening / model.units)])
+    closing = null_space(opening, rcond=1e-9)
+    total = closing.T @ np.sum(blocks, axis=0) @ closing
+    values, across = np.linalg.eigh(total)
+    seen = closing @ across[:, values > 1 / 0.05**2]
+
+    def determinant(chosen: Array) -> float:
+        M = np.sum([blocks[i] for i in chosen], axis=0)
+        return float(np.linalg.slogdet(seen.T @ M @ seen + np.eye(seen.shape[1]) / 0.05**2)[1])
+
+    assert abs(determinant(plan.chosen) - plan.log_determinant) < 1e-6 * plan.log_determinant
+    rng = np.random.default_rng(0)
+    for k in range(12):
+        other = plan.chosen.copy()
+        other[k] = rng.choice(np.setdiff1d(np.arange(len(x)), plan.chosen))
+        assert determinant(other) <= plan.log_determinant + 1e-5
+
+
+def test_candidates_are_in_the_workspace() -> None:
+    task = five_bar().task
+    x = candidate_poses(task, {"x": (0, 0.7), "z": (0.4, 0.65)}, 20, min_distance=0.1)
+    assert 0 < len(x) < 20
+    q = task.configuration(x)
+    assert (task.singularities(q).distance >= 0.1).all()
+    with pytest.raises(InputError, match="none of 2 random poses is in the workspace"):
+        candidate_poses(task, {"x": (0.9, 1)}, 2)
+    with pytest.raises(InputError, match="no coordinate 'y'"):
+        candidate_poses(task, {"y": (5, 6)}, 5)
+    with pytest.raises(InputError, match="candidates have shape"):
+        plan_poses(five_bar().model, x[:3], 5, DEVIATIONS)
+
+
+def test_deviations_of_the_pose() -> None:
+    """Of what the calibrated mechanism says, against errors of calibrations of one machine."""
+    model, case = five_bar().model, five_bar()
+    p, unused = wrong(np.random.default_rng(0)), case.x[:6] * 0.999
+    errors = []
+    for seed in range(30):
+        values, _ = measured(p, np.random.default_rng(seed))
+        found = calibrate(model, read(values), widest=1.0)
+        q = model.closed(unused, model.home(unused, model.nominal), p)
+        slopes = model.predict(unused, q, p)
+        gain = np.linalg.inv(slopes.by_pose[:, :2])
+        errors.append(-gain @ (slopes.by_parameters[:, :2] @ (found.parameters - p))[..., None])
+    size = np.sqrt(np.mean(np.array(errors)[..., 0] ** 2, axis=0))
+    ratio = size / pose_deviations(model, found, unused)
+    assert 0.8 < np.sqrt(np.mean(ratio**2)) < 1.25
 
 
 def test_all_groups() -> None:

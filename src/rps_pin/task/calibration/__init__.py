@@ -19,6 +19,12 @@ from rps_pin.task.calibration.information import Identifiable
 from rps_pin.task.calibration.instruments import BallBar, Height, Inclinometer, Tracker
 from rps_pin.task.calibration.instruments_file import load_instruments
 from rps_pin.task.calibration.measured_file import read_readings
+from rps_pin.task.calibration.plan import (
+    Plan,
+    candidate_poses,
+    plan_poses,
+    pose_deviations,
+)
 from rps_pin.task.calibration.prediction import CalibrationModel, Predicted, geometric_groups
 from rps_pin.task.calibration.sensors import Readings, readings
 from rps_pin.task.calibration.solve import Calibration, calibrate
@@ -33,6 +39,7 @@ __all__ = [
     "Height",
     "Identifiable",
     "Inclinometer",
+    "Plan",
     "Predicted",
     "Readings",
     "Tracker",
@@ -41,9 +48,12 @@ __all__ = [
     "by_sensor",
     "calibrate",
     "calibrated_mechanism",
+    "candidate_poses",
     "cross_validate",
     "geometric_groups",
     "load_instruments",
+    "plan_poses",
+    "pose_deviations",
     "read_readings",
     "readings",
     "unseen_in_words",

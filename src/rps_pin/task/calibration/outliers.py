@@ -14,11 +14,17 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
+from scipy.stats import chi2, norm
 
 from rps_pin.arrays import Array, Bools
 
 #: Residual, over its own deviation, beyond which a reading is an outlier.
 LIMIT = 4.0
+#: Of two sets of as many readings, the better one is told if its sum of squares is less by this.
+MARGIN = 9.0
+#: Chance that the readings of a pose that are right agree less than is asked for: that of a
+#: residual of `LIMIT` deviations.
+_SURE = 2 * norm.sf(LIMIT)
 #: Readings of a pose that are left out at most.
 MOST = 3
 
@@ -45,8 +51,13 @@ def outliers(r: Array, A: Array, known: Bools) -> Bools:
         kept = known[i] & ~out
         told = (kept.sum(axis=1) > A.shape[2]) | ~out.any(axis=1) | ~kept.any(axis=1)
         out, kept = out[told], kept[told]
-        total = _squares(r[i, None], A[i, None], kept[None])[0] + LIMIT**2 * out.sum(axis=1)
-        found[i] = out[int(np.argmin(total))]
+        squares = _squares(r[i, None], A[i, None], kept[None])[0]
+        redundant = np.maximum(kept.sum(axis=1) - A.shape[2], 0)
+        agree = (squares <= chi2.isf(_SURE, np.maximum(redundant, 1))) | ~kept.any(axis=1)
+        total = np.where(agree, squares + LIMIT**2 * out.sum(axis=1), np.inf)
+        best = int(np.argmin(total))
+        alike = (total < total[best] + MARGIN) & (out.sum(axis=1) == out[best].sum())
+        found[i] = out[best] if alike.sum() == 1 else known[i]
     return found
 
 

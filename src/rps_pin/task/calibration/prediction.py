@@ -217,20 +217,6 @@ class CalibrationModel:
         use = next(one for one in self._uses if one.instrument is instrument)
         return np.asarray(q[:, use.frame.q])
 
-    def actuators_by_parameters(self, x: Array, q: Array, p: Array) -> tuple[Array, Array]:
-        """Return the actuators' slopes by the pose, (n, na, m), and by the parameters, (n, na, p).
-
-        Of the positions themselves, not of what sensors read, at task coordinates x (n, m).
-        """
-        q, own = self.closed(x, q, p), self._own(p)
-        model = self.mechanism.model
-        names = self.task.mechanism.actuated
-        columns = [model.joints[model.getJointId(name)].idx_v for name in names]
-        moved, _ = self._sensitivity(q, own)
-        slopes = np.zeros((len(q), len(columns), p.size))
-        slopes[:, :, : self._count] = moved[:, columns]
-        return np.asarray(self._engine.motion_basis(q, parameters=own))[:, columns], slopes
-
     def _sensitivity(self, q: Array, own: Array | None) -> tuple[Array, Array]:
         """Return dq/dp with the task's coordinates held, (n, nv, p), and what opens the loops."""
         found = np.zeros((len(q), self.mechanism.model.nv, self._count))

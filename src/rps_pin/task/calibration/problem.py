@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import UnreachableError
+from rps_pin.numerics.linear_algebra import rank
 from rps_pin.task.calibration.information import Identifiable, identifiable, reduced
 from rps_pin.task.calibration.instruments import Tracker
 from rps_pin.task.calibration.outliers import outliers
@@ -85,7 +87,6 @@ class Problem:
     def begin(self, start: Array | None, p: Array | None = None) -> None:
         """Find the poses from about `start` (poses, m), with the believed parameters or others."""
         task, sensors = self._model.task, self._model.sensors
-        self.p = self.p if p is None else p.copy()
         home = np.tile(task.home, (len(self._values), 1))
         guess = home.copy() if start is None else start.copy()
         for i, name in enumerate(task.coordinates):
@@ -96,6 +97,10 @@ class Problem:
         self._move_poses(guess - home)
         if p is None:
             self._place_trackers()
+        else:
+            # Not from home with p: there a rotation about the axis that is no coordinate of the
+            # task has two rotation vectors with the same coordinates, where these are all zero.
+            self.q, self.p = self._model.closed(self.x, self.q, p), p.copy()
         self._find_poses(self._known)
 
     def find_poses(self) -> None:
@@ -224,14 +229,21 @@ class Problem:
         while scale > _ROBUST:
             size = np.median(np.abs(self.weighed(self.x, self.p).residuals[self.used]))
             scale = max(_ROBUST, min(_TYPICAL * float(size), scale / 2))
-            self.fit(seen, scale)
+            with suppress(UnreachableError):  # this only tells outliers; the last fit decides
+                self.fit(seen, scale)
 
     def covariance(self, seen: Identifiable) -> Array:
         """Return that of the combinations that are seen, in one unit, of the readings in use."""
         _, A, B = self.weighed(self.x, self.p)
         used = self.used[..., None]
         rows = np.vstack([*(reduced(A * used, B * used)), self._prior]) @ seen.seen
-        return np.asarray(np.linalg.inv(rows.T @ rows))
+        s, across = np.linalg.svd(rows, full_matrices=False)[1:]
+        if rank(s, 1e-12) < len(s):
+            raise UnreachableError(
+                f"the {int(self.used.sum())} readings that are no outliers do not determine the "
+                "parameters that all of them together do"
+            )
+        return np.asarray((across.T / s**2) @ across)
 
     def leave_out(self) -> None:
         """Decide anew which readings are outliers: `outliers`, with the parameters as they are."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
-from rps_pin.errors import InputError, did_you_mean
+from rps_pin.errors import InputError, UnreachableError, did_you_mean
 from rps_pin.task.calibration.information import Identifiable
 from rps_pin.task.calibration.prediction import CalibrationModel
 from rps_pin.task.calibration.problem import Problem
@@ -30,7 +30,7 @@ _SURE, _MANY = 5.0, 0.2
 #: A parameter is determined alone if no unseen combination of length 1 has more of it.
 _ALONE = 1e-6
 #: Share of the characteristic length beyond which a deviation is too large to be of use.
-_WIDEST = 0.01
+WIDEST = 0.01
 
 
 class Calibration(NamedTuple):
@@ -85,12 +85,6 @@ class Calibration(NamedTuple):
         share = self.outliers.sum() / np.isfinite(self.residuals).sum()
         if share > _MANY:
             found.append(f"{share:.0%} of the readings are outliers")
-        if self.identifiable.weak:
-            found.append(
-                f"{self.identifiable.weak} combinations of parameters are seen so weakly that "
-                "their deviation would be larger than an error that is thought possible: they stay "
-                "as believed; measure more or other poses, or give priors"
-            )
         return tuple(found)
 
     @property
@@ -123,8 +117,8 @@ def calibrate(
         read.
     widest
         Deviation of a combination of parameters, m, beyond which it is left as believed; a
-        hundredth of the task's characteristic length if left out. Such a combination changes no
-        reading by more than its deviation while it is off by less.
+        hundredth of the task's characteristic length if left out. While it is off by less, it
+        changes no reading by more than the reading's deviation.
 
     Raises
     ------
@@ -142,7 +136,7 @@ def calibrate(
     problem = Problem(model, read, prior_of(model, priors or {}))
     problem.begin(None if start is None else _start(model, read, start))
     if widest is None:
-        widest = _WIDEST * model.task.characteristic_length
+        widest = WIDEST * model.task.characteristic_length
     seen = problem.identifiable().within(positive_number(widest, "widest", "m"))
     wanted = seen.rank + problem.x.size
     if wanted >= read.total + problem.priors:
@@ -155,6 +149,7 @@ def calibrate(
     for _ in range(_ROUNDS):
         used = problem.used
         problem.leave_out()
+        _refuse_contradiction(problem, seen, read)
         problem.fit(seen)
         if np.array_equal(used, problem.used):
             break
@@ -179,6 +174,18 @@ def calibrate(
         read,
         model.units,
     )
+
+
+def _refuse_contradiction(problem: Problem, seen: Identifiable, read: Readings) -> None:
+    """Raise `UnreachableError` if too few readings are left to find the parameters."""
+    used = int(np.count_nonzero(problem.used))
+    poses = int(problem.used.any(axis=1).sum())
+    if used + problem.priors < seen.rank + poses * problem.x.shape[1] or not used:
+        raise UnreachableError(
+            f"the readings contradict each other: {read.total - used} of {read.total} are "
+            f"outliers, and the {used} that are left do not determine {seen.rank} combinations of "
+            "parameters; are they those of this mechanism, and their deviations right?"
+        )
 
 
 def prior_of(model: CalibrationModel, given: Mapping[str, float]) -> Array:
