@@ -84,8 +84,8 @@ def tolerance_command(
 ) -> None:
     """Compute errors of a mechanism's pose from tolerances of lengths, placements and encoders.
 
-    The file has **tolerances**, by name or pattern (**placement:leg_*.x: 0.05 mm**, **offset:***:
-    20 arcsec**), **distribution** (normal or uniform) and **sigmas** (a normal tolerance is so many
+    The file has **tolerances**, by name or pattern (`placement:leg_*.x: 0.05 mm`, `offset:*:
+    0.1 mrad`), **distribution** (normal or uniform) and **sigmas** (a normal tolerance is so many
     standard deviations; 3). With --over, errors over the workspace; with two axes a map. Angles are
     in radians.
 
