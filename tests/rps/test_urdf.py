@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 import rps_pin
 from rps_pin import RPSParameters, RPSRobot
-from rps_pin.rps.urdf import URDF_UNLIMITED, ball_frames, build_urdf
+from rps_pin.rps.leg_frames import URDF_UNLIMITED, ball_frames
+from rps_pin.rps.urdf import build_urdf
 from tests import strategies
 from tests.strategies import LEG_ANGLES
 

@@ -11,7 +11,7 @@ import pytest
 
 from rps_pin import ClosedLoopModel, RPSRobot, helix
 from rps_pin.errors import InputError
-from rps_pin.rps.urdf import LEGS
+from rps_pin.rps.leg_frames import LEGS
 from rps_pin.viewer import Forces, Ghosts, Motion, Recorder, Trail, View, fitting_layers, save_html
 from rps_pin.viewer.layers.colours import BLACK, BLUE, GOLD, GREEN, VERMILLION
 from rps_pin.viewer.scene.bounds import bounding_box

@@ -15,10 +15,10 @@ from rps_pin.errors import InputError
 from rps_pin.panel.panel import Actuator, Panel
 from rps_pin.panel.slider import DEGREE, MM, Slider, quantity, slider
 from rps_pin.rps.kinematics.legs import cone_angles, violations
+from rps_pin.rps.leg_frames import LEGS
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.singularity.measures import singularity_measures
-from rps_pin.rps.urdf import LEGS
 from rps_pin.task.maps import TaskState
 from rps_pin.trajectories.path import Trajectory
 from rps_pin.validation import real_vector

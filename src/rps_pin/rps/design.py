@@ -15,10 +15,10 @@ from rps_pin.config import Faults, YamlFile
 from rps_pin.errors import InputError, did_you_mean
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.rps.kinematics.legs import cone_angles
+from rps_pin.rps.leg_frames import LEGS
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.robot import RPSRobot
 from rps_pin.rps.robot_file import load_robot
-from rps_pin.rps.urdf import LEGS
 from rps_pin.task import Task
 from rps_pin.task.design.file import DimensionEntry, dimension_of
 from rps_pin.task.design.geometry.dimensions import Dimension

@@ -27,9 +27,10 @@ from rps_pin.rps.kinematics.forward_kinematics import forward_kinematics
 from rps_pin.rps.kinematics.inverse_kinematics import inverse_kinematics, reachable_motion
 from rps_pin.rps.kinematics.legs import LegMotion, Legs, PoseLegs, check_legs
 from rps_pin.rps.kinematics.samples import Errors, maskable
+from rps_pin.rps.leg_frames import LEGS, ball_frames
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.task import RPSTask
-from rps_pin.rps.urdf import LEGS, ball_frames, build_urdf
+from rps_pin.rps.urdf import build_urdf
 from rps_pin.validation import whole_number
 
 #: Calls of microseconds where code is generated.

@@ -9,8 +9,8 @@ from __future__ import annotations
 import pinocchio as pin
 
 from rps_pin.closed_loop import JointEffects
+from rps_pin.rps.leg_frames import LEGS
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.urdf import LEGS
 
 _KINDS = ("prismatic", "revolute")
 #: Names of the parameters of friction that are zero without it.

@@ -22,8 +22,8 @@ from rps_pin.rps.kernels import tips as ring
 from rps_pin.rps.kernels.limits import length_within, within
 from rps_pin.rps.kinematics.pose import Tilt, components, tilt_of
 from rps_pin.rps.kinematics.samples import refuse
+from rps_pin.rps.leg_frames import LEG_DIRECTIONS
 from rps_pin.rps.parameters import RPSParameters
-from rps_pin.rps.urdf import LEG_DIRECTIONS
 
 #: e_i, shape (3 legs, 3): the radial directions in the base plane, and in the platform.
 RADIAL = np.array([[math.cos(angle), math.sin(angle), 0.0] for angle in LEG_DIRECTIONS])

@@ -8,10 +8,9 @@ boundary of a workspace, drawn in positions, passes through itself. In poses it 
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-import trimesh
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError
@@ -23,6 +22,9 @@ from rps_pin.task.workspace.boundary import surface
 from rps_pin.task.workspace.grids import shares
 from rps_pin.task.workspace.volume import refuse_slices
 from rps_pin.validation import choice, whole_number
+
+if TYPE_CHECKING:
+    import trimesh
 
 Space = Literal["position", "pose"]
 #: Of coordinates, over the largest of their axis.
@@ -131,6 +133,8 @@ def theoretical_cylinder(
     if not (math.isfinite(lower) and math.isfinite(upper) and lower < upper):
         raise InputError(f"heights {lower} to {upper} m must be finite and in order")
     whole_number(sections, "sections", least=3)
+    import trimesh  # noqa: PLC0415 (takes long to load)
+
     cylinder: trimesh.Trimesh = trimesh.creation.cylinder(
         radius=parameters.platform_radius,
         sections=sections,

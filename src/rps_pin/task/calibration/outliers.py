@@ -14,7 +14,7 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2, norm
+from scipy.special import chdtri, ndtr
 
 from rps_pin.arrays import Array, Bools
 
@@ -24,7 +24,7 @@ LIMIT = 4.0
 MARGIN = 9.0
 #: Chance that the readings of a pose that are right agree less than is asked for: that of a
 #: residual of `LIMIT` deviations.
-_SURE = 2 * norm.sf(LIMIT)
+_SURE = 2 * ndtr(-LIMIT)
 #: Readings of a pose that are left out at most.
 MOST = 3
 
@@ -53,7 +53,7 @@ def outliers(r: Array, A: Array, known: Bools) -> Bools:
         out, kept = out[told], kept[told]
         squares = _squares(r[i, None], A[i, None], kept[None])[0]
         redundant = np.maximum(kept.sum(axis=1) - A.shape[2], 0)
-        agree = (squares <= chi2.isf(_SURE, np.maximum(redundant, 1))) | ~kept.any(axis=1)
+        agree = (squares <= chdtri(np.maximum(redundant, 1), _SURE)) | ~kept.any(axis=1)
         total = np.where(agree, squares + LIMIT**2 * out.sum(axis=1), np.inf)
         best = int(np.argmin(total))
         alike = (total < total[best] + MARGIN) & (out.sum(axis=1) == out[best].sum())

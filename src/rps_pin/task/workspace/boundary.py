@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.errors import InputError
@@ -14,6 +14,9 @@ from rps_pin.files import whole_file
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.workspace.result import Region
 from rps_pin.task.workspace.volume import cells, refuse_slices
+
+if TYPE_CHECKING:
+    import trimesh
 
 MESH_FORMATS = (".stl", ".ply", ".obj", ".glb")
 
@@ -84,6 +87,8 @@ def surface(inside: Bools, points: Array) -> trimesh.Trimesh:
     used, corners = np.unique(quads, return_inverse=True)
     corners = corners.reshape(-1, 4)
     faces = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+    import trimesh  # noqa: PLC0415 (takes long to load)
+
     mesh = trimesh.Trimesh(points.reshape(-1, 3)[used], faces, process=False)
     if mesh.volume < 0:  # the map from the grid turns the orientation round
         mesh.faces = mesh.faces[:, ::-1]

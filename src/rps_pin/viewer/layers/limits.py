@@ -9,8 +9,8 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array
 from rps_pin.rps.kinematics.legs import cone_angles
+from rps_pin.rps.leg_frames import LEGS
 from rps_pin.rps.robot import RPSRobot
-from rps_pin.rps.urdf import LEGS
 from rps_pin.viewer.displayed_mechanism import DisplayedMechanism
 from rps_pin.viewer.layers.base import DrawnLayer, LayerContext, NodeState, RobotSizedLayer
 from rps_pin.viewer.layers.colours import BLUE, WARNING, colour_bar, css, warning
