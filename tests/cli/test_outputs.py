@@ -230,7 +230,7 @@ def test_folders_and_open_files_are_refused(tmp_path: Path) -> None:
     assert "a.txt: name that file itself" in ended.stderr
 
 
-MACHINE = ROOT / "examples" / "machine"
+SAMPLES = ROOT / "src" / "rps_pin" / "cli" / "samples"
 #: All commands that write: words; the last is where to.
 EVERY = {
     **{name: [*words, "-o"] for name, words in FOLDERS.items()},
@@ -239,10 +239,10 @@ EVERY = {
     "reproduce": ["reproduce", "--quick", "-o"],
     "export c": ["export", "c", "four_bar", "-o"],
     "design": ["design", str(ROOT / "examples" / "design" / "micro_motion.yaml"), "-o"],
-    "calibrate": ["calibrate", str(MACHINE / "readings.csv"), "-m", "five_bar", "-o"],
-    "identify": ["identify", str(MACHINE / "log.csv"), "-m", "five_bar", "-o"],
+    "calibrate": ["calibrate", str(SAMPLES / "readings.csv"), "-m", "five_bar", "-o"],
+    "identify": ["identify", str(SAMPLES / "log.csv"), "-m", "five_bar", "-o"],
     "tolerance": [
-        *("tolerance", str(ROOT / "examples" / "tolerances" / "five_bar.yaml")),
+        *("tolerance", str(SAMPLES / "drawing.yaml")),
         *("-m", "five_bar", "-o"),
     ],
     "png": ["view", "--png"],

@@ -15,7 +15,8 @@ from rps_pin.task.tolerances import tolerance
 from tests.cli.commands import rps_pin
 from tests.worst import worst
 
-DRAWING = Path(__file__).parents[2] / "examples" / "tolerances" / "five_bar.yaml"
+SAMPLES = Path(__file__).parents[2] / "src" / "rps_pin" / "cli" / "samples"
+DRAWING = SAMPLES / "drawing.yaml"
 
 
 @pytest.fixture(autouse=True)

@@ -124,7 +124,7 @@ def calibrate_command(
 
     Examples:
 
-    - `rps-pin calibrate readings.csv --mechanism five_bar --deviation x=3e-5`
+    - `rps-pin calibrate readings.csv --mechanism five_bar --parameters placement:right_joint`
     """
     task, file = load_task_and_file(mechanism)
     name = f"{file.stem}_calibrated"

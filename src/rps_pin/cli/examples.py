@@ -26,6 +26,11 @@ _COPIED = {
     "scenario.yaml": "a control loop and its simulated robot",
     "faults.yaml": "another, with faults",
     "design.yaml": "a design: the dimensions of a Delta for a cylinder",
+    "readings.csv": "readings of a five-bar, for a calibration",
+    "log.csv": "motor forces of a five-bar, for an identification",
+    "other.csv": "another log of it",
+    "drawing.yaml": "tolerances of a five-bar",
+    "compliances.yaml": "what gives way in a four-bar",
 }
 
 

@@ -1,8 +1,6 @@
-"""Measure a simulated five-bar: readings.csv for `rps-pin calibrate`, log.csv and other_log.csv.
+"""Measure a simulated five-bar: readings.csv, log.csv and other.csv of `rps-pin examples`.
 
-    python examples/machine/measure.py
-    rps-pin calibrate examples/machine/readings.csv -m five_bar --parameters placement:right_joint
-    rps-pin identify examples/machine/log.csv -m five_bar --validate examples/machine/other_log.csv
+    .venv/bin/python tools/measure_machine.py
 
 The machine's right motor stands 2 mm and 1 mm off its place, and the left encoder reads 10 mrad too
 little. Its bodies are 25 % heavier than those of the drawing, and its motors have friction. The
@@ -19,8 +17,9 @@ from rps_pin import ClosedLoopModel
 from rps_pin.task.calibration import CalibrationModel
 from rps_pin.task.identification import DynamicsModel, with_parameters
 
-HERE = Path(__file__).parent
-TASK = ClosedLoopModel.load(HERE.parents[1] / "urdf" / "five_bar.yaml").task
+ROOT = Path(__file__).parents[1]
+SAMPLES = ROOT / "src" / "rps_pin" / "cli" / "samples"
+TASK = ClosedLoopModel.load(ROOT / "urdf" / "five_bar.yaml").task
 #: Standard deviations: of encoders, rad, of a tracker, m, and of forces, N m.
 ENCODER, TRACKER, FORCE = 1e-4, 3e-5, 0.05
 
@@ -28,7 +27,7 @@ ENCODER, TRACKER, FORCE = 1e-4, 3e-5, 0.05
 def write(name: str, columns: list[str], rows: np.ndarray) -> None:
     """Write a table as CSV."""
     lines = [",".join(columns), *(",".join(f"{one:.6f}" for one in row) for row in rows)]
-    (HERE / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (SAMPLES / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def readings() -> None:
@@ -75,4 +74,4 @@ def log(name: str, seed: int) -> None:
 if __name__ == "__main__":
     readings()
     log("log.csv", 0)
-    log("other_log.csv", 1)
+    log("other.csv", 1)
