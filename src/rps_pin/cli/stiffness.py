@@ -97,7 +97,7 @@ def stiffness_command(
 def _units(name: str, found: Deflection) -> tuple[str, str]:
     """Return the units of a displacement of the output, and of its stiffness."""
     angular = found.angular[found.output.index(name)]
-    return ("mrad", "Nm_per_rad") if angular else ("mm", "N_per_m")
+    return ("mrad", "N m/rad") if angular else ("mm", "N/m")
 
 
 def _output(found: Deflection) -> Any:
