@@ -231,13 +231,14 @@ def test_view_serves_this_machine_until_ctrl_c(arguments: list[str], in_page: st
 
 
 SLOW_WRITER = """
-import sys, threading
+import sys, time
 from pathlib import Path
 
 def slowly(*given):
     write(*given)
     print("under way", flush=True)
-    threading.Event().wait()
+    while True:  # a wait without end would miss a signal that comes just before it (CPython)
+        time.sleep(0.05)
 
 write, Path.write_text = Path.write_text, slowly
 sys.argv[0] = "rps-pin"
