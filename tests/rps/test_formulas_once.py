@@ -86,7 +86,14 @@ TRACES = {
         {"rps.kernels.leg_equations"},
     ),
     "the Kantorovich number": (r"\bcurvature_bound\(", {"rps.kernels.continuation"}),
-    "friction": (r"\btanh\(", {"closed_loop.dynamics.passive_joint_forces", "numerics.elementary"}),
+    "friction": (
+        r"\btanh\(",
+        {
+            "closed_loop.dynamics.passive_joint_forces",
+            "numerics.elementary",
+            "task.stiffness.beams",  # torsion of rectangles
+        },
+    ),
     "the tolerance of limits": (
         r"limit\w* [-+] (1e-12|\w*ROUNDING)",
         set[str](),

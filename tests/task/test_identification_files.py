@@ -105,6 +105,9 @@ def test_the_command(tmp_path: Path) -> None:
     for errors in answer["validation"].values():
         assert errors["free"]["percent"] < 3
         assert errors["believed"]["percent"] > 20
+    again = CliRunner().invoke(app, words)
+    assert isinstance(again.exception, InputError)
+    assert "--overwrite replaces them" in str(again.exception)
     mechanism = ClosedLoopModel.load(tmp_path / "out" / "five_bar_identified.yaml")
     masses = [one.mass for one in mechanism.model.inertias][1:]
     given = [
@@ -112,9 +115,6 @@ def test_the_command(tmp_path: Path) -> None:
     ]
     assert worst(np.array(masses) - given) < 1e-9
     assert (tmp_path / "out" / "base_parameters.csv").read_text().count("\n") == 16
-    again = CliRunner().invoke(app, words)
-    assert isinstance(again.exception, InputError)
-    assert "--overwrite replaces them" in str(again.exception)
 
 
 # Exciting motions ---------------------------------------------------------------------------------

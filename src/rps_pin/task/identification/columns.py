@@ -30,8 +30,8 @@ import pinocchio as pin
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop import ClosedLoopModel, JointEffects
+from rps_pin.closed_loop.dynamics.passive_joint_forces import friction_force
 from rps_pin.errors import InputError, MechanismError, did_you_mean
-from rps_pin.numerics.elementary import tanh
 
 #: Parts of a body, in the order of `pinocchio.Inertia.toDynamicParameters`.
 BODY = ("mass", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
@@ -155,7 +155,7 @@ class Columns:
         if kind == "damping":
             return v[:, own]
         if kind == "friction":
-            return np.asarray(tanh(v[:, own] / self._effects.friction_speed))
+            return np.asarray(friction_force(v[:, own], 0.0, 1.0, self._effects.friction_speed))
         if kind == "stiffness":
             rest = self._effects.rest[own]
             return np.asarray(q[:, joint.idx_q : joint.idx_q + joint.nq] - rest)
