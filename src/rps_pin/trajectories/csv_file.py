@@ -19,9 +19,9 @@ import csv
 import math
 import os
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import BinaryIO, Generic, TypeVar
 
 import numpy as np
 
@@ -45,6 +45,10 @@ LONGEST_LINE = 100_000
 _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 #: What is said of a comma in a number.
 POINT = "; numbers are written with a point, 0.5 and not 0,5"
+
+
+#: What the columns of a header hold.
+Header = TypeVar("Header")
 
 
 @refuses_other_kinds
@@ -98,8 +102,8 @@ def read_csv(
     if max_step is not None:
         positive_number(max_step, "max_step", "seconds")
     columns = OF_RPS if task is None else Columns.of_task(task)
-    with opened(path, "trajectory file") as file:
-        table = _table(lines_of(file, os.fspath(path)), os.fspath(path), columns)
+    read = read_numbers(path, "trajectory file", columns.positions, _row)
+    table = _Table(read.names, read.positions, read.rows, read.lines, read.origin, columns)
     _refuse_few(table, FEWEST_POSES if ends == "free" else 2)
     _refuse_times(table, max_step)
     _refuse_implausible(table)
@@ -121,25 +125,31 @@ def read_csv(
 
 
 @dataclass(frozen=True)
-class _Table:
+class NumberTable(Generic[Header]):
     """The numbers of a file, and their lines."""
 
     names: Sequence[str]
     """Of the columns, as in the header."""
-    positions: Mapping[str, int]
-    """Of the columns that are read, by quantity."""
+    positions: Header
+    """Which columns are read, and what they hold."""
     rows: Array
-    """Shape (rows, columns), in the units of the file; finite."""
+    """What was made of each line, shape (rows, numbers)."""
     lines: Sequence[int]
     """The line of the header, and of each row, from 1."""
     origin: str
     """The file, for messages."""
-    columns: Columns
-    """What is read."""
 
     def place(self, row: int) -> str:
         """Return ``"FILE, line N"`` of a row; of the header for -1."""
         return f"{self.origin}, line {self.lines[row + 1]}"
+
+
+@dataclass(frozen=True)
+class _Table(NumberTable[Mapping[str, int]]):
+    """Of a trajectory, in the units of the file; finite."""
+
+    columns: Columns
+    """What is read."""
 
     def name(self, quantity: str) -> str:
         """Return the name of a quantity's column."""
@@ -178,25 +188,53 @@ def lines_of(file: BinaryIO, origin: str) -> Iterator[tuple[int, str]]:
             yield number, line
 
 
-def _table(lines: Iterator[tuple[int, str]], origin: str, columns: Columns) -> _Table:
-    number, header = next(lines, (0, ""))
-    if not number:
-        raise InputError(f"{origin} is empty: its first line must name the columns")
-    try:
-        mark = delimiter_of(header)
-        names = [cell.strip() for cell in cells_of(header, mark)]
-        positions = columns.positions(names)
-    except InputError as error:
-        raise InputError(f"{origin}, line {number}: {error}") from None
-    numbers, values = array("q", [number]), array("d")
-    for number, line in lines:
+def read_numbers(
+    path: str | os.PathLike[str],
+    what: str,
+    positions_of: Callable[[Sequence[str]], Header],
+    row_of: Callable[[str, str, Sequence[str], Header], Sequence[float]],
+) -> NumberTable[Header]:
+    """Return the numbers of a CSV file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    what
+        What it is, for messages.
+    positions_of
+        What the columns of the header's names hold.
+    row_of
+        The numbers of a line: of the line, what separates its cells, the names and what they hold;
+        as many for each line.
+
+    Raises
+    ------
+    InputError
+        With the file, and the line where these functions raise it.
+    """
+    with opened(path, what) as file:
+        origin = os.fspath(path)
+        lines = lines_of(file, origin)
+        number, header = next(lines, (0, ""))
+        if not number:
+            raise InputError(f"{origin} is empty: its first line must name the columns")
         try:
-            values.extend(_row(line, mark, names))
+            mark = delimiter_of(header)
+            names = [cell.strip() for cell in cells_of(header, mark)]
+            positions = positions_of(names)
         except InputError as error:
             raise InputError(f"{origin}, line {number}: {error}") from None
-        numbers.append(number)
-    rows = np.array(values).reshape(-1, len(names))
-    return _Table(names, positions, rows, numbers, origin, columns)
+        numbers, values = array("q", [number]), array("d")
+        for number, line in lines:
+            try:
+                values.extend(row_of(line, mark, names, positions))
+            except InputError as error:
+                raise InputError(f"{origin}, line {number}: {error}") from None
+            numbers.append(number)
+    count = len(numbers) - 1
+    rows = np.array(values).reshape(count, -1 if count else len(names))
+    return NumberTable(names, positions, rows, numbers, origin)
 
 
 def delimiter_of(header: str) -> str:
@@ -224,7 +262,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
         raise InputError(str(error)) from None
 
 
-def _row(line: str, delimiter: str, names: Sequence[str]) -> list[float]:
+def _row(line: str, delimiter: str, names: Sequence[str], _: object) -> list[float]:
     """Return the numbers of a line."""
     cells = cells_of(line, delimiter)
     if len(cells) != len(names):

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,11 +24,10 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, did_you_mean, few, shown
-from rps_pin.files import opened
 from rps_pin.task.calibration.sensors import Readings, possible_sensors, readings
 from rps_pin.task.task import Task
 from rps_pin.trajectories.csv_columns import ANGLES, LENGTHS, TIMES, is_number
-from rps_pin.trajectories.csv_file import POINT, cells_of, delimiter_of, lines_of
+from rps_pin.trajectories.csv_file import POINT, NumberTable, cells_of, read_numbers
 
 #: Columns that are known and not used.
 _UNUSED = ("pose", *(f"time_{unit}" for unit in TIMES))
@@ -69,30 +69,12 @@ def read_readings(
         deviation or two.
     """
     known = possible_sensors(task) | dict(more or {})
-    with opened(path, "file of readings") as file:
-        lines = lines_of(file, os.fspath(path))
-        number, header = next(lines, (0, ""))
-        if not number:
-            raise InputError(f"{path} is empty: its first line must name the columns")
-        try:
-            mark = delimiter_of(header)
-            names = [cell.strip() for cell in cells_of(header, mark)]
-            columns = _columns(names, known)
-        except InputError as error:
-            raise InputError(f"{path}, line {number}: {error}") from None
-        at, rows = [], []
-        for number, line in lines:
-            try:
-                rows.append(_row(cells_of(line, mark), names, columns))
-            except InputError as error:
-                raise InputError(f"{path}, line {number}: {error}") from None
-            at.append(number)
-    if not rows:
+    table = read_numbers(path, "file of readings", partial(_columns, known=known), _row)
+    if not len(table.rows):
         raise InputError(f"{path}: there are no poses after the header")
-    table = np.array(rows)
-    _refuse_far(table, columns, names, known, task, [f"{path}, line {number}" for number in at])
+    _refuse_far(table, known, task)
     try:
-        return _readings(task, table, columns, dict(deviations or {}), known)
+        return _readings(task, table.rows, table.positions, dict(deviations or {}), known)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -168,8 +150,9 @@ def _unknown(name: str, known: Mapping[str, bool], possible: Mapping[str, _Colum
     )
 
 
-def _row(cells: Sequence[str], names: Sequence[str], columns: Mapping[int, _Column]) -> list[float]:
+def _row(line: str, mark: str, names: Sequence[str], columns: Mapping[int, _Column]) -> list[float]:
     """Return the numbers of a line in SI units, NaN of empty cells and of columns not used."""
+    cells = cells_of(line, mark)
     if len(cells) != len(names):
         raise InputError(f"{len(cells)} cells, where the header names {len(names)} columns{POINT}")
     found = [math.nan] * len(names)
@@ -191,27 +174,23 @@ def _row(cells: Sequence[str], names: Sequence[str], columns: Mapping[int, _Colu
 
 
 def _refuse_far(
-    table: Array,
-    columns: Mapping[int, _Column],
-    names: Sequence[str],
-    known: Mapping[str, bool],
-    task: Task,
-    places: Sequence[str],
+    table: NumberTable[dict[int, _Column]], known: Mapping[str, bool], task: Task
 ) -> None:
     """Refuse columns of which most numbers are so large that their unit must be another.
 
     A single one is an outlier, which the calibration finds.
     """
-    for k, one in columns.items():
+    for k, one in table.positions.items():
         turns = known[one.sensor]
         limit = _TURNED if turns else _FAR * task.characteristic_length
-        given = table[np.isfinite(table[:, k]), k]
+        column = table.rows[:, k]
+        given = column[np.isfinite(column)]
         if given.size and np.median(np.abs(given)) > limit:
             unit = "rad" if turns else "m"
             instead = f"{one.sensor}_{'deg' if turns else 'mm'}"
-            row = int(np.nanargmax(np.abs(table[:, k]) > limit))
+            row = int(np.nanargmax(np.abs(column) > limit))
             raise InputError(
-                f"{places[row]}: {names[k]} = {table[row, k] / one.unit:.9g}, as most of its "
-                f"column, is beyond {limit:.4g} {unit}; if it is in another unit, name it so: "
+                f"{table.place(row)}: {table.names[k]} = {column[row] / one.unit:.9g}, as most of "
+                f"its column, is beyond {limit:.4g} {unit}; if it is in another unit, name it so: "
                 f"{instead}"
             )

@@ -15,16 +15,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, few, shown
-from rps_pin.files import opened
 from rps_pin.task.identification.log import Log, force_log
 from rps_pin.task.identification.model import DynamicsModel
 from rps_pin.trajectories.csv_columns import ANGLES, LENGTHS, TIMES, is_number
-from rps_pin.trajectories.csv_file import POINT, cells_of, delimiter_of, lines_of
+from rps_pin.trajectories.csv_file import POINT, cells_of, read_numbers
 
 _FORCES = {"N": 1.0, "mN": 1e-3, "kN": 1e3}
 _MOMENTS = {"Nm": 1.0, "mNm": 1e-3, "kNm": 1e3}
@@ -56,40 +56,26 @@ def read_log(
         or two; if a cell is no finite number; if times do not increase.
     """
     possible = _possible(model)
-    with opened(path, "log") as file:
-        lines = lines_of(file, os.fspath(path))
-        number, header = next(lines, (0, ""))
-        if not number:
-            raise InputError(f"{path} is empty: its first line must name the columns")
-        try:
-            mark = delimiter_of(header)
-            names = [cell.strip() for cell in cells_of(header, mark)]
-            columns = _columns(names, possible, model)
-        except InputError as error:
-            raise InputError(f"{path}, line {number}: {error}") from None
-        rows = []
-        for number, line in lines:
-            try:
-                rows.append(_row(cells_of(line, mark), names, columns))
-            except InputError as error:
-                raise InputError(f"{path}, line {number}: {error}") from None
-            if len(rows) > 1 and not rows[-1][0] > rows[-2][0]:
-                raise InputError(
-                    f"{path}, line {number}: times must increase, but {rows[-1][0]:.9g} s comes "
-                    f"after {rows[-2][0]:.9g} s"
-                )
-    table = np.array(rows).reshape(-1, len(columns))
+    table = read_numbers(path, "log", partial(_columns, possible=possible, model=model), _row)
+    names, columns, rows = table.names, table.positions, table.rows
     at = {what: k for k, what in enumerate(columns)}
+    time = rows[:, at["time", ""]]
+    if not (np.diff(time) > 0).all():
+        k = int(np.argmin(np.diff(time) > 0)) + 1
+        raise InputError(
+            f"{table.place(k)}: times must increase, but {time[k]:.9g} s comes after "
+            f"{time[k - 1]:.9g} s"
+        )
 
     def of(kind: str) -> Array:
-        return table[:, [at[kind, name] for name in model.actuators]]
+        return rows[:, [at[kind, name] for name in model.actuators]]
 
     current = ("current", model.actuators[0]) in at
     used = {k for k, _ in columns.values()}
     unused = [name for k, name in enumerate(names) if k not in used]
     log = force_log(
         model,
-        table[:, at["time", ""]],
+        time,
         of("position"),
         None if current else of("force"),
         current=of("current") if current else None,
@@ -153,9 +139,10 @@ def _columns(
 
 
 def _row(
-    cells: Sequence[str], names: Sequence[str], columns: Mapping[_What, tuple[int, float]]
+    line: str, mark: str, names: Sequence[str], columns: Mapping[_What, tuple[int, float]]
 ) -> list[float]:
     """Return the numbers of a line in SI units, in the order of the columns."""
+    cells = cells_of(line, mark)
     if len(cells) != len(names):
         raise InputError(f"{len(cells)} cells, where the header names {len(names)} columns{POINT}")
     found = []
