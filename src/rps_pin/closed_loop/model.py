@@ -51,7 +51,7 @@ from rps_pin.closed_loop.io.mechanism_file import parts_from_yaml
 from rps_pin.closed_loop.io.mjcf import parts_from_mjcf
 from rps_pin.closed_loop.io.parts import MechanismParts, with_effects, without_position_limits
 from rps_pin.closed_loop.io.urdf import parts_from_urdf
-from rps_pin.closed_loop.io.write.files import write_mjcf, write_urdf
+from rps_pin.closed_loop.io.write.files import UrdfTexts, urdf_texts, write_mjcf, write_urdf
 from rps_pin.closed_loop.io.write.mjcf_inertia import Mending
 from rps_pin.closed_loop.io.write.source import Source
 from rps_pin.closed_loop.io.xml_file import absolute
@@ -656,8 +656,12 @@ class ClosedLoopModel:
         return type(self)(same.model, closures, self.actuated, home=home, **self._options())
 
     def for_task(self, task: Mapping[str, Any]) -> ClosedLoopModel:
-        """Return the same mechanism for a task: the arguments of a `rps_pin.task.Task`."""
-        options = self._options() | {"task": dict(task)}
+        """Return the same mechanism for a task: the arguments of a `rps_pin.task.Task`.
+
+        Those that are None are left out.
+        """
+        given = {name: value for name, value in task.items() if value is not None}
+        options = self._options() | {"task": given}
         return type(self)(self.model, self.closures, self.actuated, home=self._home, **options)
 
     def without_effects(self) -> ClosedLoopModel:
@@ -1496,6 +1500,10 @@ class ClosedLoopModel:
             If a limit is one that URDF does not have; names the joint.
         """
         return write_urdf(self._source(), path, shapes, overwrite)
+
+    def urdf_texts(self, path: Path, shapes: pin.GeometryModel | None = None) -> UrdfTexts:
+        """Return the texts that `to_urdf` writes for a path, whose arguments and errors it has."""
+        return urdf_texts(self._source(), path, shapes)
 
     def to_mjcf(
         self,

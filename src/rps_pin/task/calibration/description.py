@@ -10,7 +10,6 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,8 @@ from lxml import etree
 
 from rps_pin.arrays import Array
 from rps_pin.closed_loop import ClosedLoopModel, LoopClosure
-from rps_pin.errors import ClosureError, InputError
-from rps_pin.files import write_text
+from rps_pin.closed_loop.io.write.files import urdf_path, write_texts
+from rps_pin.errors import ClosureError
 from rps_pin.plain_text import short
 from rps_pin.task.calibration.prediction import CalibrationModel
 from rps_pin.task.calibration.solve import Calibration
@@ -86,32 +85,18 @@ def write_calibrated(
     RPSPinError
         As `calibrated_mechanism`, and `ClosedLoopModel.to_urdf`.
     """
-    target = Path(path)
-    description = target.with_suffix(".yaml")
-    there = [str(one) for one in (target, description) if one.exists() or one.is_symlink()]
-    if there and not overwrite:
-        raise InputError(f"{' and '.join(there)} exist; overwrite=True replaces them")
-    before, after = model.task.mechanism, calibrated_mechanism(model, found)
-    texts = []
-    for one in (before, after):
-        with TemporaryDirectory() as folder:
-            made = with_task(one, model).to_urdf(Path(folder, target.name), shapes=shapes)
-            texts.append([made.with_suffix(".urdf").read_text("utf-8"), made.read_text("utf-8")])
-    changes = changes_in_words(model, found)
-    tree = _commented_urdf(texts[0][0], texts[1][0], changes)
-    described = _commented_yaml(texts[0][1], texts[1][1], changes, after)
-    write_text(target, tree)
-    write_text(description, "\n".join([*_head(model, found, changes), described]))
-    return description
-
-
-def with_task(mechanism: ClosedLoopModel, model: CalibrationModel) -> ClosedLoopModel:
-    """Return a mechanism that has the task of a model, if it has none."""
-    if mechanism.has_task:
-        return mechanism
-    return mechanism.for_task(
-        {name: value for name, value in model.task.options.items() if value is not None}
+    target, changes = urdf_path(path), changes_in_words(model, found)
+    mechanisms = model.task.mechanism, calibrated_mechanism(model, found)
+    before, after = (
+        (one if one.has_task else one.for_task(model.task.options)).urdf_texts(target, shapes)
+        for one in mechanisms
     )
+    described = _commented_yaml(before.description, after.description, changes, mechanisms[1])
+    commented = after._replace(
+        urdf=_commented_urdf(before.urdf, after.urdf, changes),
+        description="\n".join([*_head(model, found, changes), described]),
+    )
+    return write_texts(target, commented, overwrite)
 
 
 def changes_in_words(model: CalibrationModel, found: Calibration) -> dict[str, str]:

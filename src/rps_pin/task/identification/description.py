@@ -6,12 +6,10 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import pinocchio as pin
 
-from rps_pin.errors import InputError
-from rps_pin.files import write_text
+from rps_pin.closed_loop.io.write.files import urdf_path, write_texts
 from rps_pin.plain_text import short
 from rps_pin.task.identification.result import Identification
 
@@ -52,24 +50,15 @@ def write_identified(
     RPSPinError
         As `Identification.mechanism` and `ClosedLoopModel.to_urdf`.
     """
-    target = Path(path)
-    description = target.with_suffix(".yaml")
-    there = [str(one) for one in (target, description) if one.exists() or one.is_symlink()]
-    if there and not overwrite:
-        raise InputError(f"{' and '.join(there)} exist; overwrite=True replaces them")
-    mechanism, task = found.mechanism, found.model.task
+    target, mechanism = urdf_path(path), found.mechanism
     if not mechanism.has_task:
-        given = {name: value for name, value in task.options.items() if value is not None}
-        mechanism = mechanism.for_task(given)
-    with TemporaryDirectory() as folder:
-        made = mechanism.to_urdf(Path(folder, target.name), shapes=shapes)
-        tree, described = (
-            made.with_suffix(suffix).read_text("utf-8") for suffix in (".urdf", ".yaml")
-        )
-    changes = changes_in_words(found)
-    write_text(target, _commented_tree(tree, changes))
-    write_text(description, _commented(described, found, changes))
-    return description
+        mechanism = mechanism.for_task(found.model.task.options)
+    texts, changes = mechanism.urdf_texts(target, shapes), changes_in_words(found)
+    commented = texts._replace(
+        urdf=_commented_tree(texts.urdf, changes),
+        description=_commented(texts.description, found, changes),
+    )
+    return write_texts(target, commented, overwrite)
 
 
 def changes_in_words(found: Identification) -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import pinocchio as pin
 
@@ -25,14 +26,43 @@ def write_urdf(
     overwrite: bool = False,
 ) -> Path:
     """Write the URDF of a mechanism and, beside it, its description; see `ClosedLoopModel`."""
-    target = _target(path, ".urdf")
-    description = target.with_suffix(".yaml")
+    target = urdf_path(path)
+    return write_texts(target, urdf_texts(source, target, shapes), overwrite)
+
+
+def urdf_path(path: str | os.PathLike[str]) -> Path:
+    """Return the path of a URDF.
+
+    Raises
+    ------
+    InputError
+        If it does not end in ``.urdf``.
+    """
+    return _target(path, ".urdf")
+
+
+class UrdfTexts(NamedTuple):
+    """A URDF and its description, to be written."""
+
+    urdf: str
+    description: str
+    told: list[str]
+    """What the format does not have."""
+
+
+def urdf_texts(source: Source, target: Path, shapes: pin.GeometryModel | None = None) -> UrdfTexts:
+    """Return the URDF that `target` will be, and its description."""
     told: list[str] = []
     plain = without_rows(source, is_whole)
     text, merges, ignored = urdf_text(plain, shapes, told)
-    described = description_text(plain, target.name, merges, ignored)
-    _write({target: text, description: described}, overwrite)
-    _tell(target, told)
+    return UrdfTexts(text, description_text(plain, target.name, merges, ignored), told)
+
+
+def write_texts(target: Path, texts: UrdfTexts, overwrite: bool) -> Path:
+    """Write a URDF and, beside it, its description; return the path of the latter."""
+    description = target.with_suffix(".yaml")
+    _write({target: texts.urdf, description: texts.description}, overwrite)
+    _tell(target, texts.told)
     return description
 
 
