@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,9 +14,8 @@ import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
-from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
-from rps_pin.cli.task_options import load_task_and_file
+from rps_pin.cli.task_options import load_task_and_file, needed_mechanism
 from rps_pin.errors import InputError, few
 from rps_pin.files import write_text
 from rps_pin.plain_text import short
@@ -37,18 +35,7 @@ def calibrate_command(
         Path,
         typer.Argument(metavar="DATA.csv", help="Readings, a row for each pose."),
     ],
-    mechanism: Annotated[
-        Path,
-        typer.Option(
-            "--mechanism",
-            "-m",
-            metavar="FILE|NAME",
-            help="The mechanism with a task, as it is believed to be: a description, or parameters "
-            "of a 3-RPS.",
-            show_default=False,
-            autocompletion=names_or_files(mechanism_names),
-        ),
-    ],
+    mechanism: Annotated[Path, needed_mechanism(", as it is believed to be")],
     parameters: Annotated[
         list[str] | None,
         typer.Option(
@@ -179,10 +166,11 @@ def _write(
 ) -> list[str]:
     """Write all files; return what the formats do not have."""
     urdf, _, parameters, residuals = files
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        shapes, notes = options.shapes_of(source, model.task.mechanism)
-        of_tasks.write_calibrated(model, found, urdf, shapes=shapes, overwrite=True)
+    notes = options.written_with_shapes(
+        source,
+        model.task.mechanism,
+        lambda shapes: of_tasks.write_calibrated(model, found, urdf, shapes=shapes, overwrite=True),
+    )
     units = units_of(model)
     rows = [
         (label, units[k] or "1", *map(repr, map(float, values)), "yes" if found.alone[k] else "no")
@@ -208,7 +196,7 @@ def _write(
         for pose, row in enumerate(found.residuals)
     ]
     write_text(residuals, _csv([["pose", *names], *cells]))
-    return list(dict.fromkeys([*notes, *(str(one.message) for one in told)]))
+    return notes
 
 
 def _csv(rows: Sequence[Sequence[str]]) -> str:

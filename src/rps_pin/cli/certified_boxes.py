@@ -14,7 +14,7 @@ from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.outputs import check_outputs
 from rps_pin.cli.task_options import in_unit, unit_of
-from rps_pin.cli.task_workspace import _grid as grid_of
+from rps_pin.cli.task_workspace import grid_of
 from rps_pin.errors import InputError
 from rps_pin.files import write_text
 from rps_pin.numerics.boxes import CertifiedBoxes

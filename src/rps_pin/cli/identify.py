@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,9 +13,8 @@ import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
-from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
-from rps_pin.cli.task_options import load_task_and_file
+from rps_pin.cli.task_options import load_task_and_file, needed_mechanism
 from rps_pin.files import write_text
 from rps_pin.plain_text import short
 
@@ -34,18 +32,7 @@ def identify_command(
             metavar="LOG.csv...", help="Time, the actuators' positions and forces; one or more."
         ),
     ],
-    mechanism: Annotated[
-        Path,
-        typer.Option(
-            "--mechanism",
-            "-m",
-            metavar="FILE|NAME",
-            help="The mechanism with a task, as it is believed to be: a description, or parameters "
-            "of a 3-RPS.",
-            show_default=False,
-            autocompletion=names_or_files(mechanism_names),
-        ),
-    ],
+    mechanism: Annotated[Path, needed_mechanism(", as it is believed to be")],
     bodies: Annotated[
         list[str] | None,
         typer.Option(
@@ -165,11 +152,11 @@ def _write(found: Identification, files: Sequence[Path], source: Path) -> list[s
         ("parameter", "believed", "possible"),
         zip(model.labels, model.nominal, found.possible.parameters, strict=True),
     )
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        shapes, notes = options.shapes_of(source, model.mechanism)
-        write_identified(found, urdf, shapes=shapes, overwrite=True)
-    return list(dict.fromkeys([*notes, *(str(one.message) for one in told)]))
+    return options.written_with_shapes(
+        source,
+        model.mechanism,
+        lambda shapes: write_identified(found, urdf, shapes=shapes, overwrite=True),
+    )
 
 
 def _csv(path: Path, header: Sequence[str], rows: Any) -> None:

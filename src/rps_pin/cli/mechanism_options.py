@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -157,6 +157,17 @@ def shapes_of(
     if shapes is None:
         mechanism.file = None  # the viewer need not look again
     return shapes, [str(one.message) for one in told]
+
+
+def written_with_shapes(
+    file: Path, mechanism: ClosedLoopModel, write: Callable[[pin.GeometryModel | None], object]
+) -> list[str]:
+    """Write a mechanism with the shapes of a file; return what the formats do not have."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        shapes, notes = shapes_of(file, mechanism)
+        write(shapes)
+    return list(dict.fromkeys([*notes, *(str(one.message) for one in told)]))
 
 
 def print_notes(notes: Iterable[str]) -> None:

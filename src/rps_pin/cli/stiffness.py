@@ -9,8 +9,7 @@ import numpy as np
 import typer
 
 from rps_pin.cli import console as common
-from rps_pin.cli.completion import mechanism_names, names_or_files
-from rps_pin.cli.task_options import given, load_task_and_file
+from rps_pin.cli.task_options import given, load_task_and_file, needed_mechanism
 from rps_pin.plain_text import short
 from rps_pin.task.stiffness import Deflection, StiffnessModel, load_compliances
 
@@ -24,17 +23,7 @@ def stiffness_command(
         Path,
         typer.Argument(metavar="FILE", help="What gives way: drives, bearings and beams; YAML."),
     ],
-    mechanism: Annotated[
-        Path,
-        typer.Option(
-            "--mechanism",
-            "-m",
-            metavar="FILE|NAME",
-            help="The mechanism with a task: a description, or parameters of a 3-RPS.",
-            show_default=False,
-            autocompletion=names_or_files(mechanism_names),
-        ),
-    ],
+    mechanism: Annotated[Path, needed_mechanism("")],
     at: Annotated[
         list[str] | None,
         typer.Option(

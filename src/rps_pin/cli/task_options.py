@@ -47,6 +47,18 @@ MechanismOption = Annotated[
 ]
 
 
+def needed_mechanism(told: str) -> Any:
+    """Return the option ``--mechanism`` of a command that needs one; `told` says which."""
+    return typer.Option(
+        "--mechanism",
+        "-m",
+        metavar="FILE|NAME",
+        help=f"The mechanism with a task{told}: a description, or parameters of a 3-RPS.",
+        show_default=False,
+        autocompletion=names_or_files(mechanism_names),
+    )
+
+
 def load_task(file: Path, ignore_limits: bool = False, accuracy: float | None = None) -> Task:
     """Return the task of a mechanism's file, or of the parameters of a 3-RPS.
 

@@ -122,7 +122,7 @@ def workspace_of_task(
         options.require_masses(model)
     if turning_speed is not None:
         demands["turning_speed"] = math.radians(turning_speed) if degrees else turning_speed
-    grid = _grid(task, over, held, degrees)
+    grid = grid_of(task, over, held, degrees)
     drawn = "slices" if len(grid.over) == 3 else "map"
     files = [output / "workspace.h5"]
     if len(grid.over) == 3:
@@ -190,7 +190,8 @@ def _of_counts(
     }
 
 
-def _grid(task: Task, over: Sequence[str], held: Sequence[str], degrees: bool) -> TaskGrid:
+def grid_of(task: Task, over: Sequence[str], held: Sequence[str], degrees: bool) -> TaskGrid:
+    """Return the grid that ``--over`` and ``--held`` ask for; in degrees if `degrees`."""
     axes: dict[str, Array] = {}
     for text in over:
         name, _, rest = text.partition("=")

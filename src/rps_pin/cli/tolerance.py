@@ -9,11 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from rps_pin.cli import console as common
-from rps_pin.cli.completion import mechanism_names, names_or_files
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
-from rps_pin.cli.task_options import load_path, load_task_and_file
-from rps_pin.cli.task_workspace import HeldOption, OverOption
-from rps_pin.cli.task_workspace import _grid as grid_of
+from rps_pin.cli.task_options import load_path, load_task_and_file, needed_mechanism
+from rps_pin.cli.task_workspace import HeldOption, OverOption, grid_of
 from rps_pin.errors import InputError
 from rps_pin.rps.task import RPSTask
 from rps_pin.task import Task
@@ -29,18 +27,7 @@ def tolerance_command(
     file: Annotated[
         Path, typer.Argument(metavar="FILE.yaml", help="Tolerances by name or pattern: YAML.")
     ],
-    mechanism: Annotated[
-        Path,
-        typer.Option(
-            "--mechanism",
-            "-m",
-            metavar="FILE|NAME",
-            help="The mechanism with a task, as it is drawn: a description, or parameters of a "
-            "3-RPS.",
-            show_default=False,
-            autocompletion=names_or_files(mechanism_names),
-        ),
-    ],
+    mechanism: Annotated[Path, needed_mechanism(", as it is drawn")],
     path: Annotated[
         Path | None,
         typer.Option(
