@@ -655,7 +655,7 @@ def _call_reduced(reduced: tuple[Any, ...], memo: dict[int, Any]) -> Any:
 
 def options_of(errors: Errors) -> dict[str, Any]:
     """Return the option of an engine; without one, generated code answers single calls fastest."""
-    return {} if errors == "raise" else {"errors": errors}
+    return {} if isinstance(errors, str) and errors == "raise" else {"errors": errors}
 
 
 def _continued(within_limits: bool, errors: Errors) -> dict[str, Any]:

@@ -526,7 +526,8 @@ class CompiledMechanism:
         threads: int = 1,
     ) -> GeneratedForces:
         """Return the forces of motions; see `ClosedLoopModel.inverse_dynamics`."""
-        usual = wrenches is None and parameters is None and errors == "raise" and threads == 1
+        usual = wrenches is None and parameters is None and threads == 1
+        usual = usual and errors.__class__ is str and errors == "raise"
         if usual and not self._underactuated:
             single = self._single.inverse_dynamics(q, v, a)
             if single and not single[-1]:
@@ -1195,7 +1196,7 @@ class _Single:
 
 def _checked(errors: Errors, threads: int) -> None:
     """Refuse options that are not possible."""
-    if errors not in ("raise", "mask"):
+    if errors.__class__ is not str or errors not in ("raise", "mask"):
         choice(errors, "errors", ("raise", "mask"))
     if threads != 1:
         whole_number(threads, "threads")

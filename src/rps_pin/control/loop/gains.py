@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.other_kinds import refuses_other_kinds
-from rps_pin.validation import positive_number, read_only, real_array
+from rps_pin.validation import positive_number, read_only, real_array, whole_number
 
 
 @refuses_other_kinds
@@ -101,8 +101,9 @@ class Gains:
         Raises
         ------
         InputError
-            If they are the gains of another number of errors.
+            If they are the gains of another number of errors, or the number is none.
         """
+        count = whole_number(count, "count")
         rows = [np.asarray(row) for row in (self.proportional, self.derivative, self.integral)]
         if len(rows[0]) == count:
             return self

@@ -20,7 +20,7 @@ from rps_pin.rps.generated.robot import limits_of, terms_numbers
 from rps_pin.rps.kinematics.forward_kinematics import CONDITION_LIMIT, forward_kinematics
 from rps_pin.rps.kinematics.inverse_kinematics import inverse_kinematics
 from rps_pin.rps.kinematics.legs import Legs
-from rps_pin.rps.kinematics.samples import Errors
+from rps_pin.rps.kinematics.samples import Errors, check_errors_option
 from rps_pin.rps.parameters import RPSParameters
 
 if TYPE_CHECKING:
@@ -136,7 +136,9 @@ class RobotCalls:
     ) -> Found:
         """Return the results of a function, and which samples have one."""
         code = self.code
-        if errors not in ("raise", "mask") or not (code.lanes or _are_single(given)):
+        if errors.__class__ is not str or errors not in ("raise", "mask"):
+            check_errors_option(errors)
+        if not (code.lanes or _are_single(given)):
             return answer(*given, errors)
         try:
             *found, status = code.functions[name](*given, *numbers, threads=self.threads)

@@ -62,8 +62,7 @@ class DynamicsModel:
     Attributes
     ----------
     labels : tuple of str
-        What each estimated parameter is: ``inertia:platform.mass``, ``damping:leg_1``; see
-        `rps_pin.task.identification.columns`.
+        What each estimated parameter is: ``inertia:platform.mass``, ``damping:leg_1``.
     nominal : array
         The estimated parameters of the mechanism as it is believed to be, shape (p,).
 
