@@ -1,8 +1,8 @@
 """Write the table of docs/identify.md: .venv/bin/python docs/identification_table.py.
 
 Robots, and a number of logs of each, as arguments run these only, and print them. Each robot makes
-an exciting motion, and its forces have noise of 2 % of their root mean square, its encoders one of
-1e-7 m or rad. Needs generated code.
+an exciting motion, with standstill before and after it, and its forces have noise of 2 % of their
+root mean square, its encoders one of 1e-7 m or rad. Needs generated code.
 """
 
 from __future__ import annotations
@@ -23,12 +23,15 @@ from rps_pin.task.identification import (
     identify,
     with_parameters,
 )
+from rps_pin.task.identification.filtering import REACH
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "identify.md"
 ROBOTS = ("3-RPS", "stewart", "delta", "five_bar")
 #: Logs of each robot, samples a second, cut-off frequency, Hz, and noise.
 LOGS, RATE, CUT_OFF, NOISE, ENCODER = 200, 50.0, 8.0, 0.02, 1e-7
+#: Standstill before and after the motion, s: what the filter leaves out of a log.
+REST = REACH / CUT_OFF
 #: Logs for which the physically possible parameters are found too, and of the second motion.
 POSSIBLE = 20
 
@@ -57,8 +60,10 @@ def truth(model: DynamicsModel, rng: np.random.Generator) -> Any:
 def exact(model: DynamicsModel, p: Any, seed: int) -> tuple[Any, Any, Any, Any]:
     """Return times, positions and forces of an exciting motion, and its base regressor."""
     motion = exciting_motion(model, iterations=5, starts=10, seed=seed).trajectory
-    t = np.arange(0.0, motion.duration, 1 / RATE)
-    state = model.task.state(*motion.sample(t))
+    t = np.arange(-REST, motion.duration + REST, 1 / RATE)
+    x, rate, acceleration = motion.sample(np.clip(t, 0.0, motion.duration))
+    moves = ((t >= 0.0) & (t <= motion.duration))[:, None]
+    state = model.task.state(x, rate * moves, acceleration * moves)
     mechanism = with_parameters(model, p)
     force = np.array([mechanism.inverse_dynamics(*one).tau for one in zip(*state, strict=True)])
     position = state.q[:, model.task.of_actuators]
