@@ -40,6 +40,12 @@ class PointLegs(NamedTuple):
     """x, y and z of the universal joints in world axes, shape (legs, 3, 3), rows."""
     angles: Array
     """Least and largest s, then t, shape (legs, 2, 2), rad; infinite where there is no limit."""
+    links: tuple[dict[int, Array], ...]
+    """Of each leg, by joint of the model: the rotation from the link's axes to the leg's.
+
+    The rows are the first axis, the second, and the one across both (first link), or the one across
+    the second axis and u, the second axis, and u (second link, and the slide).
+    """
 
 
 def point_legs(task: Task) -> PointLegs:
@@ -74,14 +80,14 @@ def point_legs(task: Task) -> PointLegs:
     if set(legs) != set(mechanism.actuated) or len(legs) != 6:
         _refuse(task, f"it has {len(legs)} legs with actuators, not six")
     ordered = [legs[one] for one in mechanism.actuated]
-    platform, base, *rest = (np.array(one) for one in zip(*ordered, strict=True))
-    return PointLegs(base, platform, *rest)
+    *numbers, links = zip(*ordered, strict=True)
+    return PointLegs(*(np.array(numbers[i]) for i in (1, 0, 2, 3, 4)), links)
 
 
 def _leg(
     task: Task, mechanism: ClosedLoopModel, last: int, tip: Array
-) -> tuple[str, Array, float, Array, Array]:
-    """Return the actuator of a leg, its fixed point, offset, axes and limits, from its last joint.
+) -> tuple[str, Array, float, Array, Array, dict[int, Array]]:
+    """Return the actuator of a leg, and its fixed point, offset, axes, limits and links.
 
     See `PointLegs`.
     """
@@ -115,7 +121,9 @@ def _leg(
     axes = np.array([x, y, z]) @ model.jointPlacements[first].rotation.T
     limits = np.array([_limits(model, first), _limits(model, middle)])
     limits[1] += math.atan2(d @ x, d @ z)
-    return name, np.asarray(fixed), float(sum(offsets)), axes, limits
+    on_first, on_second = np.array([x, y, z]), np.array([np.cross(y, d), y, d]) @ between.rotation
+    links = {first: on_first, middle: on_second, last: on_second @ along.rotation}
+    return name, np.asarray(fixed), float(sum(offsets)), axes, limits, links
 
 
 def _limits(model: pin.Model, joint: int) -> tuple[float, float]:

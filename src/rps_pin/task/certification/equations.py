@@ -161,7 +161,7 @@ class Equations:
         nothing = Interval(np.zeros((self.size, len(z))))
         by_y, by_x = self._slopes(*self.inputs(z, Interval(x.T), nothing))
         n, m = self.size, self.coordinates
-        return _middles(by_y, n, n, len(z)), _middles(by_x, n, m, len(z))
+        return middles(by_y, n, n, len(z)), middles(by_x, n, m, len(z))
 
     def second(self, z: Array, x: Interval, y: Interval) -> Second:
         """Return bounds of second derivatives over boxes of x, (m, n), and y, (unknowns, n)."""
@@ -297,8 +297,8 @@ def _matrices(entries: list[Any], rows: int, columns: int, n: int) -> Array:
     return np.asarray(stacked.reshape(n, rows, columns))
 
 
-def _middles(entries: list[Any], rows: int, columns: int, n: int) -> tuple[Array, Array]:
-    """Return middles and half widths, rounded up."""
+def middles(entries: list[Any], rows: int, columns: int, n: int) -> tuple[Array, Array]:
+    """Return middles and half widths of matrices of intervals, rounded up: (n, rows, columns)."""
     low = [one.lower if isinstance(one, Interval) else one for one in entries]
     high = [one.upper if isinstance(one, Interval) else one for one in entries]
     lower, upper = _matrices(low, rows, columns, n), _matrices(high, rows, columns, n)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, MechanismError, SingularityError
 from rps_pin.numerics.boxes import CertifiedBoxes, Progress
+from rps_pin.task.certification.cones import Cones
 from rps_pin.task.certification.equations import Equations
 from rps_pin.task.certification.exclusion import Exclusion
 from rps_pin.task.certification.growth import Growth, Start
 from rps_pin.task.certification.margins import Margins
 from rps_pin.task.certification.newton import sheets
+from rps_pin.task.paths.limits import Cone
 from rps_pin.task.start import started
 from rps_pin.task.task import Task
 from rps_pin.validation import non_negative_number, whole_number
@@ -27,6 +31,7 @@ def certify_general(
     upper: Array,
     *,
     start: ArrayLike | None,
+    cones: Sequence[Cone] = (),
     free: float,
     undecided: float,
     most_boxes: int,
@@ -47,7 +52,7 @@ def certify_general(
     x, q = _started(task, lower, upper, start)
     z = equations.closed(equations.state(q)[None], x[None])
     first = sheets(equations, z, x[None], np.zeros((1, task.size)))
-    margins = Margins(equations, first)
+    margins = Margins(equations, first, Cones(equations, cones) if cones else None)
     if not first.proven[0] or margins.side == 0.0:
         raise SingularityError(
             "the start is singular, so that it decides no assembly mode", np.inf, 1e9

@@ -15,6 +15,7 @@ import numpy as np
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import MechanismError
 from rps_pin.numerics.intervals import share_beyond
+from rps_pin.task.certification.cones import Cones, Rooms
 from rps_pin.task.certification.equations import Equations, inverses
 from rps_pin.task.certification.newton import Sheets
 
@@ -48,7 +49,10 @@ class _Limited(NamedTuple):
 class Margins:
     """Limits of joints and the side of the type II singularities."""
 
-    def __init__(self, equations: Equations, side: Sheets | None = None) -> None:
+    def __init__(
+        self, equations: Equations, side: Sheets | None = None, cones: Cones | None = None
+    ) -> None:
+        self._cones = cones
         task, self._equations = equations.task, equations
         mechanism = task.mechanism
         self._limited = _limits(equations)
@@ -63,10 +67,6 @@ class Margins:
         self._square = len(self._actuators) == task.size
         self._side = 0.0 if side is None else float(self.signs(side)[0])
 
-    def started(self, start: Sheets) -> Margins:
-        """Return these with the start's side of the singularities."""
-        return Margins(self._equations, start)
-
     @property
     def side(self) -> float:
         """Sign of the determinant at the start; 0 where it has none."""
@@ -79,6 +79,8 @@ class Margins:
         shares = np.stack([np.ones(n), np.zeros(n)], axis=-1)
         for limited in self._limited:
             self._keep(limited, one, inside, outside, shares)
+        if self._cones is not None:
+            self._keep_cones(self._cones.rooms(one), one, inside, outside, shares)
         regular, sign = self._regular(one)
         right = regular & ((sign == self._side) if self._square else True)
         if self._square:
@@ -128,6 +130,26 @@ class Margins:
             broken[~once[crossing]] = 0.0
             shares[crossing, 0] -= 1.0 - kept
             shares[crossing, 1] = np.maximum(shares[crossing, 1], broken)
+
+    @staticmethod
+    def _keep_cones(
+        rooms: Rooms, one: Sheets, inside: Bools, outside: Bools, shares: Array
+    ) -> None:
+        """Take the room of cones into account."""
+        reach = np.abs(rooms.slopes) * one.half[:, None]  # (n, cones, m)
+        low = rooms.middle - reach.sum(axis=-1) - rooms.error - _ROUNDED
+        high = rooms.middle + reach.sum(axis=-1) + rooms.error + _ROUNDED
+        inside &= (low > 0).all(axis=-1)
+        outside |= (high < -_SLACK).any(axis=-1)
+        for k in range(low.shape[1]):
+            open_ = np.flatnonzero(~(low[:, k] > 0))
+            if not open_.size:
+                continue
+            a, error = reach[open_, k].T, rooms.error[open_, k] + _ROUNDED
+            wide, middle = a.max(axis=1) > 0.0, rooms.middle[open_, k]
+            shares[open_, 0] -= 1.0 - share_beyond(a[wide], error - middle)
+            broken = share_beyond(a[wide], error + _SLACK + middle)
+            shares[open_, 1] = np.maximum(shares[open_, 1], broken)
 
     def _gains(self, one: Sheets) -> tuple[Array, Array]:
         """Return the middles and half widths of K in one unit, shape (n, na, m)."""
