@@ -80,8 +80,8 @@ def point_legs(task: Task) -> PointLegs:
     if set(legs) != set(mechanism.actuated) or len(legs) != 6:
         _refuse(task, f"it has {len(legs)} legs with actuators, not six")
     ordered = [legs[one] for one in mechanism.actuated]
-    *numbers, links = zip(*ordered, strict=True)
-    return PointLegs(*(np.array(numbers[i]) for i in (1, 0, 2, 3, 4)), links)
+    platform, base, offset, axes, angles = (np.array([one[i] for one in ordered]) for i in range(5))
+    return PointLegs(base, platform, offset, axes, angles, tuple(one[5] for one in ordered))
 
 
 def _leg(
