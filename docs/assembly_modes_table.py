@@ -22,9 +22,11 @@ sys.path.insert(0, str(ROOT))
 
 from tests.closed_loop.test_assembly_modes import dietmaier  # noqa: E402
 from tests.closed_loop.test_every_mode import three_rpr  # noqa: E402
+from tests.closed_loop.test_general_modes import rssr, six_hinges  # noqa: E402
 
 PLANAR = ["four_bar", "five_bar", "slider_crank", "planar_rrr"]
 PLATFORMS = ["rps", "rrs", "stewart", "rotary_stewart", "delta", "linear_delta"]
+GENERAL = ["ankle", "cassie_leg"]
 HEAD = "| mechanism | paths | complex | real | certified | s | search | s |"
 
 
@@ -33,7 +35,10 @@ def main() -> None:
     rng, rows = np.random.default_rng(0), [HEAD, "|---|---|---|---|---|---|---|---|"]
     rows.append(row("Dietmaier's platform", dietmaier(), None, None))
     rows.append(row("planar 3-RPR, general", *three_rpr(2), None))
-    for name in PLANAR + PLATFORMS:
+    rows.append(row("spatial four-bar RSSR", rssr(0), [1.0], None))
+    for seed in range(3):
+        rows.append(row(f"general 6R, tool held, {seed}", six_hinges(seed)[0], None, None))
+    for name in PLANAR + PLATFORMS + GENERAL:
         mechanism = ClosedLoopModel.load(ROOT / "urdf" / f"{name}.yaml")
         system = mechanism.system
         home = mechanism.home[system.coordinates_of(system.actuated)]

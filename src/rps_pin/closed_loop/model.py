@@ -938,10 +938,12 @@ class ClosedLoopModel:
 
         By ``"all"``, all solutions of the closures over the complex numbers are followed from those
         of a general system of the kind: of platforms on six legs, of platforms on three legs with
-        one hinge each, and of planar mechanisms of hinges and slides. The result says how many
+        one hinge each, and of planar mechanisms of hinges and slides; of other mechanisms of turns,
+        slides and balls, by loops in complex places of the closed frames. The result says how many
         there are, how that is known, and of which of the real ones it is proven that they exist;
         see `every`. Of legs that are closed in several ways for one pose of the platform, one way
-        is returned, near the guess. Other mechanisms are searched, and `known` says so.
+        is returned, near the guess. Mechanisms whose closures are not polynomial, or depend on each
+        other, are searched, and `known` says so.
 
         Parameters
         ----------
@@ -962,7 +964,8 @@ class ClosedLoopModel:
         seed
             Of the random numbers: the same starts each time.
         starts, seconds
-            Most random starts, and the longest time, s, of a search.
+            Most random starts, and the longest time, s, of a search; and of the loops of ``"all"``,
+            after which a search follows.
         within_limits
             Whether the modes must lie within the joint limits; the starts do then.
         progress

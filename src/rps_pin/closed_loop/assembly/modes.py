@@ -107,7 +107,7 @@ def assembly_modes(
     told = ""
     if method == "all":
         try:
-            found = every_mode(system, about, held, same, within_limits)
+            found = every_mode(system, about, held, same, within_limits, longest, progress)
         except NoFormulationError as refusal:
             told = f"searched, not solved as polynomials, since {refusal}"
         else:

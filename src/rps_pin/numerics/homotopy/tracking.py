@@ -18,7 +18,7 @@ maintained permissive one on PyPI, which is why this file exists.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -32,6 +32,18 @@ class Homotopy(Protocol):
         self, x: ComplexArray, s: Array
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Return H (k, n), dH/dx (k, n, n) and dH/ds (k, n) at x (k, n) and s (k,)."""
+
+
+@runtime_checkable
+class Homotopies(Protocol):
+    """A homotopy of its own for each path."""
+
+    def of(self, which: Indices) -> Homotopy:
+        """Return the homotopies of some paths."""
+
+
+def _of(homotopy: Homotopy, which: Indices) -> Homotopy:
+    return homotopy.of(which) if isinstance(homotopy, Homotopies) else homotopy
 
 
 class Accuracy(NamedTuple):
@@ -94,7 +106,7 @@ def tracked(homotopy: Homotopy, start: ComplexArray, accuracy: Accuracy | None =
     if accuracy is None:
         again = np.flatnonzero(coinciding(ends.x, ends.regular))
         if again.size:
-            better = _tracked(homotopy, start[again], TIGHT)
+            better = _tracked(_of(homotopy, again), start[again], TIGHT)
             for kept, new in zip(ends, better, strict=True):
                 kept[again] = new
     return ends
@@ -133,7 +145,7 @@ def _advance(
     homotopy: Homotopy, x: ComplexArray, s: Array, step: Array, active: Indices, accuracy: Accuracy
 ) -> None:
     """Take a step of each active path, or shorten it; changes x, s and step."""
-    here, at = x[active], s[active]
+    homotopy, here, at = _of(homotopy, active), x[active], s[active]
     length = np.minimum(step[active], 1.0 - at)
     ahead = np.where(length >= 1.0 - at, 1.0, at + length)
     predicted = _predicted(homotopy, here, at, ahead - at)

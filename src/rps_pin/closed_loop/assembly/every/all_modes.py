@@ -7,6 +7,8 @@ closed to rounding together.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from rps_pin.arrays import Array, Bools
@@ -14,6 +16,7 @@ from rps_pin.closed_loop.assembly.closing import close, close_gaps, is_closed
 from rps_pin.closed_loop.assembly.completion import beyond_limits
 from rps_pin.closed_loop.assembly.every.conditions import conditions, values_at
 from rps_pin.closed_loop.assembly.every.found_modes import FoundModes
+from rps_pin.closed_loop.assembly.every.general_modes import general_solutions
 from rps_pin.closed_loop.assembly.every.planar_modes import planar_solutions
 from rps_pin.closed_loop.assembly.every.six_leg_modes import six_leg_solutions
 from rps_pin.closed_loop.assembly.every.solutions import NoFormulationError, Solutions
@@ -34,7 +37,13 @@ _RESTARTS = 1
 
 
 def every_mode(
-    system: ConstraintSystem, about: Array, held: Bools, same: Sameness, within_limits: bool
+    system: ConstraintSystem,
+    about: Array,
+    held: Bools,
+    same: Sameness,
+    within_limits: bool,
+    longest: float = np.inf,
+    progress: Callable[[float], None] | None = None,
 ) -> FoundModes:
     """Return all assembly modes; see `ClosedLoopModel.assembly_modes` with ``method="all"``.
 
@@ -50,8 +59,12 @@ def every_mode(
         By what modes are told apart.
     within_limits
         Whether the modes must lie within the joint limits.
+    longest
+        Time for loops in the parameters, s; see `general_solutions`.
+    progress
+        Called with the share of these loops that is done.
     """
-    solutions = _solutions(system, held, about)
+    solutions = _solutions(system, held, about, longest, progress)
     modes: list[Array] = []
     places: list[Array] = []
     certified: list[bool] = []
@@ -88,7 +101,13 @@ def every_mode(
     )
 
 
-def _solutions(system: ConstraintSystem, held: Bools, about: Array) -> Solutions:
+def _solutions(
+    system: ConstraintSystem,
+    held: Bools,
+    about: Array,
+    longest: float,
+    progress: Callable[[float], None] | None,
+) -> Solutions:
     """Return those of the first formulation that the mechanism is of."""
     refusals = []
     for kind, formulation in _FORMULATIONS.items():
@@ -96,6 +115,10 @@ def _solutions(system: ConstraintSystem, held: Bools, about: Array) -> Solutions
             return formulation(system, held, about)
         except NoFormulationError as refusal:
             refusals.append(f"it is no {kind} ({refusal})")
+    try:
+        return general_solutions(system, held, about, longest, progress)
+    except NoFormulationError as refusal:
+        refusals.append(f"its closures are not followed in general ({refusal})")
     raise NoFormulationError(" and ".join(refusals))
 
 
