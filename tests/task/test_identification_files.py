@@ -20,7 +20,7 @@ from rps_pin.task.identification import (
     read_log,
     write_identified,
 )
-from rps_pin.task.identification.fourier import FourierMotion, free_coefficients
+from rps_pin.task.identification.exciting.fourier import FourierMotion, free_coefficients
 from rps_pin.task.identification.model import condition_of
 from tests.task.identified import log_of, model_of
 from tests.task.robots import compiled

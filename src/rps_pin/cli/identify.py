@@ -68,6 +68,16 @@ def identify_command(
             show_default=False,
         ),
     ] = None,
+    unknown_constants: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--unknown-constant",
+            metavar="JOINT",
+            help="An actuator whose --constant is a first guess, and found; several times. Needs a "
+            "known body: see --body.",
+            show_default=False,
+        ),
+    ] = None,
     cut_off: Annotated[
         float | None,
         typer.Option(
@@ -123,7 +133,9 @@ def identify_command(
     other = of_tasks.read_log(validate, model, **given) if validate else None
     console = common.text_console(as_json)
     bar = common.progress_bar(console, "identification")
-    found = of_tasks.identify(model, read, cut_off=cut_off, progress=bar)
+    found = of_tasks.identify(
+        model, read, unknown_constants=unknown_constants or (), cut_off=cut_off, progress=bar
+    )
     predicted = found.predict(other) if other is not None else None
     output.mkdir(parents=True, exist_ok=True)
     notes = _write(found, files, file)
@@ -143,7 +155,7 @@ def _write(found: Identification, files: Sequence[Path], source: Path) -> list[s
 
     urdf, _, base, parameters = files
     rows = zip(found.labels, found.believed, found.values, found.deviations, strict=True)
-    _csv(base, ("base_parameter", "believed", "found", "deviation"), rows)
+    _csv(base, ("base_parameter", "believed", "found", "deviation"), [*rows, *_factors(found)])
     if found.possible is None:
         return []
     model = found.model
@@ -157,6 +169,17 @@ def _write(found: Identification, files: Sequence[Path], source: Path) -> list[s
         model.mechanism,
         lambda shapes: write_identified(found, urdf, shapes=shapes, overwrite=True),
     )
+
+
+def _factors(found: Identification) -> list[tuple[str, float, float, float]]:
+    """Return the factors of unknown constants, as rows of the base parameters' table."""
+    return [
+        (f"constant_factor:{name}", 1.0, float(value), float(deviation))
+        for name, value, deviation in zip(
+            found.model.actuators, found.factors, found.factor_deviations, strict=True
+        )
+        if deviation > 0
+    ]
 
 
 def _csv(path: Path, header: Sequence[str], rows: Any) -> None:
@@ -186,6 +209,10 @@ def _summary(found: Identification, predicted: Prediction | None) -> dict[str, A
                 found.labels, found.believed, found.values, found.deviations, strict=True
             )
         ],
+        "constant_factors": {
+            label.partition(":")[2]: {"found": value, "deviation": deviation}
+            for label, _, value, deviation in _factors(found)
+        },
         "doubts": found.doubts,
     }
     if found.possible is not None:
@@ -226,6 +253,10 @@ def _print(console: Any, found: Identification, summary: dict[str, Any]) -> None
         f"{found.samples} samples, filtered at {found.cut_off:.4g} Hz; condition number "
         f"{found.condition:.3g}"
     )
+    for name, factor in summary["constant_factors"].items():
+        console.print(
+            f"{name}: constant {factor['found']:.5g} +- {factor['deviation']:.2g} times that given"
+        )
     units = [
         "N m" if turns else "N"
         for turns in found.model.mechanism.angular_velocities[

@@ -6,8 +6,8 @@ base parameters with their covariance, and physically possible parameters beside
 
 from rps_pin.task.identification.base import BaseParameters
 from rps_pin.task.identification.description import write_identified
-from rps_pin.task.identification.excitation import ExcitingMotion, exciting_motion
-from rps_pin.task.identification.fourier import FourierMotion
+from rps_pin.task.identification.exciting.excitation import ExcitingMotion, exciting_motion
+from rps_pin.task.identification.exciting.fourier import FourierMotion
 from rps_pin.task.identification.log import Log, force_log
 from rps_pin.task.identification.log_file import read_log
 from rps_pin.task.identification.model import DynamicsModel, States

@@ -129,12 +129,15 @@ def _filtered(
 def fit(model: DynamicsModel, evidence: Sequence[Evidence]) -> Fit:
     """Return the weighed least squares.
 
+    Columns of the rows beyond those of the base parameters are of further parameters, believed 0.
+
     Raises
     ------
     InputError
         If there are fewer samples than it takes.
     """
-    na, size = len(model.actuators), model.believed.size
+    na, size = len(model.actuators), evidence[0].rows.shape[2]
+    believed = np.append(model.believed, np.zeros(size - model.believed.size))
     count = sum(one.used.sum() * one.filtered.noise for one in evidence)
     if count * na < 2 * size:
         raise InputError(
@@ -148,11 +151,11 @@ def fit(model: DynamicsModel, evidence: Sequence[Evidence]) -> Fit:
     least = _EXACT**2 * np.maximum(squares, np.finfo(np.float64).tiny)
     variance = np.maximum(squares / count, np.finfo(np.float64).tiny)
     for _ in range(_ROUNDS):
-        values, covariance, seen = _solved(model.believed, stacks, noisy, variance)
+        values, covariance, seen = _solved(believed, stacks, noisy, variance)
         taken = np.array([np.sum(covariance * (one[:-1, :-1].T @ one[:-1, :-1])) for one in stacks])
         left = np.array([np.sum((one @ np.append(values, -1.0)) ** 2) for one in stacks])
         variance = np.maximum(left, least) / np.maximum(count - taken / variance, count / 10)
-    values, covariance, seen = _solved(model.believed, stacks, noisy, variance)
+    values, covariance, seen = _solved(believed, stacks, noisy, variance)
     return Fit(values, covariance, seen.alone, seen.rank, np.sqrt(variance), seen.condition)
 
 

@@ -12,6 +12,7 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop import ClosedLoopModel, JointEffects
 from rps_pin.errors import MechanismError
 from rps_pin.task.identification.evidence import evidence_of
+from rps_pin.task.identification.factors import times
 from rps_pin.task.identification.log import Log
 from rps_pin.task.identification.model import DynamicsModel, Progress
 from rps_pin.task.identification.physical import Possible
@@ -72,6 +73,10 @@ class Identification(NamedTuple):
     """The most likely parameters that are physically possible; None if not asked for."""
     doubts: tuple[str, ...]
     """What speaks against the identification, a sentence each; empty if nothing does."""
+    factors: Array
+    """Motor constants over those that the logs were read with, shape (na,); 1 where known."""
+    factor_deviations: Array
+    """Their standard deviations, shape (na,); 0 where known."""
 
     @property
     def deviations(self) -> Array:
@@ -106,6 +111,7 @@ class Identification(NamedTuple):
         doubts = list(log.notes)
         start = None if near is None else np.asarray(near, dtype=np.float64)
         found = evidence_of(self.model, [log], self.cut_off, start, doubts, progress)
+        found = times(found, self.factors)
         measured = [one.measured[one.used] for one in found]
 
         def forces(values: Array) -> Array:

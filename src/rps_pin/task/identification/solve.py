@@ -11,6 +11,7 @@ from scipy.signal import welch
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.task.identification.evidence import Evidence, Fit, evidence_of, fit
+from rps_pin.task.identification.factors import fit_with_factors, unknown_factors
 from rps_pin.task.identification.log import Log
 from rps_pin.task.identification.model import DynamicsModel, Progress
 from rps_pin.task.identification.physical import Possible, body_scale, possible
@@ -30,6 +31,7 @@ def identify(
     model: DynamicsModel,
     logs: Log | Sequence[Log],
     *,
+    unknown_constants: Sequence[str] = (),
     cut_off: float | None = None,
     near: ArrayLike | None = None,
     physical: bool = True,
@@ -48,6 +50,9 @@ def identify(
         The mechanism, and what is unknown of it.
     logs
         One or more: `force_log` or `read_log`.
+    unknown_constants
+        Actuators whose motor constant is found too: the logs' constants, or a force sensor's
+        scale, times an unknown factor. What is held as known fixes the scale.
     cut_off
         Of the filter, Hz: well above the motion's frequencies. Left out: 8 times the frequency
         below which the positions have all but 1e-4 of their power.
@@ -61,7 +66,8 @@ def identify(
     Raises
     ------
     InputError
-        If a log is too short, or the cut-off frequency too high for it.
+        If a log is too short, or the cut-off frequency too high for it; if nothing fixes the
+        scale of unknown constants.
     RPSPinError
         If the loops do not close at a log's positions, or a motion is singular.
     """
@@ -71,9 +77,12 @@ def identify(
     if cut_off is not None:
         cut_off = positive_number(cut_off, "cut_off", "Hz")
     start = None if near is None else real_vector(near, model.mechanism.model.nq, "near")
+    unknown = unknown_factors(model, unknown_constants)
     doubts = [note for one in given for note in one.notes]
     evidence = evidence_of(model, given, cut_off, start, doubts, progress)
-    found = fit(model, evidence)
+    found, factors, spread = fit(model, evidence), np.ones(len(model.actuators)), None
+    if unknown.size:
+        found, evidence, factors, spread = fit_with_factors(model, evidence, unknown)
     _doubt_motion(found, doubts)
     _doubt_residuals(model, evidence, found, doubts)
     answer = _possible(model, found, doubts) if physical else None
@@ -88,6 +97,8 @@ def identify(
         sum(int(one.used.sum()) for one in evidence),
         answer,
         tuple(doubts),
+        factors,
+        np.zeros_like(factors) if spread is None else spread,
     )
 
 

@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, RPSPinError, UnreachableError
 from rps_pin.numerics.linear_algebra import singular_values
-from rps_pin.task.identification.fourier import FourierMotion, free_coefficients
+from rps_pin.task.identification.exciting.fourier import FourierMotion, free_coefficients
 from rps_pin.task.identification.model import DynamicsModel, Progress, States, condition_of
 from rps_pin.task.path_check import check_path
 from rps_pin.task.paths.events import PathCheck

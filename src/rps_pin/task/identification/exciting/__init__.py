@@ -1,0 +1,1 @@
+"""Motions in which a log tells most: Fourier series, and the search for the best of them."""
