@@ -11,7 +11,7 @@ from scipy.signal import welch
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError
 from rps_pin.task.identification.evidence import Evidence, Fit, evidence_of, fit
-from rps_pin.task.identification.factors import fit_with_factors, unknown_factors
+from rps_pin.task.identification.factors import FactorFit, fit_with_factors, unknown_factors
 from rps_pin.task.identification.log import Log
 from rps_pin.task.identification.model import DynamicsModel, Progress
 from rps_pin.task.identification.physical import Possible, body_scale, possible
@@ -80,7 +80,8 @@ def identify(
     unknown = unknown_factors(model, unknown_constants)
     doubts = [note for one in given for note in one.notes]
     evidence = evidence_of(model, given, cut_off, start, doubts, progress)
-    found, factors, spread = fit(model, evidence), np.ones(len(model.actuators)), None
+    known = np.ones(len(model.actuators))
+    found, evidence, factors, spread = FactorFit(fit(model, evidence), evidence, known, 0 * known)
     if unknown.size:
         found, evidence, factors, spread = fit_with_factors(model, evidence, unknown)
     _doubt_motion(found, doubts)
@@ -98,7 +99,7 @@ def identify(
         answer,
         tuple(doubts),
         factors,
-        np.zeros_like(factors) if spread is None else spread,
+        spread,
     )
 
 
