@@ -330,8 +330,8 @@ def test_bad_arguments_are_refused(five_bar: CudaMechanism, cupy: FakeCuPy) -> N
         (lambda: file("five_bar").compile(device="cuda", dtype="half"), "dtype = 'half'"),
         (lambda: file("five_bar").compile(device="cuda", compiler="gcc"), "has its own"),
         (
-            lambda: file("five_bar").compile(device="cuda", functions=["closing"]),
-            "a group of functions on device 'cuda' = 'closing': it must be 'dynamics' or",
+            lambda: file("five_bar").compile(device="cuda", functions=["forces"]),
+            "a group of functions on device 'cuda' = 'forces': it must be 'dynamics' or",
         ),
     ):
         with pytest.raises(InputError, match=message):

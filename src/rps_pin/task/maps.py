@@ -27,7 +27,7 @@ from rps_pin.errors import InputError, MechanismError, RPSPinError, few
 from rps_pin.numerics.linear_algebra import null_space, rank, singular_values
 from rps_pin.task.coordinates import Extended, of_frame, of_joints
 from rps_pin.task.engine import PinocchioEngine
-from rps_pin.validation import numbers, positive_number
+from rps_pin.validation import choice, numbers, positive_number
 
 
 class TaskState(NamedTuple):
@@ -94,6 +94,8 @@ class TaskMaps:
         }
         #: What `compile` was given.
         self.compile_options: dict[str, Any] = {}
+        #: The extended mechanism on a graphics card, if `compile` was asked for it.
+        self.card: Any = None
         self._refuse_wrong_count()
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -104,7 +106,7 @@ class TaskMaps:
         copied: Self = _call_reduced(self.__reduce__(), memo)
         if self.compiled:
             copied._by_task, copied._by_actuators = self._by_task, self._by_actuators
-            copied.compile_options = self.compile_options
+            copied.compile_options, copied.card = self.compile_options, self.card
         return copied
 
     def __repr__(self) -> str:
@@ -193,7 +195,9 @@ class TaskMaps:
         Parameters
         ----------
         **options
-            ``compiler``, ``batches`` and others; see `rps_pin.codegen.compile_mechanism`.
+            ``compiler``, ``batches`` and others; see `rps_pin.codegen.compile_mechanism`. With
+            ``device="cuda"`` an NVIDIA card continues the configurations of
+            `rps_pin.task.workspace`; everything else is computed by the processor.
 
         Raises
         ------
@@ -202,6 +206,8 @@ class TaskMaps:
         """
         compiled = type(self)(self.mechanism, **self._options)
         compiled.compile_options = dict(options)
+        if choice(options.pop("device", "cpu"), "device", ("cpu", "cuda")) == "cuda":
+            compiled.card = self.extended.compile(device="cuda", functions=("closing",))
         functions = options.pop("functions", ("kinematics", "closing"))
         compiled._by_task = self.extended.compile(functions=functions, **options)
         compiled._by_actuators = self.mechanism.compile(functions=functions, **options)

@@ -1,4 +1,4 @@
-"""A mechanism on an NVIDIA card: dynamics and whole steps of as many robots as its memory holds."""
+"""A mechanism on an NVIDIA card: dynamics, steps and continuation of as many as it holds."""
 
 from __future__ import annotations
 
@@ -8,22 +8,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rps_pin.arrays import Array
+from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop.dynamics import least_effort
 from rps_pin.closed_loop.model import ClosedLoopModel
 from rps_pin.codegen.cuda.device import REALS, DeviceFunction, load_cupy
 from rps_pin.codegen.cuda.proof import differences
 from rps_pin.codegen.cuda.source import unit
+from rps_pin.codegen.engine.actuated import continued_coordinates
 from rps_pin.codegen.engine.applied import with_parameters
 from rps_pin.codegen.engine.batches import Errors
 from rps_pin.codegen.engine.generated import GeneratedCode
 from rps_pin.codegen.engine.proof import Proof
 from rps_pin.codegen.units import OPEN, SINGULAR
-from rps_pin.errors import ClosureError, InputError, RPSPinError, SingularityError
+from rps_pin.errors import ClosureError, InputError, MechanismError, RPSPinError, SingularityError
 from rps_pin.validation import choice, whole_number
 
 #: Groups of functions that are generated for a card.
-GROUPS = {"dynamics": ("inverse_dynamics", "forward_dynamics"), "simulation": ("step", "motion")}
+GROUPS = {
+    "dynamics": ("inverse_dynamics", "forward_dynamics"),
+    "simulation": ("step", "motion"),
+    "closing": ("completed",),
+}
 #: Steps of one launch; float32 counts so far.
 _MOST_STEPS = 2**24
 
@@ -130,7 +135,7 @@ class CudaMechanism:
         return copied
 
     def build(self, *groups: str) -> None:
-        """Compile and compare groups of functions now: ``"dynamics"``, ``"simulation"``."""
+        """Compile and compare groups of functions now: `GROUPS`."""
         for group in groups:
             choice(group, "a group of functions on device 'cuda'", tuple(GROUPS))
         for group in groups:
@@ -199,6 +204,44 @@ class CudaMechanism:
             raise InputError(f"count = {count}: it must be at most {_MOST_STEPS}")
         return DeviceStates(*self._run("motion", (q, v, tau, duration, count), out, **options))
 
+    # Configurations -------------------------------------------------------------------------------
+
+    def continued(
+        self, values: Array, q: Array, parameters: Array | None = None
+    ) -> tuple[Array, Bools]:
+        """Return configurations (n, nq) continued to other values, and which are reached.
+
+        As `CompiledMechanism.continued`, of arrays in the computer's memory and into it.
+
+        Parameters
+        ----------
+        values
+            Values of the actuated joints, shape (n, na).
+        q
+            Closed configurations, shape (n, nq).
+        parameters
+            As for the other methods, shape (np,) or (n, np).
+
+        Raises
+        ------
+        InputError
+            In single precision, whose rounding errors loops are closed to, no more.
+        MechanismError
+            If the actuated joints are not the mechanism's motions, or have several coordinates.
+        """
+        at = continued_coordinates(self.code)
+        if at is None:
+            raise MechanismError(
+                "generated code continues configurations by actuated joints of one coordinate each "
+                "that determine all others"
+            )
+        wanted = q.copy()
+        wanted[:, at] = values
+        extra = [self.code.nominal if parameters is None else parameters]
+        given = (self.array(q), self.array(wanted), *(extra if self.code.parameters else ()))
+        (found, *_), status = self._function(self.code, "completed")(given)
+        return self._cupy.asnumpy(found), np.asarray(self._cupy.asnumpy(status) == 0)
+
     def _run(
         self,
         name: str,
@@ -242,6 +285,8 @@ class CudaMechanism:
     def _function(self, code: GeneratedCode, name: str) -> DeviceFunction:
         """Return a function, compiled and compared with the Pinocchio engine."""
         key = code.wrench_frames, name
+        if name == "completed" and self.dtype != "float64":
+            raise InputError("configurations are continued in double precision: dtype='float64'")
         with self._lock:
             if key not in self._functions:
                 real = REALS[self.dtype]

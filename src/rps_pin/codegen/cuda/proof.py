@@ -53,7 +53,7 @@ def differences(proof: Proof, function: DeviceFunction, to_host: Callable[[Any],
                     "NVRTC",
                 )
             continue
-        expected = _expected(proof, name, sample)
+        expected = _expected(proof, name, sample, [one[i] for one in results])
         least = _least(proof, function, sample, expected)
         most = proof.limit(name, sample)
         if dtype == "float32":
@@ -100,17 +100,18 @@ def _difference(what: str, found: Array, wanted: Any, least: float, most: float)
 
 def _arguments(function: DeviceFunction, sample: Sample, step: float) -> list[Any]:
     values: dict[str, Any] = sample._asdict()
+    values["given"] = sample.near
     many = function.name == "motion"
     values |= {"h": step / BLOCK if many else step, "count": BLOCK}
     return [values[name] for name, _ in function.inputs]
 
 
-def _expected(proof: Proof, name: str, sample: Sample) -> list[Any]:
+def _expected(proof: Proof, name: str, sample: Sample, found: Sequence[Array]) -> list[Any]:
     """Return the Pinocchio engine's answers; of a motion, the state after the last of its steps.
 
     None where a function is not compared.
     """
     if name != "motion":
-        return list(proof.expected(name, sample, ()))
+        return list(proof.expected(name, sample, found))
     every = proof.expected("steps", sample, ())
     return [None if one is None else np.reshape(one, (BLOCK, -1))[-1] for one in every]

@@ -1,4 +1,4 @@
-"""CUDA text of a mechanism's dynamics and steps, one thread a sample."""
+"""CUDA text of a mechanism's dynamics, steps and continuation, one thread a sample."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rps_pin.codegen.units import Kernel, Routine, Unit
 #: its time stays in proportion to the size so far.
 CHUNK = 8000
 #: The functions, of which `motion` is many steps in one launch.
-NAMES = ("inverse_dynamics", "forward_dynamics", "step", "motion")
+NAMES = ("inverse_dynamics", "forward_dynamics", "step", "motion", "completed")
 
 
 def unit(functions: MechanismFunctions, name: str, real: str) -> Unit:

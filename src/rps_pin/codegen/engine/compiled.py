@@ -38,6 +38,7 @@ from rps_pin.closed_loop.simulation.damped import STIFF, viscous_rate
 from rps_pin.closed_loop.simulation.result import Simulation
 from rps_pin.closed_loop.simulation.stepper import Stepper
 from rps_pin.closed_loop.summary import in_one_line
+from rps_pin.codegen.engine.actuated import actuated_coordinates, continued_coordinates
 from rps_pin.codegen.engine.applied import with_parameters
 from rps_pin.codegen.engine.batches import Errors, by_samples, settled
 from rps_pin.codegen.engine.forces import GeneratedForces, each, kept
@@ -326,7 +327,7 @@ class CompiledMechanism:
                     lambda m, q: (m.complete(values, q, **given),), (guess,), **options
                 )
             ordered = [float(np.asarray(values[name])) for name in self.actuated]
-        system, count = self.mechanism.system, len(self.actuated)
+        count = len(self.actuated)
         asked = numbers(ordered, "values", f"numbers of shape (..., {count})")
         if asked.shape[-1:] != (count,):
             raise InputError(f"values has shape {asked.shape}; expected (..., {count})")
@@ -342,7 +343,7 @@ class CompiledMechanism:
         batch = np.broadcast_shapes(asked.shape[:-1], guess.shape[:-1])
         wanted = np.broadcast_to(guess, (*batch, self.model.nq)).copy()
         wanted[..., at] = asked
-        if not (system.actuated.size == count and self._is_actuated):
+        if self._continued_coordinates is None:
             return self._by_one(answer, (guess, wanted), **options)
         if jump:
             return self._closed(
@@ -359,8 +360,8 @@ class CompiledMechanism:
         that are not reached cost some microseconds, not the Pinocchio engine's 50 ms; what is
         returned of them has no meaning.
         """
-        at, system = self._actuated_coordinates, self.mechanism.system
-        if at is None or not (system.actuated.size == at.size and self._is_actuated):
+        at = self._continued_coordinates
+        if at is None:
             options: dict[str, Any] = {"restarts": 0, "errors": "mask", "parameters": parameters}
             found = self.complete(values, q, within_limits=False, **options)
             return found, np.asarray(np.isfinite(found).all(axis=-1))
@@ -415,13 +416,12 @@ class CompiledMechanism:
     @cached_property
     def _actuated_coordinates(self) -> Indices | None:
         """Where the actuated joints are in q; None if one has not one coordinate of its own."""
-        model = self.model
-        if not all(map(model.existJointName, self.actuated)):
-            return None
-        joints = [model.joints[model.getJointId(name)] for name in self.actuated]
-        if any(joint.nq != 1 for joint in joints):
-            return None
-        return np.array([joint.idx_q for joint in joints], dtype=np.intp)
+        return actuated_coordinates(self.code)
+
+    @cached_property
+    def _continued_coordinates(self) -> Indices | None:
+        """The same where generated code continues by them."""
+        return continued_coordinates(self.code)
 
     def _normalised(self, q: ArrayLike) -> Array:
         """Return configurations with quaternions of unit length."""

@@ -54,9 +54,9 @@ def compile_mechanism(
         waits for that.
     device
         ``"cpu"``, or ``"cuda"`` for an NVIDIA card (``pip install rps-pin[cuda]``). There,
-        ``"dynamics"`` (of both kinds) and ``"simulation"`` can be built, by NVRTC, which
-        ``compiler`` does not change; each function is built when it is first called unless
-        ``functions`` are named.
+        ``"dynamics"`` (of both kinds), ``"simulation"`` and ``"closing"`` (continuation alone) can
+        be built, by NVRTC, which ``compiler`` does not change; each function is built when it is
+        first called unless ``functions`` are named.
     dtype
         ``"float64"``, or for a card ``"float32"``.
 

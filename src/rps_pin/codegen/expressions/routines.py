@@ -154,13 +154,14 @@ def _completed(functions: MechanismFunctions) -> Routine:
         for i, by in enumerate(x.system.arcs.tolist())
     ]
     most = _CHANGE / GROWTH**2
-    kept = "LT(CONST(0), turn[0] * side)"
+    kept, moved = "LT(CONST(0), turn[0] * side)", []
     if x.orientation is None:
+        moved = ["REAL moving = CONST(0);", *away]
         kept = f"LE(growth[0] * moving, CONST({most!r}))"
     body = f"""
     REAL at[{model.nq}], moved[{model.nq}], dv[{model.nv}], gap[1], growth[1];
     REAL turn[1], side = CONST(0), way = CONST(0), good, again = CONST(0), going;
-    REAL share = CONST(0), aim = CONST(0), step, longest, before, length, worst, moving;
+    REAL share = CONST(0), aim = CONST(0), step, longest, before, length, worst;
     int i, k, n;
     #define SQUARE(x) ((x) * (x))
     {" ".join(squares)}
@@ -192,8 +193,7 @@ def _completed(functions: MechanismFunctions) -> Routine:
         }}
         good = AND(good, LE(gap[0], {_LAST}));
         if (n) {{
-            moving = CONST(0);
-            {" ".join(away if x.orientation is None else [])}
+            {" ".join(moved)}
             good = AND(AND(good, going), {kept});
             share = SELECT(good, aim, share);
             step = SELECT(good, SELECT(again, FMIN(longest, step + step), step),

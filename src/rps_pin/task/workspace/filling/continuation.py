@@ -10,8 +10,13 @@ that passes a singularity within about a hundredth of its length can be given up
 
 from __future__ import annotations
 
+from typing import Any
+
 from rps_pin.arrays import Array, Bools
 from rps_pin.task.task import Task
+
+#: Ways of a batch that go to the graphics card, if the task has one; fewer are the processor's.
+LEAST_ON_CARD = 1024
 
 
 def continued(task: Task, q: Array, start: Array, goal: Array) -> tuple[Array, Bools]:
@@ -28,5 +33,8 @@ def continued(task: Task, q: Array, start: Array, goal: Array) -> tuple[Array, B
     goal
         Task coordinates, shape (n, m).
     """
-    found, reached = task.engines[0].continued(goal, task.joined(q, start))
+    engine: Any = task.engines[0]
+    if task.card is not None and len(q) >= LEAST_ON_CARD:
+        engine = task.card
+    found, reached = engine.continued(goal, task.joined(q, start))
     return found[:, : q.shape[1]], reached
