@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from rps_pin import ClosedLoopModel, JointCoupling, LoopClosure
-from rps_pin.closed_loop.assembly.every.factors import Slide, Turn
-from rps_pin.closed_loop.assembly.every.general_family import GeneralFamily
-from rps_pin.closed_loop.assembly.every.general_modes import closures_of, general_solutions
+from rps_pin.closed_loop.assembly.every.general.factors import Slide, Turn
+from rps_pin.closed_loop.assembly.every.general.family import GeneralFamily
+from rps_pin.closed_loop.assembly.every.general.modes import closures_of, general_solutions
 from rps_pin.closed_loop.assembly.every.solutions import NoFormulationError
 from rps_pin.closed_loop.constraints.closures import KINDS
 from rps_pin.numerics.intervals import Interval

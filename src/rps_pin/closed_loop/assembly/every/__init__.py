@@ -9,7 +9,7 @@ stand):
   independent turns.
 
 All others of turns, slides and balls, with as many independent equations as unknowns, are
-`general_modes`: loops in complex places of the closed frames lead from one solution to the others,
+`general`: loops in complex places of the closed frames lead from one solution to the others,
 until 16 loops in a row lead to no new one. Loops in these places permute the solutions
 transitively. If each was a uniform draw from that group, 16 of them would keep a part of the
 solutions to itself with a probability of 2^-16 at most. They are not such draws: that none is

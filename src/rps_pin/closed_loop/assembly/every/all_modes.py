@@ -16,7 +16,7 @@ from rps_pin.closed_loop.assembly.closing import close, close_gaps, is_closed
 from rps_pin.closed_loop.assembly.completion import beyond_limits
 from rps_pin.closed_loop.assembly.every.conditions import conditions, values_at
 from rps_pin.closed_loop.assembly.every.found_modes import FoundModes
-from rps_pin.closed_loop.assembly.every.general_modes import general_solutions
+from rps_pin.closed_loop.assembly.every.general.modes import general_solutions
 from rps_pin.closed_loop.assembly.every.planar_modes import planar_solutions
 from rps_pin.closed_loop.assembly.every.six_leg_modes import six_leg_solutions
 from rps_pin.closed_loop.assembly.every.solutions import NoFormulationError, Solutions

@@ -18,7 +18,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array
-from rps_pin.closed_loop.assembly.every.factors import Ball, Factor, JointFactors, Slide, Turn
+from rps_pin.closed_loop.assembly.every.general.factors import (
+    Ball,
+    Factor,
+    JointFactors,
+    Slide,
+    Turn,
+)
 from rps_pin.closed_loop.constraints.equations import ClosedFrames
 from rps_pin.closed_loop.constraints.rows import (
     AxisRows,

@@ -10,9 +10,15 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array, Bools, ComplexArray
-from rps_pin.closed_loop.assembly.every.factors import Ball, Factor, Slide, Turn, joint_factors
-from rps_pin.closed_loop.assembly.every.general_equations import Loop, parts
-from rps_pin.closed_loop.assembly.every.general_family import (
+from rps_pin.closed_loop.assembly.every.general.equations import Loop, parts
+from rps_pin.closed_loop.assembly.every.general.factors import (
+    Ball,
+    Factor,
+    Slide,
+    Turn,
+    joint_factors,
+)
+from rps_pin.closed_loop.assembly.every.general.family import (
     GeneralFamily,
     Linear,
     on_its_own,

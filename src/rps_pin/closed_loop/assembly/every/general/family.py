@@ -20,8 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from rps_pin.arrays import Array, ComplexArray
-from rps_pin.closed_loop.assembly.every.factors import Ball, Factor, JointFactors, Slide, Turn
-from rps_pin.closed_loop.assembly.every.general_equations import (
+from rps_pin.closed_loop.assembly.every.general.equations import (
     Loop,
     Numbers,
     Placed,
@@ -33,6 +32,13 @@ from rps_pin.closed_loop.assembly.every.general_equations import (
     stacked,
     swapped,
     times,
+)
+from rps_pin.closed_loop.assembly.every.general.factors import (
+    Ball,
+    Factor,
+    JointFactors,
+    Slide,
+    Turn,
 )
 from rps_pin.closed_loop.constraints.closures import LoopClosure
 
