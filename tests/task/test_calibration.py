@@ -10,7 +10,15 @@ import pytest
 
 from rps_pin import ClosedLoopModel, InputError, Task, UnreachableError
 from rps_pin.arrays import Array
-from rps_pin.task.calibration import Calibration, CalibrationModel, Readings, calibrate, readings
+from rps_pin.task.calibration import (
+    Calibration,
+    CalibrationModel,
+    Readings,
+    Tracker,
+    calibrate,
+    geometric_groups,
+    readings,
+)
 from rps_pin.task.calibration.outliers import outliers
 from rps_pin.task.calibration.problem import Problem
 from tests.worst import worst
@@ -24,6 +32,16 @@ GROUPS = (
     "placement:right_arm_joint",
     "closure:tips",
 )
+TARGETS = {"A": [0.05, 0.087, 0.01], "B": [-0.1, 0.0, 0.01], "C": [0.05, -0.087, 0.01]}
+ENCODERS = ("left_joint", "left_arm_joint", "right_joint", "right_arm_joint")
+#: The five-bar's lengths, m, as its file says: left bars, right bars, base.
+PENTAGON = {
+    "placement:left_arm_joint.x": 0.3,
+    "closure:tips.a.x": 0.42,
+    "placement:right_arm_joint.x": 0.28,
+    "closure:tips.b.x": 0.45,
+    "placement:right_joint.x": 0.4,
+}
 
 
 class Case(NamedTuple):
@@ -227,6 +245,120 @@ def test_outliers_of_a_pose() -> None:
     assert np.array_equal(outliers(r, A, known), wanted)
     known[1, 3:] = False  # any one of the three may be wrong: all go
     assert np.array_equal(outliers(r, A, known)[1], known[1])
+
+
+@cache
+def rps_with_tracker() -> CalibrationModel:
+    task = ClosedLoopModel.load("urdf/rps.yaml").task
+    tracker = Tracker(TARGETS, "platform", placement=np.eye(4), known=True)
+    groups = [group for group in geometric_groups(task) if "leg" in group]
+    legs = task.mechanism.actuated
+    return CalibrationModel(
+        task, groups, [*legs, *tracker.sensors], legs, instruments=[tracker], compiler="tcc"
+    )
+
+
+def errors_of_a_drawing(noise: float, seed: int) -> tuple[CalibrationModel, Readings, Array]:
+    """A 3-RPS off by 3 mm in every number, in a small workspace; what was spoilt."""
+    model, rng = rps_with_tracker(), np.random.default_rng(seed)
+    x = model.task.home + rng.uniform(-1, 1, (80, 3)) * [0.04, 0.15, 0.15]
+    truth = model.nominal + 3e-3 * rng.normal(size=model.nominal.size) / model.units
+    values = model.predict(x, model.home(x, model.nominal), truth).readings
+    spread = np.repeat([noise / 50, noise], [3, 9])
+    values = values + spread * rng.normal(size=values.shape)
+    spoilt = np.zeros(values.shape, dtype=bool)
+    spoilt[:, 3:].flat[rng.choice(9 * 80, 12, replace=False)] = True
+    values[spoilt] += noise * rng.uniform(20, 200, 12) * rng.choice([-1, 1], 12)
+    names, more = model.sensors, model.sensors[3:]
+    columns, deviations = (
+        dict(zip(names, one, strict=True)) for one in (values.T, spread.tolist())
+    )
+    return model, readings(model.task, columns, deviations, more), spoilt
+
+
+@pytest.mark.parametrize(("noise", "widest"), [(1e-6, None), (2e-5, 1.0)])
+def test_errors_of_a_drawing_without_priors(noise: float, widest: float | None) -> None:
+    """All combinations are fitted, the weakest known to some mm; readings that are right stay."""
+    model, read, spoilt = errors_of_a_drawing(noise, 0)
+    found = calibrate(model, read, widest=widest)
+    assert found.identifiable.rank == 30
+    assert np.array_equal(found.outliers, spoilt)
+    assert 0.83 < found.chi_squared / found.freedom < 1.19  # of 678: 0.1 % and 99.9 %
+    assert not found.doubts
+
+
+def test_a_combination_left_as_believed_is_doubted_if_readings_contradict_it() -> None:
+    """Off by 20 mm in a combination that is known to less than that, and may be off by 2."""
+    case = five_bar()
+    exact = case.model.predict(case.x, case.q, case.model.nominal).readings
+    problem = Problem(case.model, read(exact), np.full(case.model.nominal.size, np.inf))
+    problem.begin(None)
+    every = problem.identifiable()
+    weakest = every.seen[:, -1] / case.model.units
+    widest = 0.99 / every.singular_values[every.rank - 1]
+    for off, doubted in ((0.5, False), (12.0, True)):
+        p = case.model.nominal + off * widest * weakest
+        values, _ = measured(p, np.random.default_rng(8))
+        told = calibrate(case.model, read(values), widest=widest)
+        assert told.identifiable.weak == 1
+        assert any("raise widest" in one for one in told.doubts) == doubted
+        assert not calibrate(case.model, read(values), widest=1.0).doubts
+
+
+# Redundant sensors alone --------------------------------------------------------------------------
+
+
+def pentagon_gap(numbers: Array, angles: Array) -> Array:
+    """The gap of a loop of four bars and a base, (2 n,), by lengths, base and offsets, (10,)."""
+    lengths, base, t = numbers[:4], numbers[4:6], angles + numbers[6:]
+    turned = [np.stack([np.cos(a), np.sin(a)]) for a in (t[:, 0], t[:, 0] + t[:, 1])]
+    turned += [-np.stack([np.cos(a), np.sin(a)]) for a in (t[:, 2], t[:, 2] + t[:, 3])]
+    return np.ravel(np.tensordot(lengths, turned, 1) - base[:, None])
+
+
+def test_redundant_encoders_alone() -> None:
+    """A five-bar with an encoder at every joint, and no pose measured.
+
+    What is seen is counted by differences of the gap of a pentagon, and its scale is not seen.
+    Errors of ten machines are those that the covariance, the bound, says.
+    """
+    case, joints, h = five_bar(), [*ENCODERS], 1e-6
+    model = CalibrationModel(case.task, GROUPS, joints, offsets=joints)
+    x, q = case.x, model.home(case.x, model.nominal)
+    exact = model.predict(x, q, model.nominal).readings
+
+    def taken(values: Array) -> Readings:
+        columns = dict(zip(joints, values.T, strict=True))
+        return readings(case.task, columns, dict.fromkeys(joints, 1e-4))
+
+    numbers = np.array([*PENTAGON.values(), 0.0, *np.zeros(4)])
+    assert worst(pentagon_gap(numbers, exact)) < 1e-9
+    slopes = [
+        (pentagon_gap(numbers + h * e, exact) - pentagon_gap(numbers - h * e, exact)) / (2 * h)
+        for e in np.eye(10)
+    ]
+    values = np.linalg.svd(np.array(slopes), compute_uv=False)
+    count = np.count_nonzero(values > 1e-6 * values[0])
+    seen = calibrate(model, taken(exact), widest=10.0).identifiable
+    assert seen.rank == count == 8  # of 10, but for the scale and a turn of the whole
+    scale = np.zeros(model.nominal.size)
+    for name, length in PENTAGON.items():
+        scale[model.labels.index(name)] = length
+    assert worst(seen.seen.T @ scale) < 1e-7
+    assert not any(
+        calibrate(model, taken(exact), widest=10.0).alone[model.labels.index(n)] for n in PENTAGON
+    )
+    squares = 0.0
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        p = model.nominal + seen.seen @ (1e-3 * rng.normal(size=8)) / model.units
+        there = model.predict(x, q, p).readings
+        found = calibrate(model, taken(there + 1e-4 * rng.normal(size=there.shape)), widest=10.0)
+        turn = found.identifiable.seen.T
+        error = turn @ ((found.parameters - p) * model.units)
+        own = (turn * model.units) @ found.covariance @ (turn * model.units).T
+        squares += float(error @ np.linalg.solve(own, error))
+    assert 46.5 < squares < 124.8  # chi squared of 80 degrees of freedom: 0.1 % and 99.9 %
 
 
 # Bad input ----------------------------------------------------------------------------------------

@@ -145,6 +145,11 @@ def test_the_command(tmp_path: Path) -> None:
     assert (ended.returncode, "exist; --overwrite" in ended.stderr) == (1, True)
     ended = rps_pin(*words[:-9], "--overwrite", folder=tmp_path)
     assert "the standard deviation of" in ended.stderr
+    theirs = tmp_path / "calibration" / "parameters.csv"
+    theirs.write_text("an instruments' file")
+    ended = rps_pin(*words, "--instruments", str(theirs), "--overwrite", folder=tmp_path)
+    assert "parameters.csv is an input of this command" in ended.stderr
+    assert theirs.read_text() == "an instruments' file"
 
 
 # Words --------------------------------------------------------------------------------------------

@@ -90,6 +90,14 @@ def calibrate_command(
             help="What else was read: trackers, ball bars, heights, inclinometers; YAML.",
         ),
     ] = None,
+    widest: Annotated[
+        float | None,
+        typer.Option(
+            help="A combination of parameters whose deviation would be larger, m, stays as "
+            "believed. Default: a hundredth of the characteristic length.",
+            show_default=False,
+        ),
+    ] = None,
     folds: Annotated[
         int, typer.Option(min=0, help="Parts of the poses for cross-validation; 0: none.")
     ] = 5,
@@ -119,7 +127,7 @@ def calibrate_command(
         *(output / f"{name}{suffix}" for suffix in (".urdf", ".yaml")),
         *(output / f"{one}.csv" for one in ("parameters", "residuals")),
     ]
-    check_outputs(files, overwrite, inputs=[data, file])
+    check_outputs(files, overwrite, inputs=[data, file, *([instruments] if instruments else [])])
     others = of_tasks.load_instruments(instruments, task) if instruments else ()
     given = options.by_joint(deviations or (), "--deviation")
     read = of_tasks.read_readings(data, task, given, sensors_of(others))
@@ -134,11 +142,13 @@ def calibrate_command(
     console = common.text_console(as_json)
     known = options.by_joint(priors or (), "--prior")
     with console.status("calibrating"):
-        found = of_tasks.calibrate(model, read, priors=known)
+        found = of_tasks.calibrate(model, read, priors=known, widest=widest)
     crossed = None
     if folds:
         bar = common.progress_bar(console, "cross-validation")
-        crossed = of_tasks.cross_validate(model, read, folds=folds, priors=known, progress=bar)
+        crossed = of_tasks.cross_validate(
+            model, read, folds=folds, priors=known, widest=widest, progress=bar
+        )
     output.mkdir(parents=True, exist_ok=True)
     notes = _write(model, found, files, file)
     summary = _summary(model, found, crossed)
@@ -280,8 +290,8 @@ def _print(
     console.print(common.table_of(rows, "parameter", "change", "deviation", "unit"))
     if len(changes) > _ROWS:
         console.print(f"and {len(changes) - _ROWS} more: see parameters.csv")
-    for key in ("by_kind", "by_sensor"):
-        console.print(common.table_of(_explained(summary[key]), *_EXPLAINED))
+    for key, head in (("by_kind", "kind of sensor"), ("by_sensor", "sensor")):
+        console.print(common.table_of(_explained(summary[key]), head, *_EXPLAINED))
     console.print(common.table_of(_rows(model, found, summary)))
     if summary["unseen"]:
         console.print("What the readings do not tell:")
@@ -289,7 +299,7 @@ def _print(
         console.print(f"- {one}")
 
 
-_EXPLAINED = "readings of", "there are", "outliers", "residual over deviation", "residual"
+_EXPLAINED = "readings", "outliers", "residual over deviation", "residual"
 
 
 def _explained(given: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy import linalg
 
 from rps_pin.arrays import Array
 from rps_pin.numerics.linear_algebra import rank
@@ -78,18 +79,22 @@ def identifiable(rows: Array, opening: Array, tolerance: float = _NONE) -> Ident
     tolerance
         Singular values below this part of the largest are none.
     """
-    values, across = _svd(opening)
+    _, values, across = svd(opening)
     kept = across[rank(values, tolerance) :]
-    values, within = _svd(rows @ kept.T)
+    _, values, within = svd(rows @ kept.T)
     count = rank(values, tolerance)
     seen = within[:count] @ kept
     unseen = np.vstack([within[count:] @ kept, across[: len(across) - len(kept)]])
     return Identifiable(count, seen.T, unseen.T, values, len(across) - len(kept))
 
 
-def _svd(rows: Array) -> tuple[Array, Array]:
-    """Return the singular values, and all right vectors as rows."""
-    p = rows.shape[1]
-    short = np.zeros((max(p - len(rows), 0), p))
-    _, values, across = np.linalg.svd(np.vstack([rows, short]), full_matrices=False)
-    return values, across
+def svd(rows: Array) -> tuple[Array, Array, Array]:
+    """Return U, (n, p), the singular values and all right vectors as rows, V', of (n, p).
+
+    By QR, then LAPACK's gesvd: for some matrices with many singular values near zero its gesdd,
+    which NumPy calls, does not converge.
+    """
+    n, p = rows.shape
+    q, R = np.linalg.qr(np.vstack([rows, np.zeros((max(p - n, 0), p))]))
+    u, values, across = linalg.svd(R, lapack_driver="gesvd") if p else (R, np.zeros(0), R)
+    return np.asarray(q[:n] @ u), np.asarray(values), np.asarray(across)

@@ -27,6 +27,8 @@ MARGIN = 9.0
 _SURE = 2 * ndtr(-LIMIT)
 #: Readings of a pose that are left out at most.
 MOST = 3
+#: Eigenvalues of a part of a projection below this part of the largest are none.
+_NONE = 1e-9
 
 
 def outliers(r: Array, A: Array, known: Bools) -> Bools:
@@ -46,12 +48,13 @@ def outliers(r: Array, A: Array, known: Bools) -> Bools:
     sets = np.zeros((len(every), r.shape[1]), dtype=bool)
     for row, one in zip(sets, every, strict=True):
         row[list(one)] = True
-    for i in np.flatnonzero(_squares(r, A, known[:, None])[:, 0] > LIMIT**2):
+    rest, projection = _projected(r, A, known)
+    for i in np.flatnonzero((rest**2).sum(axis=1) > LIMIT**2):
         out = np.vstack([sets[~(sets & ~known[i]).any(axis=1)], known[i]])
         kept = known[i] & ~out
         told = (kept.sum(axis=1) > A.shape[2]) | ~out.any(axis=1) | ~kept.any(axis=1)
         out, kept = out[told], kept[told]
-        squares = _squares(r[i, None], A[i, None], kept[None])[0]
+        squares = _squares(rest[i], projection[i], out)
         redundant = np.maximum(kept.sum(axis=1) - A.shape[2], 0)
         agree = (squares <= chdtri(np.maximum(redundant, 1), _SURE)) | ~kept.any(axis=1)
         total = np.where(agree, squares + LIMIT**2 * out.sum(axis=1), np.inf)
@@ -61,8 +64,23 @@ def outliers(r: Array, A: Array, known: Bools) -> Bools:
     return found
 
 
-def _squares(r: Array, A: Array, kept: Bools) -> Array:
-    """Return least sums of squares of readings that are kept, shapes (n, s), (n, k, s): (n, k)."""
-    B, b = A[:, None] * kept[..., None], r[:, None] * kept
-    left = b - (B @ (np.linalg.pinv(B) @ b[..., None]))[..., 0]
-    return np.asarray((left**2).sum(axis=-1))
+def _projected(r: Array, A: Array, known: Bools) -> tuple[Array, Array]:
+    """Return P r, (n, s), and P = 1 - A A^+ of the readings that are known, (n, s, s)."""
+    A = A * known[..., None]
+    P = np.eye(r.shape[1]) - A @ np.linalg.pinv(A)
+    return (P @ (r * known)[..., None])[..., 0], P
+
+
+def _squares(rest: Array, P: Array, out: Bools) -> Array:
+    """Return a pose's least sum of squares without some readings, of each set, (k, s): (k,).
+
+    Leaving readings S out is correcting them freely: |P r|^2 falls by (P r)_S' (P_SS)^+ (P r)_S.
+    """
+    squares = np.full(len(out), float(rest @ rest))
+    for size in np.unique(out.sum(axis=1)):
+        sets = np.flatnonzero(out.sum(axis=1) == size)
+        at = np.nonzero(out[sets])[1].reshape(len(sets), size)
+        part, block = rest[at], P[at[:, :, None], at[:, None, :]]
+        gain = np.linalg.pinv(block, rcond=_NONE, hermitian=True) @ part[..., None]
+        squares[sets] -= (part * gain[..., 0]).sum(axis=1)
+    return np.asarray(np.maximum(squares, 0.0))

@@ -153,6 +153,8 @@ class CalibrationModel:
         self.units = self._units()
         independent = mechanism.actuated_indices
         self._dependent = np.setdiff1d(np.arange(mechanism.model.nv), independent)
+        read = np.concatenate([self._moved, *(use.frame.v for use in self._uses)])
+        self._wanted = np.flatnonzero(np.isin(self._dependent, read))
 
     @property
     def engine(self) -> Any:
@@ -218,7 +220,10 @@ class CalibrationModel:
         return np.asarray(q[:, use.frame.q])
 
     def _sensitivity(self, q: Array, own: Array | None) -> tuple[Array, Array]:
-        """Return dq/dp with the task's coordinates held, (n, nv, p), and what opens the loops."""
+        """Return dq/dp with the task's coordinates held, (n, nv, p), and what opens the loops.
+
+        Rows of joints that nothing reads are zero.
+        """
         found = np.zeros((len(q), self.mechanism.model.nv, self._count))
         none = np.zeros((len(q), 0, len(self.labels)))
         if not self._count:
@@ -226,7 +231,10 @@ class CalibrationModel:
         J = self._engine.jacobian(q, parameters=own)[:, :, self._dependent]
         G = self._engine.gaps_by_parameters(q, parameters=own)
         if J.shape[1] == J.shape[2]:
-            found[:, self._dependent] = -np.linalg.solve(J, G)
+            # Rows of -J^-1 G that are read: (J'^-1 E)' G, with columns of the unit matrix, E.
+            E = np.eye(J.shape[1])[:, self._wanted]
+            adjoint = np.swapaxes(np.linalg.solve(np.swapaxes(J, 1, 2), E[None]), 1, 2)
+            found[:, self._dependent[self._wanted]] = -adjoint @ G
             return found, none
         found[:, self._dependent] = -np.linalg.pinv(J, rcond=_REDUNDANT) @ G
         left = J @ found[:, self._dependent] + G

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, UnreachableError, did_you_mean
+from rps_pin.task.calibration.fit import approach, fit
 from rps_pin.task.calibration.information import Identifiable
 from rps_pin.task.calibration.prediction import CalibrationModel
 from rps_pin.task.calibration.problem import Problem
@@ -60,6 +61,9 @@ class Calibration(NamedTuple):
     """What it was found from."""
     units: Array
     """What a unit of each parameter counts for as a length, shape (p,), m."""
+    held: float
+    """By how many deviations the readings contradict, at most, a combination that is seen too
+    weakly and was left as believed; see `calibrate`, `widest`."""
 
     @property
     def correlations(self) -> Array:
@@ -81,6 +85,12 @@ class Calibration(NamedTuple):
             found.append(
                 f"the residuals are {math.sqrt(ratio):.3g} times what the sensors' deviations say: "
                 "deviations are too small, or the machine has errors that are no parameters"
+            )
+        if self.held > 1 + _SURE:
+            found.append(
+                f"the readings contradict, by {self.held:.3g} deviations, a combination of "
+                "parameters that is seen weakly and was left as believed: raise widest, or "
+                "measure other poses"
             )
         share = self.outliers.sum() / np.isfinite(self.residuals).sum()
         if share > _MANY:
@@ -145,12 +155,12 @@ def calibrate(
             f"{seen.rank} combinations of parameters and {problem.x.size} coordinates of the poses "
             "take them all; read more, or at more poses"
         )
-    problem.approach(seen)
+    approach(problem, seen)
     for _ in range(_ROUNDS):
         used = problem.used
         problem.leave_out()
         _refuse_contradiction(problem, seen, read)
-        problem.fit(seen)
+        fit(problem, seen)
         if np.array_equal(used, problem.used):
             break
     turn = seen.seen / model.units[:, None]
@@ -173,6 +183,7 @@ def calibrate(
         freedom,
         read,
         model.units,
+        problem.contradicted(seen),
     )
 
 
