@@ -11,7 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from rps_pin import ClosedLoopModel, RPSRobot, Task
 from rps_pin.errors import InputError, MechanismError, SingularityError
+from rps_pin.numerics.boxes import Ball
+from rps_pin.numerics.intervals import Interval
 from rps_pin.task import CertifiedBoxes, certify
+from rps_pin.task.design import RoundPart
 from rps_pin.task.point_legs import point_legs
 from tests.worst import worst
 
@@ -112,6 +115,43 @@ def test_boxes_of_all_six_coordinates() -> None:
     for boxes, right in ((wide.inside, True), (wide.outside, False)):
         if len(boxes):
             assert (inside(drawn(boxes, 50_000)) == right).all()
+
+
+def test_a_ball_of_turns_is_inside_where_its_box_is_not() -> None:
+    """Of the corners of the box that the ball does not reach, nothing is said."""
+    half = np.array([0.01, 0.0, 0.0, 0.3, 0.3, 0.3])
+    box, turns = (HOME - half, HOME + half), RoundPart(["rx", "ry", "rz"], [0, 0, 0], 0.3)
+    part = certify(TASK, *box, most_boxes=2_000, undecided=0.0, round=[turns])
+    assert len(part.inside) > 20
+    random = np.random.default_rng(4)
+    x = HOME + random.uniform(-1, 1, (4_000, 6)) * half
+    within = np.linalg.norm(x[:, 3:], axis=-1) <= 0.3
+    held = sum(
+        ((x >= one[0]) & (x <= one[1])).all(axis=-1).astype(int) for one in part.inside
+    ).astype(bool)
+    assert inside(x[within & held]).all()
+    left = np.concatenate([part.outside, part.undecided])
+    kept = [((x >= one[0]) & (x <= one[1])).all(axis=-1) for one in left]
+    assert (held | np.any([*kept, ~within], axis=0)).all()  # no point of the ball is lost
+    assert part.verdict == "inside"
+    with pytest.raises(InputError, match="'phi'"):
+        certify(TASK, *box, round=[RoundPart(["rx", "phi"], [0, 0], 0.3)])
+    with pytest.raises(InputError, match="is not in the box"):
+        certify(TASK, *box, round=[RoundPart(["rx", "ry"], [0, 1], 0.3)])
+
+
+def test_boxes_that_do_not_meet_a_ball_are_told_and_others_keep_its_points() -> None:
+    random = np.random.default_rng(7)
+    ball = Ball([0, 2], np.array([0.3, -0.2]), 0.5)
+    middle, half = random.uniform(-1.5, 1.5, (3, 400)), random.uniform(0, 0.6, (3, 400))
+    meets, hull = ball.met(Interval(middle - half, middle + half))
+    x = middle[:, None] + half[:, None] * random.uniform(-1, 1, (3, 300, 400))
+    within = np.hypot(x[0] - 0.3, x[2] + 0.2) <= 0.5
+    assert not within[:, ~meets].any()
+    kept = ((x >= hull.lower[:, None]) & (x <= hull.upper[:, None])).all(axis=0)
+    assert kept[within].all()
+    assert 50 < meets.sum() < 350
+    assert ((hull.upper - hull.lower) < 1.9 * half)[:, meets].any(axis=0).sum() > 50
 
 
 def test_a_singular_pose_is_in_no_certified_box() -> None:

@@ -44,13 +44,50 @@ class Bounds(NamedTuple):
     """The same, negative."""
 
 
+class Ball(NamedTuple):
+    """A disc or a ball of some coordinates, to which what is asked is restricted."""
+
+    columns: Sequence[int]
+    centre: Array
+    radius: float
+
+    def met(self, box: Interval) -> tuple[Bools, Interval]:
+        """Return which boxes (m, n) meet it, and boxes that hold what they have of it."""
+        columns, at = list(self.columns), self.centre[:, None]
+        near = np.maximum(np.maximum(box.lower[columns] - at, at - box.upper[columns]), 0.0)
+        # Raised by more than the rounding of all this.
+        most = self.radius + 1e-12 * (self.radius + float(np.abs(self.centre).max()))
+        squared = (near * near).sum(axis=0)
+        reach = np.sqrt(np.maximum(most * most - (squared - near * near), 0.0)) * (1.0 + 1e-12)
+        reach += 1e-12 * most
+        low, high = box.lower.copy(), box.upper.copy()
+        low[columns] = np.maximum(low[columns], at - reach)
+        high[columns] = np.minimum(high[columns], at + reach)
+        meets = squared <= most * most
+        return meets, Interval(np.where(meets, low, box.lower), np.where(meets, high, box.upper))
+
+
+def met(balls: Sequence[Ball], box: Interval) -> tuple[Bools, Interval]:
+    """Return which boxes (m, n) meet all balls, and boxes that hold what they have of these."""
+    meets = np.ones(box.lower.shape[1], dtype=bool)
+    for ball in balls:
+        here, box = ball.met(box)
+        meets &= here
+    return meets, box
+
+
 #: Bounds of some margins over boxes of shape (coordinates, n).
 Group = Callable[[Interval], Sequence[Bounds]]
 
 
 @dataclass(frozen=True, eq=False)
 class CertifiedBoxes:
-    """A box of coordinates, cut into boxes that are proven inside or outside."""
+    """A box of coordinates, cut into boxes that are proven inside or outside.
+
+    Where discs or balls were given (`round`), what is proven of a box is so of its points in these,
+    "outside" perhaps of others too; boxes without such points are in none of the three. Volumes are
+    those of whole boxes.
+    """
 
     lower: Array
     """Least coordinates of the box, shape (m,)."""
@@ -132,6 +169,7 @@ def prove(
     undecided: float,
     most_boxes: int,
     progress: Progress = iter,
+    balls: Sequence[Ball] = (),
 ) -> CertifiedBoxes:
     """Return which parts of a box are proven to have positive margins.
 
@@ -147,6 +185,8 @@ def prove(
         It ends also where this many boxes are undecided.
     progress
         Wraps the loops over blocks of boxes.
+    balls
+        Points outside of these do not count: boxes that do not meet them are left out.
 
     Raises
     ------
@@ -163,14 +203,15 @@ def prove(
         left: list[tuple[Places, Bools, Array]] = []
         for i in progress(range(0, len(places), _BLOCK)):
             block, open_ = places[i : i + _BLOCK], asked[i : i + _BLOCK]
-            box = Interval(*(end.T for end in ends_of(block, lower, upper)))
+            meets, box = met(balls, Interval(*(end.T for end in ends_of(block, lower, upper))))
+            block, open_, box = block[meets], open_[meets], box[:, meets]
             with np.errstate(invalid="ignore", over="ignore"):  # no bounds: NaN proves nothing
                 out, parts = _judged(groups, box, open_)
             proven = ~open_.any(axis=1) & ~out
             decided[0].append(block[proven])
             decided[1].append(block[out])
             rest = ~(proven | out)
-            left.append((block[rest], open_[rest], parts[rest]))
+            left.append((block[rest], open_[rest], parts[rest] * (0.0 if balls else 1.0)))
         places, asked, parts = (np.concatenate(one) for one in zip(*left, strict=True))
         inside, outside = (np.concatenate(one) for one in decided)
         found = CertifiedBoxes(lower, upper, (inside, outside, places), parts)

@@ -18,12 +18,14 @@ A 3-RPS has its own: `rps_pin.rps.workspace.certify`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from rps_pin.errors import MechanismError
-from rps_pin.numerics.boxes import CertifiedBoxes, Progress, checked_box, prove
+from rps_pin.arrays import Array
+from rps_pin.errors import InputError, MechanismError
+from rps_pin.numerics.boxes import Ball, CertifiedBoxes, Progress, checked_box, prove
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.certification.general import certify_general, refuse_turns
 from rps_pin.task.certification.six_legs import LegMargins
@@ -31,6 +33,9 @@ from rps_pin.task.paths.limits import Cone
 from rps_pin.task.point_legs import point_legs
 from rps_pin.task.task import Task
 from rps_pin.validation import real_vector
+
+if TYPE_CHECKING:
+    from rps_pin.task.design.region import RoundPart
 
 
 @refuses_other_kinds
@@ -41,6 +46,7 @@ def certify(
     *,
     start: ArrayLike | None = None,
     cones: Sequence[Cone] = (),
+    round: Sequence[RoundPart] = (),
     free: float = 0.02,
     undecided: float = 0.01,
     most_boxes: int = 200_000,
@@ -76,6 +82,9 @@ def certify(
     cones
         Limits of balls and universal joints, or of any two frames, that count beside the joints'
         limits, as those of `rps_pin.task.workspace.workspace`.
+    round
+        Discs and balls of coordinates: points of the box outside of these do not count, so that
+        boxes that do not meet them are left out.
     free
         See above, rad and characteristic lengths. A Delta's platform could turn: boxes beyond its
         reach are excluded for turns of at most this.
@@ -102,7 +111,8 @@ def certify(
     """
     ends = checked_box(lower, upper, task.size, held=True)
     options: dict[str, Any] = {
-        "undecided": undecided, "most_boxes": most_boxes, "progress": progress
+        "undecided": undecided, "most_boxes": most_boxes, "progress": progress,
+        "balls": _balls(task, *ends, round),
     }  # fmt: skip
     try:
         legs = point_legs(task)
@@ -112,3 +122,19 @@ def certify(
     at_start = task.home if start is None else real_vector(start, 6, "start")
     margins = LegMargins(task, legs, at_start, cones)
     return prove(margins.groups, *ends, **options)
+
+
+def _balls(task: Task, lower: Array, upper: Array, parts: Sequence[RoundPart]) -> list[Ball]:
+    """Return round parts as balls of columns; their centres are in the box."""
+    found = []
+    for part in parts:
+        for name in part.coordinates:
+            if name not in task.coordinates:
+                raise InputError(
+                    f"no coordinate {name!r} of the task; there are: {', '.join(task.coordinates)}"
+                )
+        columns, centre = [*map(task.coordinates.index, part.coordinates)], np.array(part.centre)
+        if not ((centre >= lower[columns]) & (centre <= upper[columns])).all():
+            raise InputError(f"the centre {centre.tolist()} of a round part is not in the box")
+        found.append(Ball(columns, centre.astype(np.float64), float(part.radius)))
+    return found

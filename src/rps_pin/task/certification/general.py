@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
 from rps_pin.errors import InputError, MechanismError, SingularityError
-from rps_pin.numerics.boxes import CertifiedBoxes, Progress
+from rps_pin.numerics.boxes import Ball, CertifiedBoxes, Progress, met
+from rps_pin.numerics.intervals import Interval
 from rps_pin.task.certification.cones import Cones
 from rps_pin.task.certification.equations import Equations
 from rps_pin.task.certification.exclusion import Exclusion
@@ -32,6 +33,7 @@ def certify_general(
     *,
     start: ArrayLike | None,
     cones: Sequence[Cone] = (),
+    balls: Sequence[Ball] = (),
     free: float,
     undecided: float,
     most_boxes: int,
@@ -50,6 +52,8 @@ def certify_general(
     if equations.symbols.turn is not None:
         refuse_turns(task, lower, upper)
     x, q = _started(task, lower, upper, start)
+    if not met(balls, Interval(x[:, None]))[0].all():
+        raise InputError(f"the start, {x.tolist()}, is not in the round parts of the box")
     z = equations.closed(equations.state(q)[None], x[None])
     first = sheets(equations, z, x[None], np.zeros((1, task.size)))
     margins = Margins(equations, first, Cones(equations, cones) if cones else None)
@@ -67,6 +71,7 @@ def certify_general(
         undecided=undecided,
         most_boxes=most_boxes,
         progress=progress,
+        balls=balls,
     )
     return growth.run()
 

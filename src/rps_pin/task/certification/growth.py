@@ -8,14 +8,15 @@ proven but not whether these are inside.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rps_pin.arrays import Array, Bools, Indices
-from rps_pin.numerics.boxes import CertifiedBoxes, Places, Progress, ends_of
+from rps_pin.numerics.boxes import Ball, CertifiedBoxes, Places, Progress, ends_of, met
+from rps_pin.numerics.intervals import Interval
 from rps_pin.task.certification.equations import Equations
 from rps_pin.task.certification.margins import Margins
 from rps_pin.task.certification.newton import LEAST, Sheets, sheets
@@ -95,7 +96,9 @@ class Growth:
         undecided: float,
         most_boxes: int,
         progress: Progress = iter,
+        balls: Sequence[Ball] = (),
     ) -> None:
+        self._balls = balls
         self._equations, self._margins, self._start = equations, margins, start
         self._lower, self._upper, self._excluded = lower, upper, excluded
         self._undecided, self._most, self._progress = undecided, most_boxes, progress
@@ -115,6 +118,9 @@ class Growth:
         guess = self._start.z[None].copy()
         above: Sheets | None = None
         while True:
+            ends = ends_of(places, self._lower, self._upper)
+            meets, _ = met(self._balls, Interval(*(end.T for end in ends)))
+            places, from_, guess = places[meets], from_[meets], guess[meets]
             places, parts, above, from_, guess = self._level(places, above, from_, guess)
             none = np.zeros((0, 1 + m), dtype=np.int32)
             inside, outside = (
