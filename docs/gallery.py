@@ -252,7 +252,7 @@ def _plot_simulation() -> Figure:
 
 
 def page() -> str:
-    """Return the page: each figure with its code, which `tests/test_docs.py` runs."""
+    """Return the page: each figure with its code, which `tests/plots/test_gallery.py` runs."""
     first = _FIRST.findall(Path(__file__).read_text("utf-8"))
     lines = [
         "<!-- made by docs/gallery.py -->",

@@ -50,9 +50,11 @@ def name(page: Path) -> str:
     return page.relative_to(ROOT / "docs").with_suffix("").as_posix()
 
 
-@pytest.mark.parametrize(
-    "page", [page for page, text in TEXTS.items() if "```python" in text], ids=name
-)
+#: Pages with code; that of the gallery runs in tests/plots/test_gallery.py.
+WITH_CODE = [p for p, text in TEXTS.items() if "```python" in text and name(p) != "gallery"]
+
+
+@pytest.mark.parametrize("page", WITH_CODE, ids=name)
 def test_the_python_blocks_run_in_order_and_print_what_is_shown(page: Path, tmp_path: Path) -> None:
     for block in pages.run(TEXTS[page], tmp_path):
         if block.shown is not None:

@@ -13,17 +13,17 @@ import pytest
 from rps_pin.interruption import scratch_folder
 from tests.kills import COMMANDS, kills
 from tests.processes import run
+from tests.quick import quick
 
 INT, TERM, HUP, KILL = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
 
 
-@pytest.mark.parametrize(
-    ("name", "signals"),
-    [("urdf", (INT, KILL, TERM)), ("convert mjcf", (KILL, HUP, INT))],
-    ids=["urdf", "convert"],
-)
+CASES = [("urdf", (INT, KILL, TERM)), ("convert mjcf", (KILL, HUP, INT))]
+
+
+@pytest.mark.parametrize(("name", "signals"), quick(CASES, [CASES[0]]), ids=["urdf", "convert"])
 def test_a_command_that_is_killed_leaves_nothing_half(
     name: str, signals: tuple[signal.Signals, ...], tmp_path: Path
 ) -> None:

@@ -27,7 +27,7 @@ from tests.cli.typed import (
     commands_of_new,
     exit_status,
 )
-from tests.each import each
+from tests.quick import quick
 
 ROOT = Path(__file__).parents[2]
 URDF = ROOT / "urdf"
@@ -49,7 +49,9 @@ def run_as_typed(line: str, folder: Path) -> None:
     assert ended.returncode == exit_status(line), (line, ended.stdout, ended.stderr)
 
 
-@each("kind", ["3rps", "stewart", "delta", "five-bar"])
+@pytest.mark.parametrize(
+    "kind", quick(["3rps", "stewart", "delta", "five-bar"], ["3rps", "five-bar"])
+)
 def test_a_new_robot_works_at_once_as_typed(kind: str, tmp_path: Path) -> None:
     tmp_path /= kind
     tmp_path.mkdir()

@@ -22,6 +22,7 @@ from rps_pin.codegen.expressions.parameters import Parameters
 from rps_pin.codegen.expressions.tree import Tree
 from rps_pin.errors import InputError, MechanismError
 from tests.closed_loop.random_mechanisms import pooled
+from tests.quick import quick
 from tests.worst import worst
 
 Array = NDArray[np.float64]
@@ -140,8 +141,13 @@ def chain(loops: int, kind: str, slanted: bool = False) -> tuple[ClosedLoopModel
     return ClosedLoopModel(model, closures, ["crank"]), home
 
 
-@pytest.mark.parametrize("kind", ["point_on_line", "spherical"])
-@pytest.mark.parametrize("slanted", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "slanted"),
+    quick(
+        [(kind, slanted) for kind in ("point_on_line", "spherical") for slanted in (False, True)],
+        [("point_on_line", False), ("spherical", True)],
+    ),
+)
 def test_chains_of_loops(kind: str, slanted: bool) -> None:
     """The cost of J_d grows with the number of loops, also where a row of each is redundant."""
     counts, operations = [4, 16, 64], []

@@ -177,7 +177,7 @@ def test_ticks_are_the_interpreted_ones(name: str, faults: float) -> None:
         assert generated > (0.95 if not faults else 0.1) * ticks
 
 
-def test_ten_thousand_ticks_at_the_limits() -> None:
+def test_thousands_of_ticks_at_the_limits() -> None:
     """Forces at their limits come and go; so do faults."""
     robot = RPSRobot.from_preset("micro")
     weight = np.abs(loop("computed_torque_task", robot, False).forces).max()
@@ -186,8 +186,8 @@ def test_ten_thousand_ticks_at_the_limits() -> None:
         loop("computed_torque_task", robot, compiled, **settings) for compiled in (True, False)
     )
     motion = Motion(robot, 7, 0.002)
-    generated = compared(ours, theirs, motion, 10_000)
-    assert 2000 < generated < 9900
+    generated = compared(ours, theirs, motion, 3_000)
+    assert 600 < generated < 2970
 
 
 def test_the_state_of_a_generated_tick_is_there() -> None:

@@ -16,6 +16,7 @@ from rps_pin.control import ComputedTorque, Gains, PDControl, Status, effective_
 from rps_pin.control.loop.controller import Controller
 from tests.control import float_ticks
 from tests.control.tasks import plain, start, task
+from tests.quick import quick
 from tests.worst import worst
 
 PERIOD = 1e-3
@@ -62,7 +63,7 @@ def swing(name: str, count: int, size: float = 0.05) -> tuple[list[Array], Array
     return rows, one.follow(rows[0], near)[:, one.of_actuators]
 
 
-@pytest.mark.parametrize(("name", "law"), CASES)
+@pytest.mark.parametrize(("name", "law"), quick(CASES, CASES[:3]))
 def test_statuses_and_forces_are_those_of_the_interpreted_tick(name: str, law: str) -> None:
     """Along a motion with noise, lost and bad readings, jumps, absurd times, refused targets."""
     rng = np.random.default_rng(7)

@@ -18,6 +18,7 @@ from rps_pin.control import (
     run_loop,
     wrong_parameters,
 )
+from tests.quick import quick
 
 BANDWIDTH, SETTLE = 15.0, 0.6
 
@@ -42,7 +43,10 @@ def errors(run: LoopRun, h: float) -> tuple[float, float]:
     return float(np.sqrt(np.mean(apart**2))), float(np.sqrt(np.mean(angle**2)))
 
 
-@pytest.mark.parametrize("case", ["as believed", "all wrong, friction known to 20 %"])
+CASES = ["as believed", "all wrong, friction known to 20 %"]
+
+
+@pytest.mark.parametrize("case", quick(CASES, CASES[1:]))
 def test_at_least_tenfold(case: str) -> None:
     robot = RPSRobot.from_preset("micro")
     path = helix(robot, radius=0.5e-3, pitch=0.33e-3, height=0.223, duration=1.0)

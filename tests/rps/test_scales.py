@@ -7,13 +7,14 @@ import pytest
 from rps_pin import RPSParameters
 from rps_pin.rps import Payload
 from tests.closed_loop.scaled_answers import differences
+from tests.quick import quick
 from tests.rps.scaled_answers import answers
 from tests.scaled import Units
 
 SMALL, LARGE = 2.0**-30, 2.0**30
 
 
-@pytest.mark.parametrize("preset", RPSParameters.presets())
+@pytest.mark.parametrize("preset", quick(RPSParameters.presets(), ["micro"]))
 def test_every_call_of_a_robot_with_friction_limits_and_a_payload(preset: str) -> None:
     p = RPSParameters.from_preset(preset)
     weight = 9.81 * (p.platform_mass + 3 * p.leg_mass)

@@ -35,6 +35,7 @@ from rps_pin.rps.workspace import (
     workspace_to_file,
 )
 from tests.processes import lives, run, start, wait_for_end
+from tests.quick import quick
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +100,13 @@ def test_a_file_says_what_it_holds(space: Workspace, tmp_path: Path) -> None:
         assert file.attrs["complete"]
 
 
-@pytest.mark.parametrize("workers", [1, 3])
-@pytest.mark.parametrize("kind", ["leg lengths", "poses"])
+@pytest.mark.parametrize(
+    ("kind", "workers"),
+    quick(
+        [(kind, workers) for kind in ("leg lengths", "poses") for workers in (1, 3)],
+        [("leg lengths", 1), ("poses", 1), ("poses", 3)],
+    ),
+)
 def test_a_file_holds_what_memory_would(
     micro: RPSParameters, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: int, kind: str
 ) -> None:
