@@ -205,8 +205,8 @@ def test_a_robot_without_a_middle_is_told_to_give_a_height() -> None:
     ("arguments", "in_page"),
     [
         ([], "meshcat"),
-        (["--pose", "0.4", "0.1", "0"], "meshcat"),
-        (["--interactive", "--robot", "micro"], "viser"),
+        pytest.param(["--pose", "0.4", "0.1", "0"], "meshcat", marks=pytest.mark.slow),
+        pytest.param(["--interactive", "--robot", "micro"], "viser", marks=pytest.mark.slow),
         (["--interactive", "--mechanism", "stewart", str(SAMPLES / "stewart.csv")], "viser"),
     ],
 )

@@ -36,7 +36,8 @@ LARGE = ("delta_rods", "stewart", "rotary_stewart")
     "name",
     [
         *("four_bar", "five_bar", "slider_crank", "rps", "delta", "delta_rods", "stewart"),
-        *("rotary_stewart", "linear_delta", "planar_rrr"),
+        *("linear_delta", "planar_rrr"),
+        pytest.param("rotary_stewart", marks=pytest.mark.slow),
     ],
 )
 def test_every_mechanism_of_the_package(name: str, monkeypatch: pytest.MonkeyPatch) -> None:

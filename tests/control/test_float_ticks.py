@@ -15,9 +15,9 @@ from tests.control.float_ticks import LAWS
 
 def test_some_ticks_of_the_long_run() -> None:
     """``python -m tests.control.float_ticks`` computes a million with each engine."""
-    reports = list(float_ticks.run(1500, seed=1))
+    reports = list(float_ticks.run(3000, seed=1))
     assert not [fault for report in reports for fault in report.faults]
-    assert sum(report.ticks for report in reports) >= 3000
+    assert sum(report.ticks for report in reports) >= 6000
     seen = set().union(*(report.statuses for report in reports))
     assert seen == {"OK", *(str(flag.name) for flag in Status)}
     by_name = {report.name: report for report in reports}

@@ -14,9 +14,9 @@ from tests.fuzz.workers import outcomes
 
 SEEDS = Path(__file__).parent / "seeds"
 #: Mutants of each format.
-CASES = {"URDF": 15, "MJCF": 15, "command": 6, "scenario": 20}
+CASES = {"URDF": 30, "MJCF": 30, "command": 12, "scenario": 40}
 FIRST = 1_000_000
-_USUAL = 25
+_USUAL = 60
 
 
 @pytest.mark.parametrize("name", FORMATS)

@@ -76,7 +76,7 @@ def test_long_ways_end_where_small_steps_of_plain_newton_do() -> None:
     assert 5 < found.reached.sum() < 40
     sign = np.sign(eq.determinant(begin, angle, G, H))
     regular = np.ones(40, dtype=bool)
-    parts = np.linspace(0, 1, 601)[1:]
+    parts = np.linspace(0, 1, 1501)[1:]
     for part in parts:
         solved = eq.solve_angles(begin + part * (wanted - begin), angle, G, H)
         angle = solved.angle

@@ -35,7 +35,6 @@ from rps_pin.task.motion.task_dynamics import TaskDynamics
 from rps_pin.task.motion.time_search import KEPT
 from rps_pin.trajectories.point_to_point import LineCurve
 from rps_pin.trajectories.spline import ChordSpline
-from tests.quick import quick
 from tests.task import robots
 from tests.task.slides import ALONG, BACK, MASS, WAY, slide
 from tests.worst import worst
@@ -247,7 +246,7 @@ def without_closed_forms() -> Task:
     return plain.compile(functions=("kinematics", "closing", "dynamics"))
 
 
-@pytest.mark.parametrize("force", quick([20.0, 100.0], [20.0]))
+@pytest.mark.parametrize("force", [20.0, 100.0])
 def test_the_3_rps_without_its_closed_forms(force: float) -> None:
     robot = RPSRobot.from_preset("sokolov")
     line = LineCurve([0.40, 0.05, 0.0], [0.45, -0.05, 0.1])

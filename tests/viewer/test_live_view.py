@@ -24,6 +24,7 @@ from rps_pin.errors import InputError, RPSPinError
 from rps_pin.viewer import LiveView, LocalViewer, Recorder, Scene
 from rps_pin.viewer.server import live_view
 from tests.processes import start
+from tests.quick import quick
 
 POSE = (0.22, 0.0, 0.0)
 PLATFORM = "/world/robot/platform"
@@ -375,7 +376,10 @@ def group_lives(group: int) -> bool:
 
 
 @needs_proc
-@pytest.mark.parametrize(("word", "pause"), [("begins", 0.0), ("begins", 0.4), ("runs", 0.2)])
+@pytest.mark.parametrize(
+    ("word", "pause"),
+    quick([("begins", 0.0), ("begins", 0.4), ("runs", 0.2)], [("begins", 0.0), ("runs", 0.2)]),
+)
 def test_ctrl_c_ends_both_cleanly(script, word, pause):
     while not script.stdout.readline().startswith(word):
         assert script.poll() is None

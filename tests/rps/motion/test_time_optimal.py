@@ -26,6 +26,7 @@ from rps_pin.trajectories.path import PathSample
 from rps_pin.trajectories.point_to_point import LineCurve
 from rps_pin.trajectories.spline import ChordSpline
 from rps_pin.trajectories.tilt_figures import circle, lissajous
+from tests.quick import quick
 
 Array = NDArray[np.float64]
 
@@ -202,7 +203,7 @@ def use_of(case: Case, motion: PathSample) -> Array:
     return np.asarray(used.max(axis=-1))
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", quick(range(30), range(15)))
 def test_limits_are_kept_and_nearly_always_reached(seed: int) -> None:
     case = Case(seed)
     found = case.motion()

@@ -32,8 +32,8 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, di
     (folder / "helix.yaml").write_text("kind: helix\nradius: 0.75e-3\npitch: 0.5e-3\nheight: 0.4\n")
     commands = {
         "check": ("check",),
-        "helix": ("helix", "--rate", "5"),
-        "dynamics": ("dynamics", "helix.yaml", "--rate", "5"),
+        "helix": ("helix", "--rate", "20"),
+        "dynamics": ("dynamics", "helix.yaml", "--rate", "20"),
     }
     found = {}
     for name, command in commands.items():
