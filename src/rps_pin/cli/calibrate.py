@@ -20,7 +20,7 @@ from rps_pin.errors import InputError, few
 from rps_pin.files import write_text
 from rps_pin.plain_text import short
 from rps_pin.task import calibration as of_tasks
-from rps_pin.task.calibration.instruments import sensors_of
+from rps_pin.task.calibration.measured.instruments import sensors_of
 from rps_pin.task.calibration.words import units_of
 from rps_pin.task.task import Task
 

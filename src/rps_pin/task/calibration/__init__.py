@@ -16,9 +16,9 @@ from rps_pin.task.calibration.checks import (
 )
 from rps_pin.task.calibration.description import calibrated_mechanism, write_calibrated
 from rps_pin.task.calibration.information import Identifiable
-from rps_pin.task.calibration.instruments import BallBar, Height, Inclinometer, Tracker
-from rps_pin.task.calibration.instruments_file import load_instruments
-from rps_pin.task.calibration.measured_file import read_readings
+from rps_pin.task.calibration.measured.instruments import BallBar, Height, Inclinometer, Tracker
+from rps_pin.task.calibration.measured.instruments_file import load_instruments
+from rps_pin.task.calibration.measured.measured_file import read_readings
 from rps_pin.task.calibration.plan import (
     Plan,
     candidate_poses,

@@ -19,7 +19,7 @@ from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.closed_loop import ClosedLoopModel
 from rps_pin.closed_loop.constraints.frame_coordinates import ANGULAR, LINEAR
 from rps_pin.errors import InputError
-from rps_pin.task.calibration.instruments import Instrument, sensors_of
+from rps_pin.task.calibration.measured.instruments import Instrument, sensors_of
 from rps_pin.task.calibration.sensors import possible_sensors, sensor_columns
 from rps_pin.task.coordinates import of_frame
 from rps_pin.task.task import Task

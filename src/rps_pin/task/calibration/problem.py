@@ -10,7 +10,7 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.errors import UnreachableError
 from rps_pin.numerics.linear_algebra import rank
 from rps_pin.task.calibration.information import Identifiable, identifiable, reduced, svd
-from rps_pin.task.calibration.instruments import Tracker
+from rps_pin.task.calibration.measured.instruments import Tracker
 from rps_pin.task.calibration.outliers import outliers
 from rps_pin.task.calibration.prediction import CalibrationModel, Predicted
 from rps_pin.task.calibration.sensors import Readings

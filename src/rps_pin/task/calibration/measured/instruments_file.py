@@ -27,7 +27,7 @@ from pydantic import Field
 from rps_pin.closed_loop.constraints.closures import frame_id
 from rps_pin.closed_loop.io.mechanism_schema import PlacementEntry
 from rps_pin.config import Entry, Text, Three, read_config
-from rps_pin.task.calibration.instruments import (
+from rps_pin.task.calibration.measured.instruments import (
     BallBar,
     Height,
     Inclinometer,

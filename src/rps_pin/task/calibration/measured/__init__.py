@@ -1,0 +1,1 @@
+"""What is measured: instruments, and the files of them and of their readings."""
