@@ -117,6 +117,27 @@ def test_the_command(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "base_parameters.csv").read_text().count("\n") == 16
 
 
+def test_a_constant_is_found(tmp_path: Path) -> None:
+    """Of the right drive, whose current makes 0.8 of what its constant says."""
+    model = model_of("five_bar")
+    log = log_of("five_bar", 1, 1, 2e-4, np.random.default_rng(1))
+    names = [f"{one}_{what}" for what in ("position_rad", "current_A") for one in model.actuators]
+    table = [log.time, *log.position.T, *(log.force / [2.0, 2.0 * 0.8]).T]
+    header = ",".join(["time_s", *names])
+    np.savetxt(tmp_path / "log.csv", np.transpose(table), "%.12g", ",", header=header, comments="")
+    words = ["identify", str(tmp_path / "log.csv"), "-m", "five_bar", "--cut-off", "10", "--json"]
+    words += [f"--constant={one}=2" for one in model.actuators]
+    words += ["--unknown-constant", model.actuators[1], "-o", str(tmp_path / "out")]
+    run = CliRunner().invoke(app, words)
+    assert run.exit_code == 0, run.output
+    rows = (tmp_path / "out" / "base_parameters.csv").read_text().splitlines()
+    (row,) = (one for one in rows if one.startswith("constant_factor:"))
+    name, believed, value, deviation = row.removeprefix("constant_factor:").split(",")
+    assert (name, float(believed)) == (model.actuators[1], 1.0)
+    assert 0 < float(deviation) < 0.02
+    assert abs(float(value) - 0.8) < 4 * float(deviation)
+
+
 # Exciting motions ---------------------------------------------------------------------------------
 
 

@@ -38,8 +38,6 @@ _ROUNDING, _TRIES = 1e-9, 20
 _POOR, _GOOD = 0.25, 0.75
 #: The next radius over the step's length, if it gained well, poorly, or nothing.
 _GROWN, _HALVED, _REFUSED = 3.0, 0.5, 0.25
-
-
 #: Relative accuracy of the radius that a step keeps to.
 _ACCURACY = 1e-3
 #: Singular values below this part of the largest are none.

@@ -230,7 +230,7 @@ def displaced(
 ) -> tuple[Placed, ComplexArray, ComplexArray]:
     """Return frame b displaced by parameters (k, 6), and its velocities, (k, 3) each."""
     one, two, three = _turns(by[:, 3:])
-    spin = rate[:, 3:].copy()  # x' e_x + Rx (y' e_y + Ry z' e_z)
+    # x' e_x + Rx (y' e_y + Ry z' e_z)
     spin = np.eye(3)[0] * rate[:, 3, None] + times(
         one, np.eye(3)[1] * rate[:, 4, None] + times(two, np.eye(3)[2] * rate[:, 5, None])
     )
