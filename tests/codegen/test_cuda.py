@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -35,14 +35,6 @@ MECHANISMS: dict[str, Callable[[], ClosedLoopModel]] = {
     "stewart": lambda: file("stewart"),
     "four-bar": lambda: file("four_bar"),
 }
-
-
-@pytest.fixture(scope="module")
-def cupy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeCuPy]:
-    fake = FakeCuPy(tmp_path_factory.mktemp("card"))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(sys.modules, "cupy", fake)  # type: ignore[arg-type]
-        yield fake
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,14 +18,6 @@ from tests.worst import worst
 
 URDF = Path(__file__).parents[2] / "urdf"
 AXES = {"x": np.linspace(-0.8, 0.9, 35), "z": np.linspace(-0.8, 0.9, 35)}
-
-
-@pytest.fixture(scope="module")
-def cupy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeCuPy]:
-    fake = FakeCuPy(tmp_path_factory.mktemp("card"))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(sys.modules, "cupy", fake)  # type: ignore[arg-type]
-        yield fake
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from rps_pin.task.calibration import (
     geometric_groups,
     readings,
 )
+from rps_pin.task.calibration.fit import Linearised
 from rps_pin.task.calibration.outliers import outliers
 from rps_pin.task.calibration.problem import Problem
 from tests.worst import worst
@@ -417,3 +418,16 @@ def test_a_reading_that_cannot_be_is_an_outlier() -> None:
     found = calibrate(case.model, read(values))
     assert found.outliers[7, 3]
     assert found.outliers.sum() == 1
+
+
+def test_a_step_of_fewer_rows_than_combinations() -> None:
+    """The shortest that leaves nothing of the residuals, as by NumPy's least squares."""
+    rng = np.random.default_rng(8)
+    r, A, B = rng.normal(size=(2, 3)), rng.normal(size=(2, 3, 2)), rng.normal(size=(2, 3, 7))
+    step = Linearised(r, A, B, np.zeros((0, 7)), np.zeros(0)).step()
+    left = r - np.einsum("nsm,nm->ns", A, step.x) - B @ step.p
+    assert worst(left) < 1e-12
+    across = [np.linalg.svd(one)[0][:, 2] for one in A]  # what a pose cannot take
+    rows = np.array([n @ b for n, b in zip(across, B, strict=True)])
+    right = np.array([n @ one for n, one in zip(across, r, strict=True)])
+    assert worst(step.p - np.linalg.lstsq(rows, right, rcond=None)[0]) < 1e-12

@@ -75,9 +75,7 @@ class Linearised:
         self._M = np.linalg.pinv(A)
         rows = np.vstack([*(B - A @ (self._M @ B)), prior])
         d = np.concatenate([r.ravel(), -off])
-        u, s, across = svd(
-            np.vstack([rows, np.zeros((max(B.shape[2] - len(rows), 0), B.shape[2]))])
-        )
+        u, s, across = svd(rows)
         kept = s > _NONE * s.max(initial=0.0)
         self._s, self._V, self._d = s[kept], across[kept].T, (u.T @ d)[kept]
         self._own = float(np.square((A @ (self._M @ r[..., None]))[..., 0]).sum())
