@@ -198,6 +198,8 @@ def test_bad_boxes_and_starts_are_refused() -> None:
         certify(TASK, HOME, HOME)
     with pytest.raises(InputError, match="rotation vectors up to"):
         certify(TASK, HOME - 2.0, HOME + 2.0)
+    with pytest.raises(InputError, match=r"round = 3: it must be Sequence\[RoundPart\]"):
+        certify(TASK, HOME - 0.01, HOME + 0.01, round=3)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="lower"):
         certify(TASK, HOME[:3], HOME[:3] + 1)
     flat = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # all legs in one plane

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
-from rps_pin.errors import InputError, MechanismError
+from rps_pin.errors import InputError, MechanismError, shown
 from rps_pin.numerics.boxes import Ball, CertifiedBoxes, Progress, checked_box, prove
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.certification.general import certify_general, refuse_turns
@@ -126,6 +126,10 @@ def certify(
 
 def _balls(task: Task, lower: Array, upper: Array, parts: Sequence[RoundPart]) -> list[Ball]:
     """Return round parts as balls of columns; their centres are in the box."""
+    from rps_pin.task.design.region import RoundPart  # noqa: PLC0415  (design needs this module)
+
+    if not isinstance(parts, Sequence) or not all(isinstance(one, RoundPart) for one in parts):
+        raise InputError(f"round = {shown(parts)}: it must be Sequence[RoundPart]")
     found = []
     for part in parts:
         for name in part.coordinates:
