@@ -31,7 +31,7 @@ from tests.worst import worst
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 NAMES = sorted(path.name for path in EXAMPLES.glob("*.py"))
-PATIENCE = 60.0
+PATIENCE = 120.0
 #: A variable of the environment, by which an example's processes are found.
 MARK = "RPS_PIN_TEST_MARK"
 #: Of every example; the path turns once a second.

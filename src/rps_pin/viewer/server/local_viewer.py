@@ -20,7 +20,7 @@ from rps_pin.viewer.server.local_only import HOST, checked_port, listener
 from rps_pin.viewer.server.web import Hub, application
 from rps_pin.viewer.writers.window import Command, Window
 
-_START_SECONDS = 10.0
+_START_SECONDS = 60.0
 _FAREWELL_SECONDS = 0.5
 """Time for the open tabs to close their connections before these are cut."""
 
