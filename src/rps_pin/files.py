@@ -6,10 +6,12 @@ What a file is that was taken for another is told by how it begins.
 
 from __future__ import annotations
 
+import csv
+import io
 import os
 import re
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -161,6 +163,13 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write a text file in UTF-8, whole or not at all; see `whole_file`."""
     with whole_file(path) as scratch:
         scratch.write_text(text, "utf-8")
+
+
+def write_rows(path: str | os.PathLike[str], rows: Iterable[Iterable[object]]) -> None:
+    """Write rows of cells as CSV, with commas, whole or not at all; see `whole_file`."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    write_text(path, text.getvalue())
 
 
 def _umask() -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from rps_pin.task.calibration import (
     CalibrationModel,
     Height,
     Inclinometer,
+    Readings,
     Tracker,
     calibrate,
     calibrated_mechanism,
@@ -360,6 +362,100 @@ def test_planned_poses() -> None:
         other = plan.chosen.copy()
         other[k] = rng.choice(np.setdiff1d(np.arange(len(x)), plan.chosen))
         assert determinant(other) <= plan.log_determinant + 1e-5
+
+
+def test_what_is_measured_already_counts_as_it_was_read() -> None:
+    """Readings of all sensors as their poses; those that were not read tell nothing."""
+    model, task, x = five_bar().model, five_bar().task, five_bar().x[:20]
+    values = model.predict(x, model.home(x, model.nominal), model.nominal).readings
+    candidates = candidate_poses(task, {"x": (0.05, 0.35), "z": (0.4, 0.6)}, 30, seed=3)
+
+    def determinant(measured: Array | Readings | None) -> float:
+        return plan_poses(
+            model, candidates, 4, DEVIATIONS, measured=measured, widest=0.05
+        ).log_determinant
+
+    whole = determinant(x)
+    assert abs(determinant(read(values)) - whole) < 1e-6 * whole
+    half = values.copy()
+    half[10:, 2:] = np.nan  # without a task coordinate a five-bar's encoders tell nothing
+    half[10:, 1] = np.nan
+    assert abs(determinant(read(half)) - determinant(x[:10])) < 1e-6 * whole
+    assert determinant(None) < determinant(x[:10]) < whole
+    with pytest.raises(InputError, match="measured: readings of"):
+        determinant(readings(task, {"x": values[:, 2]}, {"x": 1e-5}))
+
+
+def test_a_plan_from_the_terminal_is_filled_in_and_read(tmp_path: Path) -> None:
+    words = ["calibrate", "--plan", "9", "-m", str(ROOT / "urdf" / "five_bar.yaml")]
+    words += ["--over", "x=0.05:0.35", "--over", "z=0.4:0.6"]
+    given = [f"--deviation={name}={value}" for name, value in DEVIATIONS.items()]
+    ended = rps_pin(*words, *given, "--json", folder=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    told = json.loads(ended.stdout)
+    x, path = np.array(told["poses"]), tmp_path / "calibration" / "poses.csv"
+    assert (told["parameters"], told["fitted"]) == (len(five_bar().model.labels), 11)
+    assert told["random_over_planned"]["deviation"] > 1
+    header, *rows = (line.split(",") for line in path.read_text().splitlines())
+    assert worst([float(row[1]) / 1e3 for row in rows] - x[:, 0]) < 1e-9
+    model = five_bar().model
+    values = model.predict(x, model.home(x, model.nominal), model.nominal).readings
+    k = header.index("planned_left_joint_deg")
+    off = worst([np.radians(float(row[k])) for row in rows] - values[:, 0])
+    assert off < np.radians(0.51e-6)  # the last of nine digits
+    with pytest.raises(InputError, match="line 2: nothing was read at this pose"):
+        read_readings(path, five_bar().task)
+    filled = written_plan(header, rows, values)
+    path.write_text(filled)
+    found = read_readings(path, five_bar().task)
+    assert worst(found.values - values) < 1e-12
+    assert worst(found.deviations / list(DEVIATIONS.values()) - 1) < 1e-9
+    more = ["calibrate", str(path), *words[1:], "-o", "next"]
+    ended = rps_pin(*more, folder=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    assert "poses measured before" in ended.stdout
+    assert (tmp_path / "next" / "poses.csv").read_text().splitlines()[0] == ",".join(header)
+
+
+def written_plan(header: list[str], rows: list[list[str]], values: Array) -> str:
+    """The plan with readings in its empty columns."""
+    lines = [",".join(header)]
+    for row, read_ in zip(rows, values, strict=True):
+        filled = row.copy()
+        for name, value in zip(DEVIATIONS, read_, strict=True):
+            unit, factor = ("deg", np.degrees(1)) if "joint" in name else ("mm", 1e3)
+            filled[header.index(f"{name}_{unit}")] = repr(float(factor * value))
+        lines.append(",".join(filled))
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ([], "--plan needs ranges .* --over NAME=FROM:TO.*home: x 0.19"),
+        (["--over", "y=0:1"], "--over y=0:1: no coordinate 'y'"),
+        (["--over", "x=0:0.1:5"], "it must be NAME=FROM:TO"),
+        (["--over", "x=1:0"], "FROM must be below TO"),
+        (["--over", "x=0:1", "--over", "x=0:1"], "x is given twice"),
+        (["--over", "x=0.1:0.3"], "say what will be read.*--deviation SENSOR=VALUE"),
+        (["--over", "x=0.1:0.3", "--deviation", "q=1"], "called 'q'"),
+        (["--over", "x=0.1:0.3", "--deviation", "x=1e-5", "--folds", "3"], "calibrates nothing"),
+        (["--over", "x=3:4", "--deviation", "x=1e-5"], "none of 300 random poses"),
+    ],
+)
+def test_faults_of_a_plan(words: list[str], told: str, tmp_path: Path) -> None:
+    ended = rps_pin("calibrate", "--plan", "5", "-m", "five_bar", *words, folder=tmp_path)
+    assert ended.returncode in (1, 2)
+    assert re.search(told, re.sub(r"[\s│]+", " ", ended.stderr)), ended.stderr
+    assert not (tmp_path / "calibration").exists()
+
+
+def test_a_calibration_needs_readings() -> None:
+    for words, told in ([], "give a file of readings, or a --plan"), (["r.csv"], "of a --plan"):
+        more = ["--over", "x=0:1"] if words else []
+        ended = rps_pin("calibrate", *words, "-m", "five_bar", *more)
+        assert ended.returncode == 2
+        assert told in re.sub(r"[\s│]+", " ", ended.stderr)
 
 
 def test_candidates_are_in_the_workspace() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,15 +12,16 @@ import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
+from rps_pin.cli.calibration_plan import RANGE, PlanAsked, offsets_of, plan_calibration
+from rps_pin.cli.given_options import refuse
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.task_options import load_task_and_file, needed_mechanism
-from rps_pin.errors import InputError, few
-from rps_pin.files import write_text
+from rps_pin.errors import few
+from rps_pin.files import write_rows
 from rps_pin.plain_text import short
 from rps_pin.task import calibration as of_tasks
 from rps_pin.task.calibration.measured.instruments import sensors_of
 from rps_pin.task.calibration.words import units_of
-from rps_pin.task.task import Task
 
 #: Rows of the printed table of parameters, and of other lists, at most.
 _ROWS, _LISTED = 40, 12
@@ -31,11 +30,16 @@ _CORRELATED = 0.9
 
 
 def calibrate_command(
-    data: Annotated[
-        Path,
-        typer.Argument(metavar="DATA.csv", help="Readings, a row for each pose."),
-    ],
+    context: typer.Context,
     mechanism: Annotated[Path, needed_mechanism(", as it is believed to be")],
+    data: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="DATA.csv",
+            help="Readings, a row for each pose; with --plan only if there are some.",
+            show_default=False,
+        ),
+    ] = None,
     parameters: Annotated[
         list[str] | None,
         typer.Option(
@@ -98,6 +102,25 @@ def calibrate_command(
             show_default=False,
         ),
     ] = None,
+    plan: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            help="Choose N poses to measure (next) in place of a calibration; sensors are those of "
+            "the file and of --deviation.",
+            show_default=False,
+        ),
+    ] = None,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar=RANGE,
+            help="A coordinate of the task that may vary in a plan, m or rad: **z=0.4:0.6**; "
+            "several times. Those that are not named stay at home.",
+            show_default=False,
+        ),
+    ] = None,
     folds: Annotated[
         int, typer.Option(min=0, help="Parts of the poses for cross-validation; 0: none.")
     ] = 5,
@@ -115,12 +138,33 @@ def calibrate_command(
     changed), which every other command takes; **parameters.csv** and **residuals.csv**. What the
     readings cannot tell is printed, and stays as it was.
 
+    With --plan, **poses.csv** has poses in the workspace, clear of singularities, that tell most of
+    the parameters: where to go, and empty columns for the readings. Filled in, it is a DATA.csv.
+
     Exit status: 0 done; 1 an error; 2 wrong usage.
 
     Examples:
 
     - `rps-pin calibrate readings.csv --mechanism five_bar --parameters placement:right_joint`
+
+    - `rps-pin calibrate --plan 12 --mechanism five_bar --over x=0.1:0.3 --over z=0.4:0.6
+    --deviation left_joint=1e-4 --deviation right_joint=1e-4 --deviation x=3e-5 --deviation z=3e-5`
     """
+    if plan is not None:
+        refuse(context, "a --plan calibrates nothing", "folds")
+        plan_calibration(
+            PlanAsked(plan, mechanism, data, tuple(over or ()), instruments, output),
+            options.by_joint(deviations or (), "--deviation"),
+            options.by_joint(priors or (), "--prior"),
+            {"parameters": parameters, "offsets": offsets, "scales": scales, "widest": widest},
+            overwrite,
+            as_json,
+        )
+        return
+    if over:
+        raise typer.BadParameter("--over is of a --plan", param_hint="--over")
+    if data is None:
+        raise typer.BadParameter("give a file of readings, or a --plan", param_hint="DATA.csv")
     task, file = load_task_and_file(mechanism)
     name = f"{file.stem}_calibrated"
     files = [
@@ -135,7 +179,7 @@ def calibrate_command(
         task,
         parameters or of_tasks.geometric_groups(task),
         read.sensors,
-        _offsets(task, read, offsets),
+        offsets_of(task, read.sensors, offsets),
         scales or (),
         others,
     )
@@ -160,14 +204,6 @@ def calibrate_command(
     common.print_files(console, files)
 
 
-def _offsets(task: Task, read: of_tasks.Readings, given: Sequence[str] | None) -> Sequence[str]:
-    if given is None:
-        return [name for name in task.mechanism.actuated if name in read.sensors]
-    if "none" in given and len(given) > 1:
-        raise InputError("--offset none: leave out the others")
-    return [] if "none" in given else given
-
-
 def _write(
     model: of_tasks.CalibrationModel,
     found: of_tasks.Calibration,
@@ -189,7 +225,7 @@ def _write(
         )
     ]
     header = ("parameter", "unit", "before", "after", "deviation", "known_alone")
-    write_text(parameters, _csv([header, *rows]))
+    write_rows(parameters, [header, *rows])
     names = [f"{name}_{what}" for name in model.sensors for what in ("residual", "outlier")]
     cells = [
         [
@@ -205,14 +241,8 @@ def _write(
         ]
         for pose, row in enumerate(found.residuals)
     ]
-    write_text(residuals, _csv([["pose", *names], *cells]))
+    write_rows(residuals, [["pose", *names], *cells])
     return notes
-
-
-def _csv(rows: Sequence[Sequence[str]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
 
 
 def _summary(

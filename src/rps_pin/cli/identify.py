@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +13,7 @@ from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.task_options import load_task_and_file, needed_mechanism
-from rps_pin.files import write_text
+from rps_pin.files import write_rows
 from rps_pin.plain_text import short
 
 if TYPE_CHECKING:
@@ -183,11 +181,8 @@ def _factors(found: Identification) -> list[tuple[str, float, float, float]]:
 
 
 def _csv(path: Path, header: Sequence[str], rows: Any) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows((label, *(repr(float(one)) for one in values)) for label, *values in rows)
-    write_text(path, text.getvalue())
+    written = [(label, *(repr(float(one)) for one in values)) for label, *values in rows]
+    write_rows(path, [header, *written])
 
 
 def _summary(found: Identification, predicted: Prediction | None) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 `CalibrationModel` says which numbers are parameters and what is read, `readings` what was read (or
 `read_readings`, of a CSV file), and `calibrate` finds the parameters that explain it best, with
 their covariance. `write_calibrated` writes the mechanism with these, and `plan_poses` finds the
-poses to measure.
+poses to measure; `write_plan` writes these as a file in which readings are filled in.
 """
 
 from rps_pin.task.calibration.checks import (
@@ -19,6 +19,7 @@ from rps_pin.task.calibration.information import Identifiable
 from rps_pin.task.calibration.measured.instruments import BallBar, Height, Inclinometer, Tracker
 from rps_pin.task.calibration.measured.instruments_file import load_instruments
 from rps_pin.task.calibration.measured.measured_file import read_readings
+from rps_pin.task.calibration.measured.plan_file import write_plan
 from rps_pin.task.calibration.plan import (
     Plan,
     candidate_poses,
@@ -58,4 +59,5 @@ __all__ = [
     "readings",
     "unseen_in_words",
     "write_calibrated",
+    "write_plan",
 ]

@@ -23,8 +23,10 @@ from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array, Indices
 from rps_pin.errors import InputError, did_you_mean, shown
-from rps_pin.task.calibration.information import identifiable, reduced
+from rps_pin.task.calibration.information import Identifiable, identifiable, reduced
 from rps_pin.task.calibration.prediction import CalibrationModel
+from rps_pin.task.calibration.problem import Problem
+from rps_pin.task.calibration.sensors import Readings
 from rps_pin.task.calibration.solve import WIDEST, Calibration, prior_of
 from rps_pin.task.task import Task
 from rps_pin.validation import positive_number, real_array
@@ -53,6 +55,8 @@ class Plan(NamedTuple):
     that of the pose which the actuators' readings give; NaN unless all of them are read."""
     random: Array
     """Both of random sets of as many candidates, shape (sets, 2), m."""
+    identifiable: Identifiable
+    """Which combinations of parameters all candidates together, and what is measured, determine."""
 
     @property
     def factors(self) -> tuple[float, float]:
@@ -118,7 +122,7 @@ def plan_poses(
     deviations: Mapping[str, float],
     *,
     priors: Mapping[str, float] | None = None,
-    measured: ArrayLike | None = None,
+    measured: ArrayLike | Readings | None = None,
     widest: float | None = None,
     seed: int = 0,
     progress: Callable[[Iterable[Any]], Iterable[Any]] = iter,
@@ -138,7 +142,9 @@ def plan_poses(
     priors, widest
         As for `calibrate`.
     measured
-        Task coordinates of poses that are measured already, shape (k, m).
+        What is measured already: readings of the model's sensors, NaN where nothing was read (with
+        their own deviations; their poses are found with the believed numbers), or task coordinates
+        of poses at which all sensors are read, shape (k, m).
     seed
         Of the random sets that the plan is compared with.
     progress
@@ -157,12 +163,12 @@ def plan_poses(
     missing = [name for name in model.sensors if name not in deviations]
     if missing:
         raise InputError(f"deviations: there is none of {missing[0]!r}")
-    before = np.zeros((0, m)) if measured is None else real_array(measured, "measured", (m,))
     if widest is None:
         widest = WIDEST * model.task.characteristic_length
     spread = np.array([positive_number(deviations[one], one) for one in model.sensors])
+    before, weights = _measured(model, measured, 1.0 / spread)
     every = np.vstack([x, before])
-    rows, opening = _rows(model, every, spread)
+    rows, opening = _rows(model, every, np.vstack([np.tile(1.0 / spread, (len(x), 1)), weights]))
     known = 1.0 / (prior_of(model, priors or {}) * model.units)
     prior = np.diag(known)[known > 0]
     seen = identifiable(np.vstack([*rows, prior]), np.vstack([*opening])).within(widest)
@@ -185,6 +191,7 @@ def plan_poses(
         deviation,
         pose_deviation,
         np.array([_spreads(_information(R, M_0, one), slopes) for one in random]),
+        seen,
     )
 
 
@@ -223,11 +230,30 @@ def pose_deviations(model: CalibrationModel, found: Calibration, x: ArrayLike) -
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)) / model.task.scale)
 
 
-def _rows(model: CalibrationModel, x: Array, spread: Array) -> tuple[Array, Array]:
+def _measured(
+    model: CalibrationModel, given: ArrayLike | Readings | None, planned: Array
+) -> tuple[Array, Array]:
+    """Return poses that are measured already, (k, m), and 1 / deviation there, 0 where unread."""
+    if given is None:
+        return np.zeros((0, model.task.size)), np.zeros((0, len(planned)))
+    if not isinstance(given, Readings):
+        x = real_array(given, "measured", (model.task.size,))
+        return x, np.tile(planned, (len(x), 1))
+    if given.sensors != model.sensors:
+        raise InputError(
+            f"measured: readings of {', '.join(given.sensors)}; the model's sensors are "
+            f"{', '.join(model.sensors)}"
+        )
+    problem = Problem(model, given, np.full(len(model.labels), np.inf))
+    problem.begin(None)
+    return problem.x, np.where(np.isfinite(given.values), 1.0 / given.deviations, 0.0)
+
+
+def _rows(model: CalibrationModel, x: Array, weights: Array) -> tuple[Array, Array]:
     """Return N'B of poses, and what opens the loops, by parameters in one unit."""
     found = model.predict(x, model.home(x, model.nominal), model.nominal)
-    A = found.by_pose / spread[:, None] / model.task.scale
-    B = found.by_parameters / spread[:, None] / model.units
+    A = found.by_pose * weights[..., None] / model.task.scale
+    B = found.by_parameters * weights[..., None] / model.units
     return reduced(A, B), found.opening / model.units
 
 

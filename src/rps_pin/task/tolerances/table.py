@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from collections.abc import Sequence
 
 import numpy as np
 
 from rps_pin.arrays import Array
-from rps_pin.files import write_text
+from rps_pin.files import write_rows
 from rps_pin.plain_text import plain
 from rps_pin.task.tolerances.analysis import SHOWN_PART, Part, ToleranceAnalysis
 from rps_pin.task.tolerances.sobol import SobolIndices
@@ -130,13 +128,10 @@ def _write(
     columns: Sequence[str],
     table: Sequence[Sequence[str | float]],
 ) -> None:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(
+    cells = [
         [f"{value:.9g}" if isinstance(value, float) else value for value in row] for row in table
-    )
-    write_text(path, stream.getvalue())
+    ]
+    write_rows(path, [columns, *cells])
 
 
 def _head(name: str) -> tuple[str, str]:

@@ -7,8 +7,8 @@ The header names sensors with their units, and their standard deviations where t
     124.90,,12.1,,30
 
 A row is a pose. A cell that is empty says that nothing was read. Columns ``pose`` and ``time_s``
-are not used. Blank lines, lines that begin with ``#`` and the marks between cells are as in
-`rps_pin.trajectories.csv_file`.
+are not used, nor are those of a plan, ``planned_x_mm`` (`write_plan`). Blank lines, lines that
+begin with ``#`` and the marks between cells are as in `rps_pin.trajectories.csv_file`.
 """
 
 from __future__ import annotations
@@ -31,6 +31,8 @@ from rps_pin.trajectories.csv_file import POINT, NumberTable, cells_of, read_num
 
 #: Columns that are known and not used.
 _UNUSED = ("pose", *(f"time_{unit}" for unit in TIMES))
+#: What names of columns begin with that say where a pose was planned; not used.
+PLANNED = "planned_"
 #: A length beyond this many characteristic lengths, or an angle beyond, rad, is in another unit.
 _FAR, _TURNED = 30.0, 8 * math.pi
 
@@ -79,6 +81,15 @@ def read_readings(
         raise InputError(f"{path}: {error}") from None
 
 
+def measured_sensors(
+    path: str | os.PathLike[str], task: Task, more: Mapping[str, bool] | None = None
+) -> tuple[str, ...]:
+    """Return the sensors that have a column in a file of readings; see `read_readings`."""
+    known = possible_sensors(task) | dict(more or {})
+    table = read_numbers(path, "file of readings", partial(_columns, known=known), _row)
+    return tuple(one.sensor for one in table.positions.values() if not one.deviation)
+
+
 def _readings(
     task: Task,
     table: Array,
@@ -120,6 +131,8 @@ def _columns(names: Sequence[str], known: Mapping[str, bool]) -> dict[int, _Colu
     found: dict[int, _Column] = {}
     for k, name in enumerate(names):
         if name in _UNUSED:
+            continue
+        if name not in possible and name.removeprefix(PLANNED) in possible:
             continue
         if name not in possible:
             raise InputError(_unknown(name, known, possible))
