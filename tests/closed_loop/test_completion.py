@@ -17,7 +17,7 @@ from tests.worst import worst
 
 Array = NDArray[np.float64]
 
-SEEDS = range(40)
+SEEDS = range(20)
 
 
 def by_null_space(c: Case, of: ClosedLoopModel) -> tuple[Array, Array, Array | None]:
@@ -75,13 +75,13 @@ def test_any_actuators_get_the_forces_of_the_null_space(planar: bool) -> None:
             force = force_of_bodies(c, c.v, c.a)
             by_factors += completion.forces(m.jacobian(c.q), force) is not None
     assert worst(errors) < 1e-9
-    assert by_factors > 25
+    assert by_factors > 12
 
 
 def test_least_squares_and_factors_give_the_same_forces() -> None:
     """Passive velocities that meet all rows; units differ where joints slide."""
     errors, scaled = [], 0
-    for seed in range(60):
+    for seed in range(30):
         c = case(seed, effects=seed % 2 == 0)
         m = with_actuators(c, some_actuators(c, seed)[:2])
         m.inverse_dynamics(c.q, c.v, c.a)  # which chooses velocities
@@ -96,7 +96,7 @@ def test_least_squares_and_factors_give_the_same_forces() -> None:
         assert found[3] is not None and wanted[3] is not None
         size = np.linalg.norm(force)
         errors += [worst(*(one - other for one, other in zip(found, wanted, strict=True))) / size]
-    assert len(errors) > 7 and scaled > 2
+    assert len(errors) > 3 and scaled > 0
     assert worst(errors) < 1e-10
 
 

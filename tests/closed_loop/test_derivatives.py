@@ -16,6 +16,7 @@ from rps_pin.closed_loop.dynamics.inverse_dynamics import inverse_dynamics
 from tests.closed_loop import mechanisms, random_mechanisms
 from tests.closed_loop.mechanisms import FOUR_BAR, five_bar, values
 from tests.closed_loop.random_mechanisms import EVERY_KIND, Case, case, pooled, slopes, worst_error
+from tests.quick import quick
 
 Array = NDArray[np.float64]
 
@@ -102,7 +103,7 @@ def redundant(c: Case) -> bool:
 
 
 @every_kind
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", quick(range(2), [0]))
 @pytest.mark.parametrize("check", [check_inverse, check_forward])
 def test_derivatives_are_those_of_central_differences(
     check: Callable[[Case], None], kind: str, seed: int
@@ -112,7 +113,7 @@ def test_derivatives_are_those_of_central_differences(
 
 
 @pytest.mark.parametrize("check", [check_inverse, check_forward])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", quick(range(8), range(3)))
 def test_derivatives_of_overconstrained_mechanisms(
     check: Callable[[Case], None], seed: int
 ) -> None:
@@ -120,7 +121,7 @@ def test_derivatives_of_overconstrained_mechanisms(
 
 
 @pytest.mark.parametrize("check", [check_inverse, check_forward])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", quick(range(4), range(2)))
 def test_derivatives_with_massless_links(check: Callable[[Case], None], seed: int) -> None:
     check(case(seed, massless=True))
 
@@ -131,8 +132,7 @@ def test_derivatives_with_massless_links(check: Callable[[Case], None], seed: in
 )
 def test_derivatives_with_every_joint(check: Callable[[Case], None], sort: str) -> None:
     """Two of it at least, among revolute ones."""
-    for seed in range(2):
-        check(case(seed, joints=[sort, sort, "revolute", "revolute"]))
+    check(case(0, joints=[sort, sort, "revolute", "revolute"]))
 
 
 @given(seeds)
@@ -220,7 +220,7 @@ def test_derivatives_are_pinocchio_s(kind: str) -> None:
     more than one way; along them, dq = T dy and dv = V dy, both have to agree.
     """
     right = 0
-    for seed in range(8):
+    for seed in range(5):
         c = _regular(kind, seed)
         mechanism, at = c.mechanism, c.mechanism.actuated_indices
         tau = np.random.default_rng(seed).normal(size=at.size)
@@ -239,7 +239,7 @@ def test_derivatives_are_pinocchio_s(kind: str) -> None:
         if kind == "spherical":
             assert worst_error(found.q, theirs.by_q) < CLOSE
             assert worst_error(found.v, theirs.by_v) < CLOSE
-    assert right >= 3
+    assert right >= 2
 
 
 def _regular(kind: str, seed: int) -> Case:
@@ -254,14 +254,14 @@ def _regular(kind: str, seed: int) -> Case:
 # What they mean -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_acceleration_slope_is_the_reduced_mass_matrix(seed: int) -> None:
     c = case(seed, massless=True, armature=True)
     found = c.mechanism.inverse_dynamics_derivatives(c.q, c.v, c.a)
     assert worst_error(found.acceleration, c.mechanism.mass_matrix(c.q)) < 1e-10
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_inverse_and_forward_derivatives_undo_each_other(seed: int) -> None:
     """tau(y, u, a(y, u, tau)) = tau: T_w a_tau = 1, T_y + T_w a_y = 0, T_u + T_w a_u = 0."""
     c = case(seed, effects=True)

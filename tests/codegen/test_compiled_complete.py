@@ -17,6 +17,7 @@ from tests.closed_loop.test_complete import (
     jansen,
     wrapped,
 )
+from tests.codegen.engines import QUICK
 from tests.worst import worst
 
 
@@ -26,7 +27,7 @@ def test_never_another_branch(
 ) -> None:
     """Against circle intersection; what ends in a singularity is NaN."""
     one, rng = drawn(make, seed)
-    fast, start = one.mechanism.compile(), one.exact(one.start)[0]
+    fast, start = one.mechanism.compile(compiler=QUICK), one.exact(one.start)[0]
     reach = 4.0 / one.start.size
     goals = one.start + rng.uniform(-reach, reach, (30, one.start.size))
     found = fast.complete(goals, start, errors="mask")
@@ -44,7 +45,7 @@ def test_never_another_branch(
 def test_hands_over_what_it_does_not_follow() -> None:
     """Open guesses, jumps, and ways that end, as in the Pinocchio engine."""
     mechanism, q = double_rocker()
-    fast = mechanism.compile()
+    fast = mechanism.compile(compiler=QUICK)
     rough = q + np.array([0.05, -0.02, 0.03])
     expected = mechanism.complete([0.7], rough)
     np.testing.assert_allclose(fast.complete([0.7], rough), expected, rtol=0, atol=1e-12)

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from operator import mul
 
 import numpy as np
@@ -394,17 +394,16 @@ def rows_of(closure: LoopClosure) -> Rows:
         return DistanceRows(closure.distance)
     axis = np.array(closure.axis, dtype=np.float64)
     axis_b = np.array(closure.axis_b or closure.axis, dtype=np.float64)
-    on_line, on_plane = PointRows(across(axis)), PointRows(axis[None])
-    parallel = ParallelRows(axis, axis_b)
-    return {
-        "revolute": Stack([point, parallel]),
-        "prismatic": Stack([on_line, FrameRows()]),
-        "cylindrical": Stack([on_line, parallel]),
-        "universal": Stack([point, AxisRows(axis[None], axis_b[None])]),
-        "planar": Stack([on_plane, parallel]),
-        "point_on_line": on_line,
-        "point_on_plane": on_plane,
-    }[closure.kind]
+    made: dict[str, Callable[[], Rows]] = {
+        "revolute": lambda: Stack([point, ParallelRows(axis, axis_b)]),
+        "prismatic": lambda: Stack([PointRows(across(axis)), FrameRows()]),
+        "cylindrical": lambda: Stack([PointRows(across(axis)), ParallelRows(axis, axis_b)]),
+        "universal": lambda: Stack([point, AxisRows(axis[None], axis_b[None])]),
+        "planar": lambda: Stack([PointRows(axis[None]), ParallelRows(axis, axis_b)]),
+        "point_on_line": lambda: PointRows(across(axis)),
+        "point_on_plane": lambda: PointRows(axis[None]),
+    }
+    return made[closure.kind]()
 
 
 def across(axis: Array) -> Array:

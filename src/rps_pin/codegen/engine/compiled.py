@@ -319,7 +319,8 @@ class CompiledMechanism:
         ordered: Any = values
         whole_number(restarts, "restarts", 0)
         given: dict[str, Any] = {"within_limits": within_limits, "jump": jump}
-        given["restarts"] = restarts
+        # A path that ends is masked whatever else there is: nothing is looked for to tell of it.
+        given["restarts"] = restarts if jump or options.get("errors") != "mask" else 0
         guess = self.reference().home if q_guess is None else self._normalised(q_guess)
         if isinstance(values, Mapping):
             if any(np.ndim(one) for one in values.values()) or set(values) != set(self.actuated):
