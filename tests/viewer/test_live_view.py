@@ -28,7 +28,7 @@ from tests.quick import quick
 
 POSE = (0.22, 0.0, 0.0)
 PLATFORM = "/world/robot/platform"
-PATIENCE = 120.0
+PATIENCE = 300.0
 needs_proc = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs Linux's /proc")
 
 

@@ -35,7 +35,8 @@ from rps_pin.viewer.server.local_viewer import LocalViewer
 #: Number of the write, and the pose; its CRC-32 follows.
 _RECORD = struct.Struct("4d")
 _CHECKSUM = 4
-_START_SECONDS = 60.0
+#: A loaded machine may take a minute to import Pinocchio; a process that ends is seen at once.
+_START_SECONDS = 300.0
 _END_SECONDS = 5.0
 
 
@@ -156,7 +157,8 @@ class LiveView:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         try:
-            told = self._line.recv() if self._line.poll(_START_SECONDS) else "it took too long"
+            late = f"no answer within {_START_SECONDS:g} s"
+            told = self._line.recv() if self._line.poll(_START_SECONDS) else late
         except (EOFError, OSError):
             told = 'its process ended (a script needs `if __name__ == "__main__":`)'
         if not told.startswith("http"):
