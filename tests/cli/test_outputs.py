@@ -245,6 +245,10 @@ EVERY = {
         *("tolerance", str(SAMPLES / "drawing.yaml")),
         *("-m", "five_bar", "-o"),
     ],
+    "stiffness": [
+        *("stiffness", str(SAMPLES / "drives.yaml"), "-m", "five_bar"),
+        *("--over", "x=0.1:0.3:2", "--over", "z=0.4:0.6:2", "-o"),
+    ],
     "png": ["view", "--png"],
     "video": ["view", "--video"],
 }

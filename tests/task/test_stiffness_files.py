@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Iterable
 from functools import cache
@@ -9,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from rps_pin import ClosedLoopModel, ClosureError, InputError, Task
 from rps_pin.cli.app import app
+from rps_pin.plots import plot_stiffness_map
 from rps_pin.task.stiffness import (
     Beam,
     Compliances,
@@ -23,6 +26,7 @@ from rps_pin.task.stiffness import (
     stiffness_map,
 )
 
+ROOT = Path(__file__).parents[2]
 FILE = """
 materials:
   steel: {young_modulus_Pa: 210.0e9, shear_modulus_Pa: 81.0e9}
@@ -164,3 +168,58 @@ def test_the_command_prints_what_the_model_has(tmp_path: Path) -> None:
     table = CliRunner().invoke(app, words).stdout
     for name in (*found.output, "crank_joint", "knee", "Frequencies"):
         assert name in table
+
+
+def test_the_command_writes_maps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A row for each pose, with what the model has there; empty where there is none."""
+    monkeypatch.setattr(Figure, "savefig", lambda _, path, **options: path.write_text("<svg/>"))
+    monkeypatch.chdir(tmp_path)
+    path = written(tmp_path, "actuators: {left_joint: {stiffness_Nm_per_rad: 2.0e3}}\n")
+    words = ["stiffness", str(path), "-m", "five_bar", "--over", "z=0.5:0.9:3"]
+    words += ["--over", "x=0.1:0.2:2", "--wrench", "1", "0", "2", "0", "0", "0"]
+    run = CliRunner().invoke(app, [*words, "--json"])
+    assert run.exit_code == 0, run.output
+    told = json.loads(run.stdout)
+    written_files = sorted(file.name for file in (tmp_path / "stiffness").iterdir())
+    assert written_files == sorted(
+        ["map.csv", "stiffness.png", "stiffness.svg", "frequency.png", "frequency.svg"]
+    )
+    assert sorted(Path(one).name for one in told["files"]) == written_files
+    with (tmp_path / "stiffness" / "map.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    task = ClosedLoopModel.load(ROOT / "urdf" / "five_bar.yaml").task
+    model = StiffnessModel(task, load_compliances(path, task.mechanism))
+    assert (told["points"], told["reached"]) == (6, 2)
+    assert [(float(row["z_m"]), float(row["x_m"])) for row in rows] == [
+        (z, x) for z in (0.5, 0.7, 0.9) for x in (0.1, 0.2)
+    ]
+    for row in rows:
+        if float(row["z_m"]) > 0.65:
+            assert row["least_stiffness_N_per_m"] == row["frequency_1_Hz"] == ""
+            continue
+        one = model.at([float(row["x_m"]), float(row["z_m"])], [1, 0, 2, 0, 0, 0])
+        assert float(row["displacement_z_m"]) == pytest.approx(one.displacement[2], rel=1e-8)
+        assert float(row["compliance_x_m_per_N"]) == pytest.approx(one.compliance[0, 0], rel=1e-8)
+        assert float(row["frequency_1_Hz"]) == pytest.approx(one.frequencies[0], rel=1e-8)
+        least = 1 / np.linalg.eigvalsh(one.compliance[:3, :3])[-1]
+        assert float(row["least_stiffness_N_per_m"]) == pytest.approx(least, rel=1e-8)
+    least = min(float(row["frequency_1_Hz"]) for row in rows if row["frequency_1_Hz"])
+    assert told["lowest_frequency"]["least"] == pytest.approx(least, rel=1e-8)
+    run = CliRunner().invoke(app, [*words, "--at", "x=0.1"])
+    assert run.exit_code == 2
+    run = CliRunner().invoke(app, [*words[:4], "--held", "x=0.1"])
+    assert run.exit_code == 2
+
+
+def test_a_map_of_a_task_of_joints_has_units_of_turns() -> None:
+    task = ClosedLoopModel.load("urdf/ankle.yaml").task
+    assert task.frame is None
+    drives = Compliances(actuators=dict.fromkeys(task.mechanism.actuated, 1e5))
+    model = StiffnessModel(task, drives)
+    x = task.home + np.array([[[0.0, 0.0], [0.0, 0.02]], [[0.05, 0.0], [0.05, 0.02]]])
+    found = stiffness_map(model, x)
+    assert found.unit == "N m/rad"
+    figure = plot_stiffness_map(found)
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert "least stiffness (N m/rad)" in labels
+    assert [figure.axes[0].get_xlabel(), labels[0]] == [f"{one} (°)" for one in task.coordinates]

@@ -31,6 +31,7 @@ _COPIED = {
     "other.csv": "another log of it",
     "drawing.yaml": "tolerances of a five-bar",
     "compliances.yaml": "what gives way in a four-bar",
+    "drives.yaml": "what gives way in a five-bar",
 }
 
 

@@ -9,7 +9,11 @@ import numpy as np
 import typer
 
 from rps_pin.cli import console as common
+from rps_pin.cli.given_options import refuse
+from rps_pin.cli.outputs import OverwriteOption
+from rps_pin.cli.stiffness_map import MapAsked, write_maps
 from rps_pin.cli.task_options import given, load_task_and_file, needed_mechanism
+from rps_pin.cli.task_workspace import HeldOption, OverOption, grid_of
 from rps_pin.plain_text import short
 from rps_pin.task.stiffness import Deflection, StiffnessModel, load_compliances
 
@@ -19,6 +23,7 @@ _WRENCH = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", 
 
 
 def stiffness_command(
+    context: typer.Context,
     file: Annotated[
         Path,
         typer.Argument(metavar="FILE", help="What gives way: drives, bearings and beams; YAML."),
@@ -47,7 +52,15 @@ def stiffness_command(
         ),
     ] = None,
     gravity: Annotated[bool, typer.Option(help="Whether weight counts.")] = True,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Angles of --at in degrees.")] = False,
+    over: OverOption = None,
+    held: HeldOption = None,
+    degrees: Annotated[
+        bool, typer.Option("--degrees", help="Angles of --at, --over and --held in degrees.")
+    ] = False,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder for the maps of --over; it is made.")
+    ] = Path("stiffness"),
+    overwrite: OverwriteOption = False,
     as_json: common.JsonOption = False,
 ) -> None:
     """Compute a mechanism's deflection under a load and its weight, stiffness and frequencies.
@@ -57,15 +70,28 @@ def stiffness_command(
     the actuators' forces, the wrenches in the loops' closures, the springs that hold the most
     energy, and the lowest frequencies.
 
+    With --over, the same at each point of a grid: the least stiffness against a force in any
+    direction, displacement, compliance and frequencies (**map.csv**), with two axes as figures
+    (**stiffness.png**, **frequency.png**).
+
     Exit status: 0 done; 1 an error, or nothing holds the output; 2 wrong usage.
 
     Examples:
 
     - `rps-pin stiffness compliances.yaml -m four_bar --frame coupler_tip`
+
+    - `rps-pin stiffness drives.yaml -m five_bar --over x=0.1:0.3:9 --over z=0.4:0.6:9`
     """
-    task, _ = load_task_and_file(mechanism)
+    task, described = load_task_and_file(mechanism)
     compliances = load_compliances(file, task.mechanism)
     model = StiffnessModel(task, compliances, frame=frame, gravity=gravity)
+    if over:
+        refuse(context, "--at is of one pose; with --over, --held names coordinates", "at")
+        grid = grid_of(task, over, held or (), degrees).holding(task.home)
+        asked = MapAsked(model, grid, wrench, output, [file, described])
+        write_maps(asked, overwrite, as_json)
+        return
+    refuse(context, "it is of a grid: give --over, too", "held", "output", "overwrite")
     x = given(at, "--at", task.coordinates, task.angular, task.home, degrees)
     q = task.configuration(x) if at else task.mechanism.home
     found = model.deflection(q, wrench)

@@ -14,6 +14,13 @@ from rps_pin.plots.style import COLOUR_MAP, figure_of, new_axes, styled
 from rps_pin.task.stiffness import StiffnessMap
 from rps_pin.validation import choice
 
+#: Of the least stiffness, by its unit: factor, and label.
+_SCALE = {"N/m": 1e-6}
+_LABEL = {
+    "N/m": "least stiffness (N/µm)",
+    "N m/rad": "least stiffness (N m/rad)",
+    "of mixed units": "least stiffness (mixed units)",
+}
 #: Height of a new figure, inches.
 _HEIGHT = 2.6
 
@@ -45,11 +52,11 @@ def plot_stiffness_map(
     i, j = _varying(found)
     if not found.reached.any():
         raise InputError("no pose of the map has an equilibrium")
-    angular = [name.startswith("r") for name in (found.coordinates[i], found.coordinates[j])]
+    angular = found.angular[i], found.angular[j]
     scales = [(180 / np.pi, "°") if turns else (1e3, "mm") for turns in angular]
     first, second = scales[0][0] * found.x[:, 0, i], scales[1][0] * found.x[0, :, j]
     by_what: dict[str, tuple[Array, str]] = {
-        "stiffness": (1e-6 * found.softest, "least stiffness (N/µm)"),
+        "stiffness": (_SCALE.get(found.unit, 1.0) * found.softest, _LABEL[found.unit]),
         "frequency": (found.frequencies[..., 0], "lowest frequency (Hz)"),
     }
     values, label = by_what[what]

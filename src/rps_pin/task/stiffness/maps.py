@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -13,8 +14,12 @@ from rps_pin.arrays import Array, Bools
 from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.codegen.engine.batches import Errors
 from rps_pin.errors import ClosureError, InputError, SingularityError, UnreachableError
+from rps_pin.files import write_rows
 from rps_pin.task.stiffness.model import StiffnessModel
 from rps_pin.validation import choice, numbers, refuse_not_finite, whole_number
+
+#: Directions of the output that are shifts of a frame.
+_SHIFTS = ("x", "y", "z")
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +40,8 @@ class StiffnessMap:
         Under the loads, shape (..., p), m and rad.
     frequencies : array
         The lowest at each, shape (..., k), Hz.
+    angular, output_angular : tuples of bool
+        Which coordinates, and which directions of the output, are angles.
     """
 
     coordinates: tuple[str, ...]
@@ -43,6 +50,8 @@ class StiffnessMap:
     compliance: Array
     displacement: Array
     frequencies: Array
+    angular: tuple[bool, ...]
+    output_angular: tuple[bool, ...]
 
     @property
     def reached(self) -> Bools:
@@ -50,29 +59,44 @@ class StiffnessMap:
         return np.asarray(~np.isnan(self.displacement[..., 0]))
 
     @property
+    def unit(self) -> str:
+        """Unit of `softest`: of a task of slides and hinges there is none."""
+        if any(name in _SHIFTS for name in self.output) or not any(self.output_angular):
+            return "N/m"
+        return "N m/rad" if all(self.output_angular) else "of mixed units"
+
+    @property
     def softest(self) -> Array:
         """Least stiffness against a force in any direction, shape (...), N/m.
 
         One over the largest eigenvalue of the compliance's part of shifts and forces; of a task of
-        joints one over the largest of the whole.
+        joints one over the largest of the whole, see `unit`.
         """
-        shifts = [k for k, name in enumerate(self.output) if name in ("x", "y", "z")]
+        shifts = [k for k, name in enumerate(self.output) if name in _SHIFTS]
         part = self.compliance[..., shifts, :][..., shifts] if shifts else self.compliance
         found = np.full(self.x.shape[:-1], np.nan)
         some = self.reached
-        found[some] = 1 / np.linalg.eigvalsh(part[some])[..., -1]
+        with np.errstate(divide="ignore"):  # what is rigid
+            found[some] = 1 / np.maximum(np.linalg.eigvalsh(part[some])[..., -1], 0.0)
         return found
 
     def summary(self) -> str:
-        """Return the least and largest stiffness and frequency, in a line each."""
+        """Return the least and largest stiffness and frequency, in a line each, and where."""
         some = self.reached
         lines = [f"{int(some.sum())} of {some.size} poses"]
         if some.any():
             for name, unit, values in (
-                ("least stiffness", "N/m", self.softest[some]),
+                ("least stiffness", self.unit, self.softest[some]),
                 ("lowest frequency", "Hz", self.frequencies[some][:, 0]),
             ):
-                lines.append(f"{name}: {values.min():.4g} to {values.max():.4g} {unit}")
+                at = self.x[some][np.argmin(values)]
+                told = ", ".join(
+                    f"{coordinate} = {float(value):.6g}"
+                    for coordinate, value in zip(self.coordinates, at, strict=True)
+                )
+                lines.append(
+                    f"{name}: {values.min():.4g} to {values.max():.4g} {unit}, the least at {told}"
+                )
         return "\n".join(lines)
 
 
@@ -139,4 +163,36 @@ def stiffness_map(
         C.reshape(*batch, p, p),
         moved.reshape(*batch, p),
         lowest.reshape(*batch, count),
+        model.task.angular,
+        model.angular,
     )
+
+
+def write_map(found: StiffnessMap, path: str | os.PathLike[str]) -> None:
+    """Write a map as CSV, a row for each pose, units in the names of the columns.
+
+    Coordinates, `StiffnessMap.softest`, of each direction of the output displacement and compliance
+    (its own displacement by a load of one), and frequencies. Where there is no equilibrium, cells
+    are empty; a direction that is rigid has the compliance 0.
+    """
+    units = dict(zip(found.coordinates, found.angular, strict=True))
+    header = [f"{name}_{'rad' if turns else 'm'}" for name, turns in units.items()]
+    header.append(f"least_stiffness_{found.unit.replace(' m', 'm').replace('/', '_per_')}")
+    out = list(zip(found.output, found.output_angular, strict=True))
+    header += [f"displacement_{name}_{'rad' if turns else 'm'}" for name, turns in out]
+    header += [f"compliance_{name}_{'rad_per_Nm' if turns else 'm_per_N'}" for name, turns in out]
+    k = found.frequencies.shape[-1]
+    header += [f"frequency_{i + 1}_Hz" for i in range(k)]
+    m, p = len(found.coordinates), len(found.output)
+    own = np.diagonal(found.compliance, axis1=-2, axis2=-1)
+    table = np.hstack(
+        [
+            found.x.reshape(-1, m),
+            found.softest.reshape(-1, 1),
+            found.displacement.reshape(-1, p),
+            own.reshape(-1, p),
+            found.frequencies.reshape(-1, k),
+        ]
+    )
+    rows = [["" if np.isnan(one) else f"{one:.9g}" for one in row] for row in table]
+    write_rows(path, [header, *rows])
