@@ -84,7 +84,8 @@ class MujocoLoops:
         rows = np.vstack([self._row(*pair) for pair in self.pairs])
         basis, mass = np.zeros((nv, len(a))), np.zeros((nv, nv))
         basis[a] = np.eye(len(a))
-        basis[p] = -np.linalg.solve(rows[:, p], rows[:, a])
+        # Of a plane mechanism one row of each pair is zero.
+        basis[p] = -np.linalg.lstsq(rows[:, p], rows[:, a], rcond=None)[0]
         self.mujoco.mj_fullM(self.model, self.data, mass)
         return basis.T @ mass @ basis
 
