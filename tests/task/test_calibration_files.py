@@ -450,6 +450,21 @@ def test_faults_of_a_plan(words: list[str], told: str, tmp_path: Path) -> None:
     assert not (tmp_path / "calibration").exists()
 
 
+def test_a_cross_validation_that_fails_loses_no_calibration(tmp_path: Path) -> None:
+    """Two poses make two parts; one of them does not tell what both do."""
+    values, _ = measured(five_bar().model.nominal, np.random.default_rng(2))
+    written(values[:2], tmp_path / "r.csv")
+    words = ["calibrate", "r.csv", "-m", str(ROOT / "urdf" / "five_bar.yaml"), "--offset=none"]
+    words += [f"--deviation={name}={value}" for name, value in others().items()]
+    words += ["--parameters=placement:right_joint"]
+    ended = rps_pin(*words, folder=tmp_path)
+    assert ended.returncode == 0, ended.stderr
+    assert "note: no cross-validation, from the poses of all parts but one: 4 read" in ended.stderr
+    assert (tmp_path / "calibration" / "five_bar_calibrated.yaml").exists()
+    ended = rps_pin(*words, "--folds=5", "--overwrite", folder=tmp_path)
+    assert "--folds 5: 2 to 2, the poses; 0: none" in ended.stderr
+
+
 def test_a_calibration_needs_readings() -> None:
     for words, told in ([], "give a file of readings, or a --plan"), (["r.csv"], "of a --plan"):
         more = ["--over", "x=0:1"] if words else []

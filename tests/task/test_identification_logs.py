@@ -107,6 +107,27 @@ def test_faults_of_an_identification() -> None:
         identify(model, log(), cut_off=40.0)
     with pytest.raises(InputError, match="one or more Log objects"):
         identify(model, [])
+    dead = force.copy()
+    dead[:, 1] = 0.25
+    with pytest.raises(InputError, match=r"log: the force of leg_2_prismatic is 0.25 at all samp"):
+        identify(model, force_log(model, t, position, dead), cut_off=10.0)
+    with pytest.raises(InputError, match=r"log: no actuator moves"):
+        identify(model, force_log(model, t, 0 * position + position[0], force))
+
+
+def test_a_log_that_saturation_leaves_nothing_of_says_so() -> None:
+    model = model_of("rps")
+    t, position, force = parts()
+    top = 0.7 * np.abs(force[:, 0]).max()
+    cut = force_log(model, t, position, np.clip(force, -top, top))
+    with pytest.raises(InputError, match=r"of \d+ samples of 3 .*the force of leg_1_pri.* is held"):
+        identify(model, cut, cut_off=3.0)
+
+
+def test_constants_of_forces_are_named() -> None:
+    model = model_of("rps")
+    one = force_log(model, *parts(), constants={"leg_1_prismatic": 2.0}, name="a.csv")
+    assert one.notes == ("a.csv has forces: constants of leg_1_prismatic are not used",)
 
 
 # Doubts -------------------------------------------------------------------------------------------

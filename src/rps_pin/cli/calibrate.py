@@ -13,10 +13,11 @@ import typer
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.calibration_plan import RANGE, PlanAsked, offsets_of, plan_calibration
+from rps_pin.cli.given_options import given as given_options
 from rps_pin.cli.given_options import refuse
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
 from rps_pin.cli.task_options import load_task_and_file, needed_mechanism
-from rps_pin.errors import few
+from rps_pin.errors import InputError, RPSPinError, few
 from rps_pin.files import write_rows
 from rps_pin.plain_text import short
 from rps_pin.task import calibration as of_tasks
@@ -175,6 +176,11 @@ def calibrate_command(
     others = of_tasks.load_instruments(instruments, task) if instruments else ()
     given = options.by_joint(deviations or (), "--deviation")
     read = of_tasks.read_readings(data, task, given, sensors_of(others))
+    poses = len(read.values)
+    if not given_options(context, "folds"):
+        folds = min(folds, poses)
+    elif folds and not 2 <= folds <= poses:
+        raise InputError(f"--folds {folds}: 2 to {poses}, the poses; 0: none")
     model = of_tasks.CalibrationModel(
         task,
         parameters or of_tasks.geometric_groups(task),
@@ -187,14 +193,17 @@ def calibrate_command(
     known = options.by_joint(priors or (), "--prior")
     with console.status("calibrating"):
         found = of_tasks.calibrate(model, read, priors=known, widest=widest)
-    crossed = None
+    crossed, notes = None, []
     if folds:
         bar = common.progress_bar(console, "cross-validation")
-        crossed = of_tasks.cross_validate(
-            model, read, folds=folds, priors=known, widest=widest, progress=bar
-        )
+        try:
+            crossed = of_tasks.cross_validate(
+                model, read, folds=folds, priors=known, widest=widest, progress=bar
+            )
+        except RPSPinError as error:  # the calibration itself is done
+            notes.append(f"no cross-validation, from the poses of all parts but one: {error}")
     output.mkdir(parents=True, exist_ok=True)
-    notes = _write(model, found, files, file)
+    notes += _write(model, found, files, file)
     summary = _summary(model, found, crossed)
     if as_json:
         common.print_json(summary | {"notes": notes, "files": files})

@@ -151,7 +151,7 @@ def calibrate(
     wanted = seen.rank + problem.x.size
     if wanted >= read.total + problem.priors:
         raise InputError(
-            f"{read.total} readings at {len(read.values)} poses leave nothing to check by: "
+            f"{read.total} readings, poses: {len(read.values)}, leave nothing to check by: "
             f"{seen.rank} combinations of parameters and {problem.x.size} coordinates of the poses "
             "take them all; read more, or at more poses"
         )
@@ -195,7 +195,8 @@ def _refuse_contradiction(problem: Problem, seen: Identifiable, read: Readings) 
         raise UnreachableError(
             f"the readings contradict each other: {read.total - used} of {read.total} are "
             f"outliers, and the {used} that are left do not determine {seen.rank} combinations of "
-            "parameters; are they those of this mechanism, and their deviations right?"
+            "parameters; are they those of this mechanism, in the units of their columns, and "
+            "their deviations right?"
         )
 
 

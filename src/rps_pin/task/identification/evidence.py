@@ -140,10 +140,11 @@ def fit(model: DynamicsModel, evidence: Sequence[Evidence]) -> Fit:
     believed = np.append(model.believed, np.zeros(size - model.believed.size))
     count = sum(one.used.sum() * one.filtered.noise for one in evidence)
     if count * na < 2 * size:
+        used = sum(int(one.used.sum()) for one in evidence)
+        there = sum(one.used.size for one in evidence)
         raise InputError(
-            f"{sum(one.used.sum() for one in evidence)} samples of {na} forces, filtered, count "
-            f"for {count * na:.3g} independent numbers: too few for {size} parameters; "
-            f"log longer"
+            f"{used} of {there} samples of {na} forces can be used, and, filtered, count for "
+            f"{count * na:.3g} independent numbers: too few for {size} parameters; log longer"
         )
     stacks = [_stacked(evidence, k) for k in range(na)]
     noisy = [_noisy_information(evidence, k) for k in range(na)]

@@ -107,7 +107,10 @@ def force_log(
         )
     if held:
         tau = np.vstack([tau[:1], (tau[:-1] + tau[1:]) / 2])
-    return Log(t, a, tau, name)
+    notes: tuple[str, ...] = ()
+    if force is not None and constants:
+        notes = (f"{name} has forces: constants of {', '.join(constants)} are not used",)
+    return Log(t, a, tau, name, notes)
 
 
 def _checked(

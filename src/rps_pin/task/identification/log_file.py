@@ -84,7 +84,7 @@ def read_log(
         name=os.fspath(path),
     )
     if unused:
-        log = log._replace(notes=(f"{path}: columns that are not used: {few(unused)}",))
+        log = log._replace(notes=(*log.notes, f"{path}: columns that are not used: {few(unused)}"))
     return log
 
 

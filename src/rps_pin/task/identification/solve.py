@@ -79,9 +79,14 @@ def identify(
     start = None if near is None else real_vector(near, model.mechanism.model.nq, "near")
     unknown = unknown_factors(model, unknown_constants)
     doubts = [note for one in given for note in one.notes]
+    _refuse_dead(model, given)
     evidence = evidence_of(model, given, cut_off, start, doubts, progress)
     known = np.ones(len(model.actuators))
-    found, evidence, factors, spread = FactorFit(fit(model, evidence), evidence, known, 0 * known)
+    try:
+        first = fit(model, evidence)
+    except InputError as error:  # what was left out may be why
+        raise InputError("; ".join([str(error), *doubts])) from None
+    found, evidence, factors, spread = FactorFit(first, evidence, known, 0 * known)
     if unknown.size:
         found, evidence, factors, spread = fit_with_factors(model, evidence, unknown)
     _doubt_motion(found, doubts)
@@ -101,6 +106,19 @@ def identify(
         factors,
         spread,
     )
+
+
+def _refuse_dead(model: DynamicsModel, logs: Sequence[Log]) -> None:
+    """Refuse logs without motion, and actuators whose force is the same at all samples."""
+    for log in logs:
+        if not np.ptp(log.position, axis=0).any():
+            raise InputError(f"{log.name}: no actuator moves: all positions are the same")
+    for k, name in enumerate(model.actuators):
+        if not any(np.ptp(log.force[:, k]) for log in logs):
+            raise InputError(
+                f"{logs[0].name}: the force of {name} is {logs[0].force[0, k]:.6g} at all samples: "
+                "nothing was measured there"
+            )
 
 
 def _possible(model: DynamicsModel, found: Fit, doubts: list[str]) -> Possible | None:
