@@ -454,9 +454,9 @@ def test_a_cross_validation_that_fails_loses_no_calibration(tmp_path: Path) -> N
     """Two poses make two parts; one of them does not tell what both do."""
     values, _ = measured(five_bar().model.nominal, np.random.default_rng(2))
     written(values[:2], tmp_path / "r.csv")
-    words = ["calibrate", "r.csv", "-m", str(ROOT / "urdf" / "five_bar.yaml"), "--offset=none"]
+    words = ["calibrate", "r.csv", "-m", str(ROOT / "urdf" / "five_bar.yaml"), "--widest=1"]
     words += [f"--deviation={name}={value}" for name, value in others().items()]
-    words += ["--parameters=placement:right_joint"]
+    words += ["--parameters=placement:right_joint", "--offset=left_joint"]
     ended = rps_pin(*words, folder=tmp_path)
     assert ended.returncode == 0, ended.stderr
     assert "note: no cross-validation, from the poses of all parts but one: 4 read" in ended.stderr
