@@ -27,7 +27,7 @@ settings.register_profile(
     "rps_pin",
     derandomize=True,
     deadline=None,
-    max_examples=60,
+    max_examples=40,
     print_blob=True,
     phases=[Phase.explicit, Phase.generate, Phase.shrink],  # "explain" takes minutes
     suppress_health_check=[HealthCheck.too_slow],

@@ -25,7 +25,7 @@ def at_once(works: Sequence[Callable[[], Any]], count: int) -> tuple[list[list[A
     begin = threading.Barrier(len(works))
 
     def work(k: int) -> None:
-        begin.wait(10)
+        begin.wait(240)
         while len(found[k]) < count and not foreign:
             try:
                 found[k].append(works[k]())

@@ -89,7 +89,7 @@ def case(
 
 
 #: Tests of properties take their mechanisms from a pool of so many seeds (and their options).
-POOL = 24
+POOL = 12
 
 pool = st.integers(0, POOL - 1)
 """Seeds of the pool."""

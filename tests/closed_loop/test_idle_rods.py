@@ -52,7 +52,7 @@ def test_rods_without_mass_change_nothing() -> None:
 
 
 @pytest.mark.parametrize("check", [check_inverse, check_forward])
-@pytest.mark.parametrize("seed", quick([0, 1, 3, 5, 10, 14], [1, 5]))
+@pytest.mark.parametrize("seed", quick([0, 1, 3, 5, 10, 14], [5]))
 def test_derivatives_follow_the_motion_of_least_norm(
     check: Callable[[Case], None], seed: int
 ) -> None:

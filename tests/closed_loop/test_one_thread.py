@@ -89,7 +89,7 @@ class _Inside:
 
     def __call__(self, t: float, q: Any, v: Any) -> dict[str, Any]:
         self.inside.set()
-        self.tried.wait(10)
+        self.tried.wait(240)
         return {}
 
 
@@ -105,7 +105,7 @@ def _refused_meanwhile(inside: _Inside, step: Callable[[], Any], calls: Any) -> 
 
     thread = threading.Thread(target=work)
     thread.start()
-    assert inside.inside.wait(10)
+    assert inside.inside.wait(240)
     refused = []
     try:
         for name, call in calls.items():

@@ -308,7 +308,7 @@ def test_random_mechanisms_with_random_errors(planar: bool, size: float) -> None
     Most plane ones have redundant rows, which are not redundant any more.
     """
     rounded = 0
-    for seed in range(16):
+    for seed in range(10):
         c = case(seed, planar=planar)
         exact, found = c.mechanism, as_a_file_has_it(c, size)
         described = found.describe()
@@ -326,4 +326,4 @@ def test_random_mechanisms_with_random_errors(planar: bool, size: float) -> None
         assert worst(found.forward_dynamics(found.home, v, forces.tau) - a) < 1e-7 * max(
             1.0, worst(a)
         )
-    assert rounded > 8 or not planar
+    assert rounded > 5 or not planar

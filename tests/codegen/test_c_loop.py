@@ -64,10 +64,20 @@ def test_wrong_usage(c_loop, options) -> None:
     assert run([c_loop, *options]).returncode == 2
 
 
+def catches(pid: int, number: int) -> bool:
+    """Whether a process has a handler of a signal."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    caught = int(re.search(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)[1], 16)
+    return bool(caught >> (number - 1) & 1)
+
+
 def test_ctrl_c_ends_it(c_loop) -> None:
-    process = start([c_loop, "-t", "60"])
-    time.sleep(0.5)
+    process = start([c_loop, "-t", "600"])
+    while not catches(process.pid, signal.SIGINT):
+        assert process.poll() is None
+        time.sleep(0.01)
+    time.sleep(0.2)  # for a tick
     process.send_signal(signal.SIGINT)
-    printed, _ = process.communicate(timeout=60)
+    printed, _ = process.communicate(timeout=240)
     assert process.returncode == 0
-    assert 0 < int(printed.split()[0]) < 60_000
+    assert 0 < int(printed.split()[0]) < 600_000

@@ -43,7 +43,21 @@ def five_bar(request, tmp_path_factory) -> tuple[Package, Path]:
 
 
 @pytest.mark.parametrize(
-    ("compiler", "flags"), [("gcc", ("-O2",)), ("gcc", SANITIZED), ("clang", ("-O1",))]
+    ("five_bar", "compiler", "flags"),
+    quick(
+        [
+            (real, *with_)
+            for real in ("double", "float")
+            for with_ in [("gcc", ("-O2",)), ("gcc", SANITIZED), ("clang", ("-O1",))]
+        ],
+        [
+            ("double", "gcc", ("-O2",)),
+            ("double", "gcc", SANITIZED),
+            ("float", "gcc", ("-O2",)),
+            ("float", "clang", ("-O1",)),
+        ],
+    ),
+    indirect=["five_bar"],
 )
 def test_the_self_test_passes_without_warnings(five_bar, compiler, flags) -> None:
     package, folder = five_bar

@@ -33,7 +33,7 @@ def test_measures_are_those_of_the_robots_closed_forms(tmp_path: Path) -> None:
     path = point_to_point([0.22, -0.05, 0.05], [0.23, 0.08, 0.0], duration=0.05)
     one = Measuring(space(), Requirements(REGION, motions={"path": path}, samples=7))
     low, high = np.array([*RANGES.values()]).T
-    values = np.random.default_rng(0).uniform(low, high, (30, 4))
+    values = np.random.default_rng(0).uniform(low, high, (12, 4))
     found, within = one(values), 0
     for k, row in enumerate(values):
         (file,) = one.space.write(row, np.empty(0), tmp_path, f"robot_{k}")
@@ -52,7 +52,7 @@ def test_measures_are_those_of_the_robots_closed_forms(tmp_path: Path) -> None:
         forces = robot.mechanism.inverse_dynamics
         tau = [forces(*each).tau for each in zip(*state, strict=True)]
         np.testing.assert_allclose(found.force[k], np.abs(tau).max(), rtol=1e-9)
-    assert 5 < within < 25
+    assert 2 <= within <= 10
 
 
 def test_the_winner_is_certified(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rps_pin import InputError, ParameterError, RPSParameters
@@ -442,6 +442,7 @@ def test_inertia_about_the_com_is_taken_as_it_is() -> None:
 
 
 @given(p=strategies.parameters())
+@settings(max_examples=30)
 def test_yaml_round_trip_is_exact(
     p: RPSParameters, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -112,6 +113,7 @@ def test_figures_are_those_of_quadrature() -> None:
     sheet = size_trajectory(robot, path, 20_000.0)
     pieces = [0.0, path.ramp, path.duration - path.ramp, path.duration]
 
+    @cache
     def at(t: float, leg: int) -> tuple[float, float]:
         motion = path.sample(t)
         speed = robot.motion(*motion)[1].speed[leg]

@@ -100,7 +100,7 @@ def test_boxes_that_are_wholly_inside_or_outside() -> None:
 
 def test_random_robots_have_no_counterexample() -> None:
     random = np.random.default_rng(8)
-    for _ in range(12):
+    for _ in range(6):
         g, h = random.uniform(0.5, 2.0, 2)
         shortest = random.uniform(0.5, 1.5) * max(g, h)
         robot = MICRO.replace(

@@ -229,7 +229,7 @@ def test_ctrl_c_in_a_real_process_leaves_no_file(tmp_path: Path) -> None:
     assert process.stdout is not None
     assert process.stdout.readline() == "under way\n"
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=240)
     assert process.returncode != 0
     assert "KeyboardInterrupt" in errors
     assert list(tmp_path.iterdir()) == []
@@ -268,7 +268,7 @@ def test_a_process_that_is_ended_takes_its_workers_with_it(
             assert len(workers) == 2
             assert all(lives(one) for one in workers)
             process.send_signal(number)
-            _, errors = process.communicate(timeout=60)
+            _, errors = process.communicate(timeout=240)
         finally:
             process.kill()
     wait_for_end(workers)
@@ -327,7 +327,7 @@ def test_a_disk_that_fills_up_in_earnest(tmp_path: Path) -> None:
         [sys.executable, "-c", textwrap.dedent(script)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=240,
         check=False,
     )
     assert "no part of it was kept" in done.stdout, done.stderr
@@ -488,7 +488,7 @@ def test_a_process_goes_on_after_a_file_that_could_not_be_closed(size: int, tmp_
             except OSError as error:
                 print(error.strerror)
     """
-    done = run([sys.executable, "-c", textwrap.dedent(script)], timeout=60)
+    done = run([sys.executable, "-c", textwrap.dedent(script)], timeout=240)
     assert done.returncode == 0, done.stderr
     first, second = done.stdout.splitlines()
     assert first.endswith("no part of it was kept: File too large")
