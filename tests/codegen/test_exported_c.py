@@ -58,6 +58,7 @@ def five_bar(request, tmp_path_factory) -> tuple[Package, Path]:
         ],
     ),
     indirect=["five_bar"],
+    scope="module",  # one package after the other, each made once
 )
 def test_the_self_test_passes_without_warnings(five_bar, compiler, flags) -> None:
     package, folder = five_bar

@@ -31,7 +31,8 @@ def space() -> RPSDesignSpace:
 def test_measures_are_those_of_the_robots_closed_forms(tmp_path: Path) -> None:
     """Reach within lengths and cones, conditioning, forces and speeds: to 1e-9."""
     path = point_to_point([0.22, -0.05, 0.05], [0.23, 0.08, 0.0], duration=0.05)
-    one = Measuring(space(), Requirements(REGION, motions={"path": path}, samples=7))
+    asked = Requirements(REGION, motions={"path": path}, samples=7)
+    one = Measuring(space(), asked, compiler="tcc")
     low, high = np.array([*RANGES.values()]).T
     values = np.random.default_rng(0).uniform(low, high, (12, 4))
     found, within = one(values), 0
