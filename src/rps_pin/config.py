@@ -164,6 +164,11 @@ class YamlFile:
                 f"{where}: unknown key {key!r}{did_you_mean(str(key), keys)}; the keys of "
                 f"{path_text(path[:-1]) or what} are: {', '.join(keys)}"
             )
+        if problem["type"] == "invalid_key":
+            return (
+                f"{where}: {path_text(path) or what}: the key {shown(value)} is no name; numbers "
+                "are written with a point, 0.5 and not 0,5"
+            )
         said = "" if isinstance(value, dict) else f" = {shown(value)}"
         return f"{where}: {path_text(path) or what}{said}: {rule_of(problem)}"
 

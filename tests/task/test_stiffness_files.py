@@ -97,6 +97,7 @@ def test_a_file_says_what_the_objects_say(tmp_path: Path) -> None:
         ("inner_diameter_m: 0.026", "inner_diameter_m: 0.04", "line 6: inner_diameter = 0.04"),
         ("section: own", "section: bar", "line 7: no beam has the section 'own'"),
         ("{link: coupler,", "{link: coupler, segments: 0,", "line 1[78]: segments"),
+        ("rad: 2.0e4}", "rad: 2,0e4}", r"line 10: .*key 0.0 is no name; .* with a point, 0.5 and"),
         ("crank_joint: {stiff", "crank: {stiff", "line 10: no actuator 'crank'"),
     ],
 )
@@ -209,6 +210,13 @@ def test_the_command_writes_maps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert run.exit_code == 2
     run = CliRunner().invoke(app, [*words[:4], "--held", "x=0.1"])
     assert run.exit_code == 2
+
+
+def test_the_command_says_that_nothing_vibrates(tmp_path: Path) -> None:
+    path = written(tmp_path, "closures: {tips: {y_N_per_m: 1.0e5}}\n")
+    run = CliRunner().invoke(app, ["stiffness", str(path), "-m", "five_bar"])
+    assert run.exit_code == 0, run.output
+    assert "Frequencies: none, nothing that has a mass moves" in run.stdout
 
 
 def test_a_map_of_a_task_of_joints_has_units_of_turns() -> None:

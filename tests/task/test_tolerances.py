@@ -486,3 +486,12 @@ def test_the_table(tmp_path: Path) -> None:
     assert head.split(",")[:4] == ["number", "tolerance", "unit", "distribution"]
     assert len(lines) == len(table)
     assert "and 10 more" in table_text(found, len(table) - 10)
+
+
+def test_poses_beyond_limits_are_named() -> None:
+    """A Stewart platform below its base: its legs are too long there, or too short."""
+    task = ClosedLoopModel.load("urdf/stewart.yaml").task
+    lower = task.home - np.array([0, 0, 0.3, 0, 0, 0])
+    found = tolerance(task, {"offset:*": "0.01 mm"}, [task.home, lower])
+    assert found.doubts == ("1 of 2 poses are beyond joints' limits of position",)
+    assert not tolerance(task, {"offset:*": "0.01 mm"}).doubts

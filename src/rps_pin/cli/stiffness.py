@@ -103,7 +103,8 @@ def stiffness_command(
     console.print(_forces(found))
     console.print(_springs(found))
     told = ", ".join(short(one) for one in found.frequencies[:_FREQUENCIES])
-    console.print(f"Frequencies: {told} Hz")
+    told = f"{told} Hz" if told else "none, nothing that has a mass moves"
+    console.print(f"Frequencies: {told}")
     if found.undetermined:
         names = ", ".join(found.undetermined)
         console.print(f"Not determined, too little gives way: the wrenches in {names}")

@@ -79,7 +79,7 @@ def identify(
     start = None if near is None else real_vector(near, model.mechanism.model.nq, "near")
     unknown = unknown_factors(model, unknown_constants)
     doubts = [note for one in given for note in one.notes]
-    _refuse_dead(model, given)
+    _refuse_dead(model, given, cut_off)
     evidence = evidence_of(model, given, cut_off, start, doubts, progress)
     known = np.ones(len(model.actuators))
     try:
@@ -108,11 +108,14 @@ def identify(
     )
 
 
-def _refuse_dead(model: DynamicsModel, logs: Sequence[Log]) -> None:
-    """Refuse logs without motion, and actuators whose force is the same at all samples."""
+def _refuse_dead(model: DynamicsModel, logs: Sequence[Log], cut_off: float | None) -> None:
+    """Refuse actuators whose force is the same at all samples, and a cut-off by no motion."""
     for log in logs:
-        if not np.ptp(log.position, axis=0).any():
-            raise InputError(f"{log.name}: no actuator moves: all positions are the same")
+        if cut_off is None and not np.ptp(log.position, axis=0).any():
+            raise InputError(
+                f"{log.name}: no actuator moves, all positions are the same: no cut-off frequency "
+                "follows from them; log a motion, or give cut_off"
+            )
     for k, name in enumerate(model.actuators):
         if not any(np.ptp(log.force[:, k]) for log in logs):
             raise InputError(

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rps_pin.arrays import Array, Indices
+from rps_pin.closed_loop.assembly.completion import beyond_limits
 from rps_pin.errors import InputError, few
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.tolerances.model import Nominal, ToleranceModel
@@ -148,6 +149,11 @@ class ToleranceAnalysis:
             )
         if unseen := self.unseen:
             found.append(f"{few(unseen, 6)}: to first order no error of these changes the output")
+        system = self.model.task.mechanism.system
+        if beyond := sum(bool(beyond_limits(system, q).any()) for q in self.poses.q):
+            found.append(
+                f"{beyond} of {len(self.poses.q)} poses are beyond joints' limits of position"
+            )
         return tuple(found)
 
     def scaled(self, factor: float) -> ToleranceAnalysis:
