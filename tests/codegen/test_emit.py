@@ -24,6 +24,7 @@ from tests.codegen.machine import (
     random_function,
     reference,
 )
+from tests.quick import quick
 from tests.worst import worst
 
 
@@ -62,7 +63,7 @@ def test_two_and_four_lanes(march: str, flags: tuple[str, ...], tmp_path: Path) 
     assert error == 0 if flags else error < 1e-15
 
 
-@pytest.mark.parametrize("chunk", [500, 37, 4])
+@pytest.mark.parametrize("chunk", quick([500, 37, 4], [37]))
 def test_random_functions_in_chunks(chunk: int, tmp_path: Path) -> None:
     """Large and small chunks, sparse outputs, matrices."""
     rng = np.random.default_rng(1)
