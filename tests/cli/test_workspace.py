@@ -160,12 +160,14 @@ def test_certified_boxes_of_a_mechanism_and_of_a_3_rps(tmp_path: Path) -> None:
     )
     assert told["verdict"] == found.verdict
     assert list(told["shares"].values()) == [v / sum(found.volumes) for v in found.volumes]
+    assert told["out"] == found.reason_shares()
     rows = list(csv.DictReader((tmp_path / "one" / "boxes.csv").read_text().splitlines()))
     for verdict in ("inside", "outside", "undecided"):
         boxes = [row for row in rows if row["verdict"] == verdict]
         assert told["boxes"][verdict] == len(boxes) == len(getattr(found, verdict))
+        assert all((row["reasons"] != "") == (verdict == "outside") for row in boxes)
     sizes = [
-        (float(r["x_most"]) - float(r["x_least"])) * (float(r["z_most"]) - float(r["z_least"]))
+        math.prod(float(r[f"{one}_most_m"]) - float(r[f"{one}_least_m"]) for one in "xz")
         for r in rows
     ]
     assert math.isclose(sum(sizes), 0.2 * 0.4, rel_tol=1e-9)
@@ -175,6 +177,8 @@ def test_certified_boxes_of_a_mechanism_and_of_a_3_rps(tmp_path: Path) -> None:
     )
     assert run.returncode == 0, run.stderr
     assert "-6 to 6 deg" in run.stdout
+    rows = list(csv.DictReader((tmp_path / "rps" / "boxes.csv").read_text().splitlines()))
+    assert min(float(row["rx_least_deg"]) for row in rows) == pytest.approx(-6)
     assert "the whole box" in run.stdout
 
 

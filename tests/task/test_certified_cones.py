@@ -93,11 +93,13 @@ def test_both_ways_prove_a_cone_of_a_tilt() -> None:
         found = certify(STEWART, low, high, cones=[cone], undecided=0.0, most_boxes=most)
         shares.append(found.share_undecided)
         _check(found, lambda x: tilted(x) < 0.12)
+        assert list(found.reason_shares()) == ["universe, platform cone above 0.12 rad"]
         size, _, undecided = found.volumes
         assert size <= np.pi * 0.12**2 <= size + undecided
     assert shares[1] < 0.02 < shares[0]
     one = certify_general(STEWART, low, high, cones=[cone], most_boxes=40, **GENERAL)
     _check(one, lambda x: tilted(x) < 0.12)
+    assert one.reason_shares() == found.reason_shares()
     assert one.volumes[0] > 0.9 * np.pi * 0.12**2
     for boxes, other in ((one.inside, found.outside), (one.outside, found.inside)):
         middles = other.mean(axis=1)[:, None]

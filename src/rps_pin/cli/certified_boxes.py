@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,8 +11,10 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from rps_pin.arrays import Array
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
+from rps_pin.cli.degrees import as_asked
 from rps_pin.cli.outputs import check_outputs
 from rps_pin.cli.task_options import in_unit, unit_of
 from rps_pin.cli.task_workspace import grid_of
@@ -21,6 +24,7 @@ from rps_pin.numerics.boxes import CertifiedBoxes
 from rps_pin.rps.robot_file import kind_of_file
 from rps_pin.rps.workspace import certify as certify_rps
 from rps_pin.task import Task, certify
+from rps_pin.trajectories.csv_columns import table_in_degrees
 
 CertifyOption = Annotated[
     bool,
@@ -80,7 +84,7 @@ def certify_boxes(
     console = common.text_console(as_json)
     with console.status("proving boxes"):
         found = prove(of, lower, upper, undecided=undecided, most_boxes=most_boxes)
-        write_text(file, boxes_csv(found, task))
+        write_text(file, boxes_csv(found, task, degrees))
     summary = _summary(found, task, name or "mechanism", degrees)
     if as_json:
         common.print_json(summary | {"files": [file]})
@@ -89,22 +93,47 @@ def certify_boxes(
     common.print_files(console, [file])
 
 
-def boxes_csv(found: CertifiedBoxes, task: Task) -> str:
-    """Return the boxes as a table: what each is, and its least and largest coordinates, m or rad.
+def boxes_csv(found: CertifiedBoxes, task: Task, degrees: bool = False) -> str:
+    """Return the boxes as a table: what each is, and its least and largest coordinates.
 
-    Of an undecided box, the last columns are the parts of it that are proven inside and outside.
+    Of an undecided box, two columns are the parts of it that are proven inside and outside; of one
+    outside, the last column has the reasons, with semicolons between them.
     """
     text = io.StringIO()
-    ends = [f"{one}_{end}" for one in task.coordinates for end in ("least", "most")]
-    text.write(",".join(["verdict", *ends, "part_inside", "part_outside"]) + "\n")
-    whole = {"inside": (1.0, 0.0), "outside": (0.0, 1.0)}
-    for verdict in ("inside", "outside", "undecided"):
-        boxes = getattr(found, verdict)
-        numbers = np.moveaxis(boxes, 1, 2).reshape(len(boxes), 2 * task.size)
-        parts = found.parts if verdict == "undecided" else np.tile(whole[verdict], (len(boxes), 1))
-        for row in np.hstack([numbers, parts]).tolist():
-            text.write(",".join([verdict, *map(repr, row)]) + "\n")
+    table = csv.writer(text, lineterminator="\n")
+    columns = zip(task.coordinates, task.angular, strict=True)
+    names = [f"{one}_{end}_{unit_of(turns, False)}" for one, turns in columns
+             for end in ("least", "most")]  # fmt: skip
+    names += ["part_inside", "part_outside"]
+    rows = [_rows_of(found, verdict) for verdict in ("inside", "outside", "undecided")]
+    told = [*[""] * len(rows[0]), *_told(found), *[""] * len(rows[2])]
+    verdicts = np.repeat(["inside", "outside", "undecided"], [len(one) for one in rows])
+    numbers = np.concatenate(rows)
+    if degrees:
+        names, numbers = table_in_degrees(names, numbers)
+    table.writerow(["verdict", *names, "reasons"])
+    for verdict, row, reasons in zip(verdicts, numbers.tolist(), told, strict=True):
+        table.writerow([verdict, *map(repr, row), reasons])
     return text.getvalue()
+
+
+def _rows_of(found: CertifiedBoxes, verdict: str) -> Array:
+    """Return ends of boxes and parts that are proven, shape (n, 2 m + 2)."""
+    boxes = getattr(found, verdict)
+    numbers = np.moveaxis(boxes, 1, 2).reshape(len(boxes), 2 * boxes.shape[2])
+    whole = {"inside": (1.0, 0.0), "outside": (0.0, 1.0)}
+    parts = found.parts if verdict == "undecided" else np.tile(whole[verdict], (len(boxes), 1))
+    return np.hstack([numbers, parts])
+
+
+def _told(found: CertifiedBoxes) -> list[str]:
+    """Return the reasons of each box outside."""
+    flags, which = np.unique(found.reason, return_inverse=True)
+    words = [
+        "; ".join(as_asked(one) for k, one in enumerate(found.reasons) if int(flag) >> k & 1)
+        for flag in flags
+    ]
+    return [words[k] for k in which]
 
 
 def _summary(found: CertifiedBoxes, task: Task, name: str, degrees: bool) -> dict[str, Any]:
@@ -131,6 +160,7 @@ def _summary(found: CertifiedBoxes, task: Task, name: str, degrees: bool) -> dic
             )
         ),
         "boxes": {one: len(getattr(found, one)) for one in ("inside", "outside", "undecided")},
+        "out": {as_asked(name): share for name, share in found.reason_shares().items()},
     }
 
 
@@ -144,5 +174,9 @@ def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
         *(
             (name, f"{100 * share:.4g} % of the volume, {counts[name]} boxes")
             for name, share in summary["shares"].items()
+        ),
+        *(
+            ("of the boxes outside", f"{100 * share:.4g} %: {name}")
+            for name, share in summary["out"].items()
         ),
     ]

@@ -120,7 +120,10 @@ def _leg(
         _refuse(task, f"the line of {name!r} does not lead from the universal joint to the ball")
     axes = np.array([x, y, z]) @ model.jointPlacements[first].rotation.T
     limits = np.array([_limits(model, first), _limits(model, middle)])
-    limits[1] += math.atan2(d @ x, d @ z)
+    shift = math.atan2(d @ x, d @ z)
+    if not math.cos(mechanism.home[model.joints[middle].idx_q] + shift) > _NONE:
+        _refuse(task, f"at home, joint {model.names[middle]!r} turns the leg beyond a right angle")
+    limits[1] += shift
     on_first, on_second = np.array([x, y, z]), np.array([np.cross(y, d), y, d]) @ between.rotation
     links = {first: on_first, middle: on_second, last: on_second @ along.rotation}
     return name, np.asarray(fixed), float(sum(offsets)), axes, limits, links

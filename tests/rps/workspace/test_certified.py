@@ -9,7 +9,7 @@ import pytest
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.errors import InputError, SingularityError
-from rps_pin.rps.workspace import CertifiedBoxes, certify, leg_grid, volume, workspace
+from rps_pin.rps.workspace import CertifiedBoxes, Reason, certify, leg_grid, volume, workspace
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
 
 MICRO = RPSRobot.from_preset("micro").parameters
@@ -99,7 +99,9 @@ def test_boxes_that_are_wholly_inside_or_outside() -> None:
 
 
 def test_random_robots_have_no_counterexample() -> None:
-    random = np.random.default_rng(8)
+    """And what is said to put a box out is broken at all of its points."""
+    random, seen = np.random.default_rng(8), Reason.INSIDE
+    bits = {one.text: one for one in Reason}
     for _ in range(6):
         g, h = random.uniform(0.5, 2.0, 2)
         shortest = random.uniform(0.5, 1.5) * max(g, h)
@@ -113,14 +115,19 @@ def test_random_robots_have_no_counterexample() -> None:
         )
         low = np.array([0.5 * shortest, -1.0, -1.0])
         start = (shortest, 0.0, 0.0)
-        boxes = certify(robot, low, (1.6 * shortest, 1.0, 1.0), start=start, most_boxes=3000)
+        boxes = certify(robot, low, (1.6 * shortest, 1.0, 1.0), start=start, most_boxes=600)
         side = side_of_singularity(robot, np.array(start))
         for proven, right in ((boxes.inside, True), (boxes.outside, False)):
             if len(proven):
                 pose, _ = drawn(proven, 20_000, 3)
                 reason = evaluate(robot, pose, side, min_conditioning=0.0).reason
                 assert ((reason == 0) == right).all()
-        assert len(boxes.outside)
+        for name in boxes.reason_shares():
+            pose, _ = drawn(boxes.outside[boxes.mask(name)], 2_000, 4)
+            reason = evaluate(robot, pose, side, min_conditioning=0.0).reason
+            assert ((reason & bits[name]) != 0).all(), name
+            seen |= bits[name]
+    assert len(seen) == 12  # all limits
 
 
 def test_a_singularity_inside_is_not_certified() -> None:
@@ -128,6 +135,7 @@ def test_a_singularity_inside_is_not_certified() -> None:
     free = MICRO.without_limits()
     boxes = certify(free, (-0.05, -0.2, -0.2), (0.2, 0.2, 0.2), start=START, most_boxes=8_000)
     assert boxes.verdict == "partly"
+    assert boxes.reason_shares() == {"singular": 1.0}
     pose, _ = drawn(boxes.inside, 50_000, 5)
     assert inside(free, pose).all()
     assert not inside(free, np.array([[0.0, 0.0, 0.0]])).any()

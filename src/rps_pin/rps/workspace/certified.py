@@ -26,6 +26,7 @@ from rps_pin.numerics.boxes import (
     Bounds,
     CertifiedBoxes,
     Group,
+    Groups,
     Progress,
     bounded,
     checked_box,
@@ -41,6 +42,7 @@ from rps_pin.rps.kernels.tilt_functions import tilt_functions
 from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import level_pose, parameters_of
 from rps_pin.rps.workspace.evaluate import side_of_singularity
+from rps_pin.rps.workspace.reasons import Reason
 from rps_pin.validation import real_vector
 
 if TYPE_CHECKING:
@@ -109,17 +111,19 @@ class Margins:
         self._side = math.copysign(1.0, side_of_singularity(parameters, start))
         endless = math.isinf(parameters.leg_length_limits[1])
         lower, upper = parameters.leg_angle_limits
+        short, long = _of_legs(Reason.LEG_1_SHORT), _of_legs(Reason.LEG_1_LONG)
+        angles, cones = _of_legs(Reason.LEG_1_ANGLE), _of_legs(Reason.LEG_1_SPHERICAL)
         asked = {
-            self._lengths: 3 if endless else 6,
-            self._angles: 3 if upper - lower < 2 * math.pi else 0,
-            self._cones: 3 if parameters.spherical_cone_limit < math.pi else 0,
-            self._determinant: 1,
+            self._lengths: short if endless else short + long,
+            self._angles: angles if upper - lower < 2 * math.pi else [],
+            self._cones: cones if parameters.spherical_cone_limit < math.pi else [],
+            self._determinant: [Reason.SINGULAR],
         }
         #: For `rps_pin.numerics.boxes.prove`.
-        self.groups: dict[str, tuple[int, Group]] = {
-            margins.__name__: (count, self._group(margins))
-            for margins, count in asked.items()
-            if count
+        self.groups: Groups = {
+            margins.__name__: ([one.text for one in reasons], self._group(margins))
+            for margins, reasons in asked.items()
+            if reasons
         }
 
     def _group(self, margins: Callable[[_Legs], list[Number]]) -> Group:
@@ -194,6 +198,11 @@ class _Legs:
             )
             for i in range(3)
         ]  # fmt: skip
+
+
+def _of_legs(leg_1: Reason) -> list[Reason]:
+    """Return a reason of leg 1, and those of legs 2 and 3, whose bits follow."""
+    return [Reason(leg_1 << leg) for leg in range(3)]
 
 
 def _at_legs(of_ring: ring.Ring) -> list[Number]:

@@ -17,6 +17,7 @@ from rps_pin.task.certification.exclusion import Exclusion
 from rps_pin.task.certification.growth import Growth, Start
 from rps_pin.task.certification.margins import Margins
 from rps_pin.task.certification.newton import sheets
+from rps_pin.task.certification.reasons import limit_words
 from rps_pin.task.paths.limits import Cone
 from rps_pin.task.start import started
 from rps_pin.task.task import Task
@@ -56,7 +57,8 @@ def certify_general(
         raise InputError(f"the start, {x.tolist()}, is not in the round parts of the box")
     z = equations.closed(equations.state(q)[None], x[None])
     first = sheets(equations, z, x[None], np.zeros((1, task.size)))
-    margins = Margins(equations, first, Cones(equations, cones) if cones else None)
+    words = limit_words(task, cones)
+    margins = Margins(equations, first, words, Cones(equations, cones) if cones else None)
     if not first.proven[0] or margins.side == 0.0:
         raise SingularityError(
             "the start is singular, so that it decides no assembly mode", np.inf, 1e9
@@ -67,7 +69,7 @@ def certify_general(
         Start(x, z[0]),
         lower,
         upper,
-        excluded=Exclusion(equations, z[0], free).excluded,
+        exclusion=Exclusion(equations, z[0], free),
         undecided=undecided,
         most_boxes=most_boxes,
         progress=progress,

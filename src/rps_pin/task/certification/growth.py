@@ -8,16 +8,18 @@ proven but not whether these are inside.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rps_pin.arrays import Array, Bools, Indices
+from rps_pin.numerics.bits import Flags, distinct
 from rps_pin.numerics.boxes import Ball, CertifiedBoxes, Places, Progress, ends_of, met
 from rps_pin.numerics.intervals import Interval
 from rps_pin.task.certification.equations import Equations
+from rps_pin.task.certification.exclusion import Exclusion
 from rps_pin.task.certification.margins import Margins
 from rps_pin.task.certification.newton import LEAST, Sheets, sheets
 
@@ -31,8 +33,6 @@ _ROUNDED = 1e-10
 #: a and b of 0.3 at most: |1 + b^| / (1 - a b) + |a + b + b x a| |b| / (1 - a b)^2 < 1.5, times
 #: sqrt(3) for largest entries).
 _LONGER, _SMALL_TURN = 3.0, 0.3
-
-Excluded = Callable[[Array, Array], Bools]
 
 
 class Start(NamedTuple):
@@ -92,7 +92,7 @@ class Growth:
         lower: Array,
         upper: Array,
         *,
-        excluded: Excluded,
+        exclusion: Exclusion,
         undecided: float,
         most_boxes: int,
         progress: Progress = iter,
@@ -100,7 +100,9 @@ class Growth:
     ) -> None:
         self._balls = balls
         self._equations, self._margins, self._start = equations, margins, start
-        self._lower, self._upper, self._excluded = lower, upper, excluded
+        self._lower, self._upper, self._exclusion = lower, upper, exclusion
+        #: The bits of the exclusion's reasons follow those of the margins.
+        self._reasons = distinct([*margins.reasons, *exclusion.reasons])
         self._undecided, self._most, self._progress = undecided, most_boxes, progress
         self._free = np.flatnonzero(upper > lower)
         self._bits = min(30, 62 // max(len(self._free), 1))
@@ -108,6 +110,7 @@ class Growth:
         self._length = equations.task.mechanism.characteristic_length
         self._inside: list[Places] = []
         self._outside: list[Places] = []
+        self._why: list[Flags] = []
 
     def run(self) -> CertifiedBoxes:
         """Return the boxes."""
@@ -126,7 +129,11 @@ class Growth:
             inside, outside = (
                 np.concatenate([none, *one]) for one in (self._inside, self._outside)
             )
-            found = CertifiedBoxes(self._lower, self._upper, (inside, outside, places), parts)
+            why = np.concatenate([np.zeros(0, dtype=np.uint64), *self._why])
+            found = CertifiedBoxes(
+                *(self._lower, self._upper, (inside, outside, places), parts),
+                *(self._reasons, why),
+            )
             small = found.share_undecided <= self._undecided
             deep = len(self._levels) > self._bits
             if not len(places) or small or deep or len(places) > self._most:
@@ -151,9 +158,11 @@ class Growth:
             self._within(work, above)
         self._flood(work)
         self._exclude(work)
-        for one, into in ((work.inside, self._inside), (work.outside, self._outside)):
+        outside = work.why != 0
+        for one, into in ((work.inside, self._inside), (outside, self._outside)):
             into.append(places[one])
-        rest = np.flatnonzero(~(work.inside | work.outside))
+        self._why.append(work.why[outside])
+        rest = np.flatnonzero(~(work.inside | outside))
         parts = work.shares[rest]
         kept, sources = [], np.full(len(rest), -1, dtype=np.intp)
         count = 0
@@ -296,7 +305,7 @@ class Growth:
         joined_, one = at[there[ok]], found.taken(ok)
         if ok.size:
             judged = self._margins.judged(one)
-            work.inside[joined_], work.outside[joined_] = judged.inside, judged.outside
+            work.inside[joined_], work.why[joined_] = judged.inside, judged.why
             work.shares[joined_] = judged.shares
             work.joined[joined_] = True
             work.found.append(one)
@@ -350,7 +359,8 @@ class Growth:
             work.guess[block[good]] = z[good]
             # A leg that closes, or nearly, at the middle closes somewhere in the box.
             block = block[~(gap < _NEAR * work.half[block].max(axis=-1) / self._length)]
-            work.outside[block] = self._excluded(work.x[block], work.half[block])
+            legs = self._exclusion.excluded(work.x[block], work.half[block])
+            work.why[block] = legs << np.uint64(len(self._margins.reasons))
 
 
 @dataclass
@@ -364,7 +374,8 @@ class _Work:
     guess: Array
     """States in floats, closed at the middles or near."""
     inside: Bools = field(init=False)
-    outside: Bools = field(init=False)
+    why: Flags = field(init=False)
+    """Reasons of boxes outside, 0 of others."""
     joined: Bools = field(init=False)
     closed: Bools = field(init=False)
     """Whether a configuration was found in floats, at the middle."""
@@ -374,9 +385,8 @@ class _Work:
 
     def __post_init__(self) -> None:
         n = len(self.places)
-        self.inside, self.outside, self.joined, self.closed = (
-            np.zeros(n, dtype=bool) for _ in range(4)
-        )
+        self.inside, self.joined, self.closed = (np.zeros(n, dtype=bool) for _ in range(3))
+        self.why = np.zeros(n, dtype=np.uint64)
         self.shares = np.zeros((n, 2))
 
 

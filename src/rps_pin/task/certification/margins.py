@@ -14,10 +14,13 @@ import numpy as np
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import MechanismError
+from rps_pin.numerics.bits import Flags, bit_of, distinct
 from rps_pin.numerics.intervals import share_beyond
 from rps_pin.task.certification.cones import Cones, Rooms
 from rps_pin.task.certification.equations import Equations, inverses
 from rps_pin.task.certification.newton import Sheets
+from rps_pin.task.certification.reasons import LimitWords
+from rps_pin.task.workspace.reasons import SINGULAR
 
 #: Rooms within this of zero are proven to be neither, rad or characteristic lengths.
 _ROUNDED, _SLACK = 1e-12, 1e-9
@@ -29,7 +32,8 @@ class Judged(NamedTuple):
     """What is proven of boxes, shape (n,) each."""
 
     inside: Bools
-    outside: Bools
+    why: Flags
+    """Bits of the reasons of boxes that are outside; 0 of others."""
     shares: Array
     """Parts of the others that are inside and outside, at least, shape (n, 2)."""
 
@@ -44,18 +48,29 @@ class _Limited(NamedTuple):
     lower: float
     upper: float
     unit: float
+    names: tuple[str, str]
+    """The reasons below and above; empty where there is no limit."""
 
 
 class Margins:
     """Limits of joints and the side of the type II singularities."""
 
     def __init__(
-        self, equations: Equations, side: Sheets | None = None, cones: Cones | None = None
+        self,
+        equations: Equations,
+        side: Sheets,
+        words: LimitWords,
+        cones: Cones | None = None,
     ) -> None:
         self._cones = cones
         task, self._equations = equations.task, equations
         mechanism = task.mechanism
-        self._limited = _limits(equations)
+        self._limited = _limits(equations, words)
+        names = [name for one in self._limited for name in one.names if name]
+        #: Names of the reasons, in the order of their bits.
+        self.reasons = distinct([*names, *words.cones, SINGULAR])
+        self._bits = {name: bit_of(self.reasons, name) for name in self.reasons}
+        self._of_cones = [self._bits[name] for name in words.cones]
         scale = np.where(task.angular, 1.0, mechanism.characteristic_length)
         self._x_scale = scale
         self._actuators = [_where(equations, int(k)) for k in task.of_actuators]
@@ -65,7 +80,7 @@ class Margins:
                 "point is singular"
             )
         self._square = len(self._actuators) == task.size
-        self._side = 0.0 if side is None else float(self.signs(side)[0])
+        self._side = float(self.signs(side)[0])
 
     @property
     def side(self) -> float:
@@ -75,23 +90,21 @@ class Margins:
     def judged(self, one: Sheets) -> Judged:
         """Return what is proven of boxes over which configurations are proven."""
         n = len(one.x)
-        inside, outside = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
+        inside, why = np.ones(n, dtype=bool), np.zeros(n, dtype=np.uint64)
         shares = np.stack([np.ones(n), np.zeros(n)], axis=-1)
         for limited in self._limited:
-            self._keep(limited, one, inside, outside, shares)
+            self._keep(limited, one, inside, why, shares)
         if self._cones is not None:
-            self._keep_cones(self._cones.rooms(one), one, inside, outside, shares)
+            self._keep_cones(self._cones.rooms(one), one, inside, why, shares)
         regular, sign = self._regular(one)
         right = regular & ((sign == self._side) if self._square else True)
         if self._square:
-            outside |= regular & (sign == -self._side)
+            why[regular & (sign == -self._side)] |= self._bits[SINGULAR]
         shares[~right, 0] = 0.0
         shares = np.where(np.isfinite(shares), np.clip(shares, 0.0, 1.0), 0.0)
-        return Judged(inside & right & ~outside, outside, shares)
+        return Judged(inside & right & (why == 0), why, shares)
 
-    def _keep(
-        self, joint: _Limited, one: Sheets, inside: Bools, outside: Bools, shares: Array
-    ) -> None:
+    def _keep(self, joint: _Limited, one: Sheets, inside: Bools, why: Flags, shares: Array) -> None:
         """Take the room that a joint has to its limits into account."""
         if joint.unknown is None:
             middle = one.x[:, joint.z] / joint.unit
@@ -110,8 +123,11 @@ class Margins:
         low, high = middle - reach_, middle + reach_
         inside &= (low > lower) & (high < upper)
         turn = 2 * np.pi if joint.turns else np.inf
-        outside |= (low > upper + _SLACK) & (high < lower + turn - _SLACK)
-        outside |= (high < lower - _SLACK) & (low > upper - turn + _SLACK)
+        above = (low > upper + _SLACK) & (high < lower + turn - _SLACK)
+        below = (high < lower - _SLACK) & (low > upper - turn + _SLACK)
+        for broken, name in zip((below, above), joint.names, strict=True):
+            if name:
+                why[broken] |= self._bits[name]
         once = (high < lower + turn - _SLACK) & (low > upper - turn + _SLACK)
         open_ = np.flatnonzero(~((low > lower) & (high < upper)))
         if not open_.size:
@@ -126,22 +142,21 @@ class Margins:
             a, z = reach[crossing].T, (within + _ROUNDED)[crossing]
             wide = a.max(axis=1, initial=0.0) > 0.0
             kept = share_beyond(a[wide], z - room[crossing])
-            broken = share_beyond(a[wide], z + _SLACK + room[crossing])
-            broken[~once[crossing]] = 0.0
+            out = share_beyond(a[wide], z + _SLACK + room[crossing])
+            out[~once[crossing]] = 0.0
             shares[crossing, 0] -= 1.0 - kept
-            shares[crossing, 1] = np.maximum(shares[crossing, 1], broken)
+            shares[crossing, 1] = np.maximum(shares[crossing, 1], out)
 
-    @staticmethod
     def _keep_cones(
-        rooms: Rooms, one: Sheets, inside: Bools, outside: Bools, shares: Array
+        self, rooms: Rooms, one: Sheets, inside: Bools, why: Flags, shares: Array
     ) -> None:
         """Take the room of cones into account."""
         reach = np.abs(rooms.slopes) * one.half[:, None]  # (n, cones, m)
         low = rooms.middle - reach.sum(axis=-1) - rooms.error - _ROUNDED
         high = rooms.middle + reach.sum(axis=-1) + rooms.error + _ROUNDED
         inside &= (low > 0).all(axis=-1)
-        outside |= (high < -_SLACK).any(axis=-1)
-        for k in range(low.shape[1]):
+        for k, bit in enumerate(self._of_cones):
+            why[high[:, k] < -_SLACK] |= bit
             open_ = np.flatnonzero(~(low[:, k] > 0))
             if not open_.size:
                 continue
@@ -204,7 +219,7 @@ def _where(equations: Equations, coordinate: int) -> tuple[int | None, int]:
     return None, equations.task.extension.idx_q.tolist().index(coordinate)
 
 
-def _limits(equations: Equations) -> list[_Limited]:
+def _limits(equations: Equations, words: LimitWords) -> list[_Limited]:
     """Return the joints that have limits; none of turns with more room than a whole turn."""
     task = equations.task
     limits = task.mechanism.system.limits
@@ -216,15 +231,17 @@ def _limits(equations: Equations) -> list[_Limited]:
     for q, lower, upper in zip(limits.q.tolist(), limits.lower, limits.upper, strict=True):
         if not (np.isfinite(lower) or np.isfinite(upper)):
             continue
+        names = words.of(q, "lower"), words.of(q, "upper")
         if q in of_task:
-            found.append(_Limited(of_task[q], None, False, lower, upper, 1.0))
+            found.append(_Limited(of_task[q], None, False, lower, upper, 1.0, names))
             continue
         one = kinds.get(q)
         if one is None:
             name = limits.names[limits.q.tolist().index(q)]
             raise MechanismError(f"joint {name!r} has limits that boxes cannot be certified with")
-        turns = one.kind == "turn" and bool(np.isfinite(lower) and np.isfinite(upper))
-        if turns and upper - lower >= 2 * np.pi:
+        turns = one.kind == "turn"
+        if turns and not upper - lower < 2 * np.pi:  # some whole turn keeps them
             continue
-        found.append(_Limited(q, one.y.start, turns, float(lower), float(upper), one.unit))
+        ends = float(lower), float(upper)
+        found.append(_Limited(q, one.y.start, turns, *ends, one.unit, names))
     return found

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rps_pin.arrays import Array
 from rps_pin.errors import SingularityError
-from rps_pin.numerics.boxes import Bounds, Group, bounded
+from rps_pin.numerics.boxes import Bounds, Groups, bounded
 from rps_pin.numerics.intervals import Enclosure, Interval
 from rps_pin.numerics.stumpff import enclosures
+from rps_pin.task.certification.leg_angles import AngleRoom, angle_rooms
 from rps_pin.task.certification.leg_cones import LegCones
+from rps_pin.task.certification.reasons import LimitWords, limit_words
 from rps_pin.task.certification.vectors import cross, dot, norm
 from rps_pin.task.paths.limits import Cone
 from rps_pin.task.point_legs import PointLegs
 from rps_pin.task.task import Task
+from rps_pin.task.workspace.reasons import SINGULAR
 
 Number = Any
 
@@ -32,11 +34,11 @@ class LegMargins:
 
     def __init__(self, task: Task, legs: PointLegs, start: Array, cones: Sequence[Cone]) -> None:
         self._cones = LegCones(task, legs, cones)
-        model, self._legs = task.mechanism.model, legs
-        at = task.of_actuators
-        limits = model.lowerPositionLimit[at], model.upperPositionLimit[at]
-        self._least, self._most = (np.asarray(one) + legs.offset for one in limits)
-        self._least = np.maximum(self._least, 0.0)
+        self._legs = legs
+        words = limit_words(task, cones)
+        self._of_cones = words.cones
+        self._lengths = _length_rooms(task, legs, words)
+        self._angles = _angle_rooms(task, legs, words)
         self._unit = 1.0 / task.characteristic_length
         rows = _rows(legs, _points(start[:, None]), self._unit)
         self._side = float(_signs(_middle(rows))[0])
@@ -44,13 +46,15 @@ class LegMargins:
             raise SingularityError("the start pose is singular", np.inf, 1 / _SIGNED)
 
     @property
-    def groups(self) -> dict[str, tuple[int, Group]]:
+    def groups(self) -> Groups:
         """For `rps_pin.numerics.boxes.prove`, the cheapest first."""
-        found: dict[str, tuple[int, Group]] = {
-            "lengths": (12, self.lengths),
-            "angles": (6 + int(np.isfinite(self._legs.angles).sum()), self.angles),
-            "cones": (len(self._cones), self.cones),
-            "singularity": (1, self.regular),
+        angles = [name for rooms in self._angles for one in rooms for name in one.names]
+        found: Groups = {
+            "lengths": ([room.name for room in self._lengths], self.lengths),
+            "universal joints": ([SINGULAR] * len(self._angles), self.universal),
+            "angles": (angles, self.angles),
+            "cones": (self._of_cones, self.cones),
+            "singularity": ([SINGULAR], self.regular),
         }
         return {name: group for name, group in found.items() if group[0]}
 
@@ -59,37 +63,39 @@ class LegMargins:
 
         def margins(*pose: Number) -> list[Number]:
             found = [norm(along) for along, _ in _legs(self._legs, pose)]
-            above = [d - least for d, least in zip(found, self._least, strict=True)]
-            below = [most - d for d, most in zip(found, self._most, strict=True)]
-            return [room * self._unit - _ROUNDED for room in above + below]
+            rooms = [(found[one.leg] - one.limit) * one.sign for one in self._lengths]
+            return [room * self._unit - _ROUNDED for room in rooms]
+
+        return bounded(margins, box, _SLACK)
+
+    def universal(self, box: Interval) -> list[Bounds]:
+        """Return bounds of cos(t)^2 of the universal joints' second angles t."""
+
+        def margins(*pose: Number) -> list[Number]:
+            return [y * y + z * z - _ROUNDED for _, y, z in self._directions(pose)]
 
         return bounded(margins, box, _SLACK)
 
     def angles(self, box: Interval) -> list[Bounds]:
-        """Return bounds of what the universal joints' angles s and t have to their limits.
-
-        sin(t - least) and the like are linear in u: with cos(t) > 0, of which 1 - sin(t)^2 > 0 is
-        proven, cos(t) sin(s - least) is positive if s is beyond the least.
-        """
+        """Return bounds of what the universal joints' angles have to their limits."""
 
         def margins(*pose: Number) -> list[Number]:
             found = []
-            legs = zip(_legs(self._legs, pose), self._legs.axes, self._legs.angles, strict=True)
-            for (along, _), axes, ((s_least, s_most), (t_least, t_most)) in legs:
-                length = norm(along)
-                x, y, z = (dot(along, axis) / length for axis in axes)
-                found.append(y * y + z * z)
-                if np.isfinite(s_least):
-                    found.append(-y * math.cos(s_least) - z * math.sin(s_least))
-                if np.isfinite(s_most):
-                    found.append(z * math.sin(s_most) + y * math.cos(s_most))
-                if np.isfinite(t_least):
-                    found.append(x - math.sin(max(t_least, -math.pi / 2)))
-                if np.isfinite(t_most):
-                    found.append(math.sin(min(t_most, math.pi / 2)) - x)
+            for (x, y, z), rooms in zip(self._directions(pose), self._angles, strict=True):
+                across = None if all(one.simple for one in rooms) else (y * y + z * z).sqrt()
+                found += [number for one in rooms for number in one.numbers(x, y, z, across)]
             return [one - _ROUNDED for one in found]
 
-        return bounded(margins, box, _SLACK)
+        numbers = iter(bounded(margins, box, _SLACK))
+        return [room for rooms in self._angles for one in rooms for room in one.bounds(numbers)]
+
+    def _directions(self, pose: tuple[Number, ...]) -> list[list[Number]]:
+        """Return each leg's direction in the axes of its universal joint."""
+        found = []
+        for (along, _), axes in zip(_legs(self._legs, pose), self._legs.axes, strict=True):
+            length = norm(along)
+            found.append([dot(along, axis) / length for axis in axes])
+        return found
 
     def cones(self, box: Interval) -> list[Bounds]:
         """Return bounds of the room of cones, of cosines."""
@@ -131,6 +137,40 @@ class LegMargins:
         none = np.zeros(whole.shape)
         right, wrong = signs == self._side, signs == -self._side
         return [Bounds(whole & right, whole & wrong, none, none)]
+
+
+class _LengthRoom(NamedTuple):
+    """The room of a leg's length to a limit: sign (length - limit)."""
+
+    leg: int
+    limit: float
+    sign: float
+    name: str
+
+
+def _length_rooms(task: Task, legs: PointLegs, words: LimitWords) -> list[_LengthRoom]:
+    """Return the limits of the lengths, m; each is above zero, too, or the leg has no direction."""
+    model, found = task.mechanism.model, []
+    for k, (q, offset) in enumerate(zip(task.of_actuators, legs.offset, strict=True)):
+        least = float(model.lowerPositionLimit[q] + offset)
+        most = float(model.upperPositionLimit[q] + offset)
+        name = words.of(int(q), "lower") if least > 0.0 else SINGULAR
+        found.append(_LengthRoom(k, max(least, 0.0), 1.0, name))
+        if np.isfinite(most):
+            found.append(_LengthRoom(k, most, -1.0, words.of(int(q), "upper")))
+    return found
+
+
+def _angle_rooms(task: Task, legs: PointLegs, words: LimitWords) -> list[list[AngleRoom]]:
+    """Return the rooms of the angles of each leg's universal joint."""
+    model, found = task.mechanism.model, []
+    for limits, links in zip(legs.angles, legs.links, strict=True):
+        first, second, _ = sorted(links)
+        at = [int(model.joints[joint].idx_q) for joint in (first, second)]
+        found.append(
+            angle_rooms(limits, [(words.of(k, "lower"), words.of(k, "upper")) for k in at])
+        )
+    return found
 
 
 def _turn(pose: tuple[Number, ...]) -> Callable[[Any], list[Number]]:

@@ -101,7 +101,8 @@ class JointRooms:
                         signal = Signal("position", 0, side, limit, unit, which)
                         found.append((iq, iv, 1.0 if side == "lower" else -1.0, signal))
         self.signals = tuple(signal for *_, signal in found)
-        self._q = np.array([iq for iq, *_ in found], dtype=np.intp)
+        #: Which coordinates of q have the limits, shape (limits,).
+        self.q = np.array([iq for iq, *_ in found], dtype=np.intp)
         self._v = np.array([iv for _, iv, *_ in found], dtype=np.intp)
         self._sign = np.array([sign for _, _, sign, _ in found])
         self._limit = np.array([signal.limit for signal in self.signals])
@@ -110,7 +111,7 @@ class JointRooms:
 
     def rooms(self, q: Array, v: Array, pose: Array, rate: Array) -> tuple[Array, Array]:
         """Return the room to each limit and its rate; see `PositionLimits`."""
-        room = self._sign * (q[:, self._q] - self._limit) + self._slack
+        room = self._sign * (q[:, self.q] - self._limit) + self._slack
         return room, self._sign * v[:, self._v]
 
 

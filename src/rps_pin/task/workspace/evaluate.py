@@ -9,6 +9,7 @@ import numpy as np
 
 from rps_pin.arrays import Array, Bools
 from rps_pin.errors import InputError, MechanismError
+from rps_pin.numerics.bits import Flags, bit_of
 from rps_pin.numerics.linear_algebra import many_singular_values
 from rps_pin.task.paths.limits import Cone, ConeRooms
 from rps_pin.task.sizing.demands import Demands
@@ -17,8 +18,6 @@ from rps_pin.task.workspace.reasons import (
     INTERFERENCE,
     SINGULAR,
     UNREACHABLE,
-    Flags,
-    bit_of,
     reason_names,
 )
 

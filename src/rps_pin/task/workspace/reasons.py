@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rps_pin.errors import InputError, shown
+from rps_pin.errors import InputError
+from rps_pin.numerics.bits import MOST_NAMES
 from rps_pin.task.paths.findings import Signal
-
-Flags = NDArray[np.uint64]
 
 #: Names of the reasons that are no limits.
 SINGULAR = "singular"
 UNREACHABLE = "beyond the end of the assembly mode"
 INTERFERENCE = "interference of links"
-#: Reasons that a number of 64 bits holds.
-MOST_REASONS = 64
+
+
+def limit_names(limits: Sequence[Signal]) -> list[str]:
+    """Return limits in words, each once: the second of two cones of one name is ``"... (2)"``."""
+    names: list[str] = []
+    for limit in limits:
+        name, number = limit_in_words(limit), 2
+        while name in names:  # two cones of one name
+            name, number = f"{limit_in_words(limit)} ({number})", number + 1
+        names.append(name)
+    return names
 
 
 def reason_names(limits: Sequence[Signal], *, interference: bool) -> tuple[str, ...]:
@@ -28,17 +33,12 @@ def reason_names(limits: Sequence[Signal], *, interference: bool) -> tuple[str, 
     InputError
         If there are more limits than bits.
     """
-    names: list[str] = []
-    for limit in limits:
-        name, number = limit_in_words(limit), 2
-        while name in names:  # two cones of one name
-            name, number = f"{limit_in_words(limit)} ({number})", number + 1
-        names.append(name)
+    names = limit_names(limits)
     names += [SINGULAR, UNREACHABLE, *([INTERFERENCE] if interference else [])]
-    if len(names) > MOST_REASONS:
+    if len(names) > MOST_NAMES:
         raise InputError(
             f"the mechanism has {len(limits)} limits; a workspace tells at most "
-            f"{MOST_REASONS - 3} apart: leave out limits that cannot be met (infinite in the URDF)"
+            f"{MOST_NAMES - 3} apart: leave out limits that cannot be met (infinite in the URDF)"
         )
     return tuple(names)
 
@@ -52,16 +52,3 @@ def limit_in_words(limit: Signal) -> str:
     what = "" if limit.name == "position" else f" {limit.name}"
     side = {"lower": "below", "upper": "above", "both": "beyond"}[limit.side]
     return f"{who}{what} {side} {limit.limit:.6g} {limit.unit}"
-
-
-def bit_of(names: Sequence[str], name: str) -> np.uint64:
-    """Return the bit of a reason.
-
-    Raises
-    ------
-    InputError
-        If there is no such reason.
-    """
-    if name not in names:
-        raise InputError(f"no reason {shown(name)}; there are: {', '.join(names)}")
-    return np.uint64(1) << np.uint64(list(names).index(name))

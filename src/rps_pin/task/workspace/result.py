@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rps_pin.arrays import Array, Bools
+from rps_pin.numerics.bits import Flags, holds
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.workspace.evaluate import TaskFields
 from rps_pin.task.workspace.grids import TaskGrid
-from rps_pin.task.workspace.reasons import Flags, bit_of
 
 #: The name under which points inside are counted.
 INSIDE = "inside"
@@ -127,7 +127,7 @@ class TaskWorkspace(Region):
         """
         if reason == INSIDE:
             return self.inside
-        return np.asarray((self.reason & bit_of(self.reasons, reason)) != 0)
+        return holds(self.reason, self.reasons, reason)
 
     def counts(self) -> dict[str, int]:
         """Return how many points are inside, and how many each single reason puts out.
