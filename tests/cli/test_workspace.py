@@ -5,15 +5,20 @@ from __future__ import annotations
 import csv
 import json
 import math
+from contextvars import copy_context
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
+from typer.testing import CliRunner
 
 from rps_pin import ClosedLoopModel
 from rps_pin.cli import task_workspace
-from rps_pin.task import Payload, certify
+from rps_pin.cli.app import app
+from rps_pin.cli.degrees import words_in_degrees
+from rps_pin.task import Cone, Payload, certify
+from rps_pin.task.design import RoundPart
 from rps_pin.task.workspace import load_workspace, volume, workspace
 from tests.cli.commands import rps_pin
 
@@ -37,8 +42,10 @@ def test_two_axes_make_a_file_and_a_map(tmp_path: Path) -> None:
     assert found.grid.over == ("x", "z")
     again = rps_pin(*FIVE_BAR, "-o", str(tmp_path))
     assert (again.returncode, "exist" in again.stderr) == (1, True)
-    text = rps_pin(*FIVE_BAR, "--overwrite", "-o", str(tmp_path)).stdout
+    cone = ("--cone", "universe,left_arm_joint=1.0:x:x")
+    text = rps_pin(*FIVE_BAR, *cone, "--overwrite", "-o", str(tmp_path)).stdout
     assert "of which inside" in text
+    assert "universe, left_arm_joint cone above 1 rad" in " ".join(text.replace("│", " ").split())
     assert "beyond the end of the assembly mode" in text
 
 
@@ -182,10 +189,63 @@ def test_certified_boxes_of_a_mechanism_and_of_a_3_rps(tmp_path: Path) -> None:
     assert "the whole box" in run.stdout
 
 
+def test_cones_and_discs_of_certified_boxes(tmp_path: Path) -> None:
+    """A tilt of at most 8 degrees in a disc of 10, which is the cone's own disc."""
+    tilts = ("--over", "rx=-10:10:2", "--over", "ry=-10:10:2", "--degrees", "--most-boxes", "100")
+    cut = ("--cone", "universe,platform=8:z:0,0,2", "--round", "rx,ry=10:0:0")
+    words = ("workspace", "-m", "stewart", "--certify", *tilts, "--json")
+    run = rps_pin(*words, *cut, "-o", str(tmp_path / "one"))
+    assert run.returncode == 0, run.stderr
+    told = json.loads(run.stdout)
+    task = ClosedLoopModel.load("urdf/stewart.yaml").task
+    low, high = task.home.copy(), task.home.copy()
+    low[3:5], high[3:5] = -math.radians(10), math.radians(10)
+    found = certify(
+        task,
+        low,
+        high,
+        cones=[Cone("universe", "platform", math.radians(8))],
+        round=[RoundPart(["rx", "ry"], [0, 0], math.radians(10))],
+        most_boxes=100,
+    )
+    assert told["out"] == {"universe, platform cone above 8 deg": 1.0}
+    for verdict in ("inside", "outside", "undecided"):
+        assert told["boxes"][verdict] == len(getattr(found, verdict))
+    size, _, undecided = found.volumes
+    assert size <= math.pi * math.radians(8) ** 2 <= size + undecided
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--cone", "universe,platform"), "must be FRAME,FRAME=ANGLE[:AXIS:AXIS]"),
+        (("--cone", "universe,platform=8:u:z"), "must be FRAME,FRAME=ANGLE[:AXIS:AXIS]"),
+        (("--cone", "universe,platform=8:z:0,1"), "must be FRAME,FRAME=ANGLE[:AXIS:AXIS]"),
+        (("--cone", "universe,rain=8"), "no frame 'rain'"),
+        (("--cone", "universe,platform=180"), "must be below pi"),
+        (("--round", "rx=8"), "must be NAME,NAME[,NAME]=RADIUS"),
+        (("--round", "rx,ry=8:0"), "must be NAME,NAME[,NAME]=RADIUS"),
+        (("--round", "rx,ry=-8"), "the radius must be positive"),
+        (("--round", "rx,rain=8"), "no coordinate 'rain'"),
+        (("--round", "rx,z=8"), "lengths and angles have no common radius"),
+        (("--round", "rx,ry=8:90:0"), "the centre (90, 0) deg of a round part is not in the box"),
+    ],
+)
+def test_cones_and_discs_that_are_none(words: tuple[str, str], told: str, tmp_path: Path) -> None:
+    """In this process: eleven starts of Python would be dear."""
+    tilts = ["--over", "rx=-10:10:2", "--over", "ry=-10:10:2", "--degrees", "-o", str(tmp_path)]
+    asked = ["workspace", "-m", "stewart", "--certify", *tilts, *words]
+    run = copy_context().run(CliRunner().invoke, app, asked)
+    assert run.exit_code != 0
+    assert told in words_in_degrees(f"{run.output} {run.exception}")
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
         (("--certify", "--points", "5"), "does not go with --certify"),
+        (("--certify", "--cone", "a,b=1"), "needs a --mechanism"),
+        (("-m", "five_bar", "--round", "x,z=1"), "needs --certify"),
         (("--certify", "-m", "five_bar", "--holding"), "does not go with --certify"),
         (("--certify", "--over", "z=0.2:0.3:2", "--over", "rx=0:0.1:2"), "--over of each"),
         (("--undecided", "0.1"), "needs --certify"),

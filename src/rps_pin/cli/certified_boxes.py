@@ -16,6 +16,7 @@ from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
 from rps_pin.cli.degrees import as_asked
 from rps_pin.cli.outputs import check_outputs
+from rps_pin.cli.region_options import cones_of, round_parts
 from rps_pin.cli.task_options import in_unit, unit_of
 from rps_pin.cli.task_workspace import grid_of
 from rps_pin.errors import InputError
@@ -52,6 +53,8 @@ def certify_boxes(
     overwrite: bool,
     as_json: bool,
     *,
+    cones: Sequence[str] = (),
+    round: Sequence[str] = (),
     undecided: float,
     most_boxes: int,
     ignore_limits: bool = False,
@@ -59,6 +62,7 @@ def certify_boxes(
 ) -> None:
     """Prove boxes, write and print them; see `rps_pin.cli.workspace`."""
     inputs = []
+    demands: dict[str, Any] = {"undecided": undecided, "most_boxes": most_boxes}
     prove: Any
     if mechanism is None:
         machine = common.load_robot(robot)
@@ -70,6 +74,7 @@ def certify_boxes(
             raise InputError(f"{file} is a 3-RPS, which has boxes of its own: --robot {file}")
         task, prove = model.task, certify
         name, of = model.name, task
+        demands["cones"] = cones_of(cones, degrees)
         inputs = [file]
     grid = grid_of(task, over, held, degrees)
     if mechanism is None and len(grid.over) < task.size:
@@ -78,12 +83,13 @@ def certify_boxes(
     lower, upper = grid.at.copy(), grid.at.copy()
     for column, axis in zip(grid.columns, grid.axes, strict=True):
         lower[column], upper[column] = axis[0], axis[-1]
+    demands["round"] = round_parts(round, task, lower, upper, degrees)
     file = output / "boxes.csv"
     check_outputs([file], overwrite, inputs=inputs)
     output.mkdir(parents=True, exist_ok=True)
     console = common.text_console(as_json)
     with console.status("proving boxes"):
-        found = prove(of, lower, upper, undecided=undecided, most_boxes=most_boxes)
+        found = prove(of, lower, upper, **demands)
         write_text(file, boxes_csv(found, task, degrees))
     summary = _summary(found, task, name or "mechanism", degrees)
     if as_json:

@@ -14,6 +14,7 @@ from rps_pin.arrays import Array
 from rps_pin.bounds import POINTS, check_size
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
+from rps_pin.cli.decimal_numbers import decimal
 from rps_pin.cli.degrees import as_asked
 from rps_pin.cli.outputs import check_outputs, figures_in
 from rps_pin.cli.printing import say
@@ -201,7 +202,7 @@ def grid_of(task: Task, over: Sequence[str], held: Sequence[str], degrees: bool)
         if name in axes:
             raise InputError(f"--over: {name} is given twice")
         try:
-            first, last, points = float(parts[0]), float(parts[1]), int(parts[2])
+            first, last, points = decimal(parts[0]), decimal(parts[1]), int(parts[2])
         except ValueError:
             raise InputError(f"--over {text}: it must be {_RANGE}, such as z=0.5:0.8:31") from None
         if not (math.isfinite(first) and math.isfinite(last) and first < last and points >= 2):

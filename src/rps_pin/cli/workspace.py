@@ -18,6 +18,7 @@ from rps_pin.cli.degrees import DegreesOption
 from rps_pin.cli.given_options import refuse
 from rps_pin.cli.mechanism_options import AccuracyOption, IgnoreLimitsOption
 from rps_pin.cli.outputs import OverwriteOption, check_outputs, figures_in
+from rps_pin.cli.region_options import ConeOption, RoundOption, cones_of
 from rps_pin.cli.task_options import MechanismOption, in_unit, unit_of, units
 from rps_pin.errors import InputError
 from rps_pin.paper import PaperComparison, paper_comparison
@@ -30,7 +31,7 @@ _DRAWN_POINTS = 18
 _OF_MECHANISMS = (
     *("over", "held", "min_conditioning", "holding", "ignore_limits", "accuracy"),
     *("payload", "payload_centre", "wrench", "force", "moment"),
-    *("speed", "turning_speed", "workers", "resume"),
+    *("speed", "turning_speed", "workers", "resume", "cone"),
 )
 _FIGURES = (
     "assembly_modes",
@@ -39,10 +40,9 @@ _FIGURES = (
     "workspace_surface",
     "workspace_outlines",
 )
-#: Options of a mechanism's workspace that say nothing of certified boxes.
-_NOT_CERTIFIED = tuple(
-    name for name in _OF_MECHANISMS if name not in ("over", "held", "ignore_limits", "accuracy")
-)
+#: Options of a mechanism's workspace that are of certified boxes, too.
+_CERTIFIED = ("over", "held", "ignore_limits", "accuracy", "cone")
+_NOT_CERTIFIED = tuple(name for name in _OF_MECHANISMS if name not in _CERTIFIED)
 
 
 def workspace_command(
@@ -66,9 +66,11 @@ def workspace_command(
     moment: of_tasks.MomentOption = None,
     speed: of_tasks.SpeedOption = None,
     turning_speed: of_tasks.TurningSpeedOption = None,
+    cone: ConeOption = None,
     certify: boxes.CertifyOption = False,
     undecided: boxes.UndecidedOption = 0.01,
     most_boxes: boxes.MostBoxesOption = 100_000,
+    round: RoundOption = None,
     ignore_limits: IgnoreLimitsOption = False,
     accuracy: AccuracyOption = None,
     output: common.FolderOption = Path("workspace"),
@@ -90,7 +92,7 @@ def workspace_command(
     the points where an actuator's force or speed would be beyond its limit are out.
 
     With **--certify**, which parts of the box that **--over** spans are proven to be inside, and
-    which outside, by intervals: **boxes.csv**. The numbers of points do not count.
+    which outside and why, by intervals: **boxes.csv**. The numbers of points do not count.
 
     Exit status: 0 done; 1 an error; 2 wrong usage.
 
@@ -103,13 +105,16 @@ def workspace_command(
     - `rps-pin workspace -m delta --over x=-0.5:0.5:41 --over z=-0.8:-0.2:41 --payload 2 --speed 3`
 
     - `rps-pin workspace -m five_bar --certify --over x=0.1:0.3:2 --over z=0.4:0.7:2 -o proven`
+
+    - `rps-pin workspace --certify --over z=0.21:0.23:2 --over rx=-0.2:0.2:2 --over ry=-0.2:0.2:2
+      --round rx,ry=0.2 -o tilts`
     """
     if mechanism is not None:
         refuse(context, "it does not go with a mechanism", "robot", "points")
     if certify:
         refuse(context, "it does not go with --certify", "points", *_NOT_CERTIFIED)
         if mechanism is None:
-            refuse(context, "this option needs a --mechanism", "ignore_limits", "accuracy")
+            refuse(context, "this option needs a --mechanism", "ignore_limits", "accuracy", "cone")
         boxes.certify_boxes(
             robot,
             mechanism,
@@ -119,13 +124,15 @@ def workspace_command(
             output,
             overwrite,
             as_json,
+            cones=cone or (),
+            round=round or (),
             undecided=undecided,
             most_boxes=most_boxes,
             ignore_limits=ignore_limits,
             accuracy=accuracy,
         )
         return
-    refuse(context, "this option needs --certify", "undecided", "most_boxes")
+    refuse(context, "this option needs --certify", "undecided", "most_boxes", "round")
     if mechanism is not None:
         load = motions.payload_of(payload, payload_centre, wrench)
         of_tasks.workspace_of_task(
@@ -146,6 +153,7 @@ def workspace_command(
             moment=moment,
             speed=speed,
             turning_speed=turning_speed,
+            cones=cones_of(cone or (), degrees),
             workers=workers,
             resume=resume,
         )

@@ -20,14 +20,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from rps_pin.arrays import Array
-from rps_pin.errors import InputError, MechanismError, shown
-from rps_pin.numerics.boxes import Ball, CertifiedBoxes, Progress, checked_box, prove
+from rps_pin.errors import MechanismError
+from rps_pin.numerics.boxes import CertifiedBoxes, Progress, checked_box, prove
 from rps_pin.other_kinds import refuses_other_kinds
 from rps_pin.task.certification.general import certify_general, refuse_turns
+from rps_pin.task.certification.round_parts import Box, balls_of
 from rps_pin.task.certification.six_legs import LegMargins
 from rps_pin.task.paths.limits import Cone
 from rps_pin.task.point_legs import point_legs
@@ -83,8 +82,8 @@ def certify(
         Limits of balls and universal joints, or of any two frames, that count beside the joints'
         limits, as those of `rps_pin.task.workspace.workspace`.
     round
-        Discs and balls of coordinates: points of the box outside of these do not count, so that
-        boxes that do not meet them are left out.
+        Discs and balls of coordinates, of lengths or of angles: points of the box outside of these
+        do not count, so that boxes that do not meet them are left out.
     free
         See above, rad and characteristic lengths. A Delta's platform could turn: boxes beyond its
         reach are excluded for turns of at most this.
@@ -99,11 +98,12 @@ def certify(
     ------
     MechanismError
         If the closures are redundant or leave idle freedoms, there are fewer actuators than
-        coordinates, or the task's reference frame is not the world. In closed form, if a cone is
-        of a body that is neither the base, the platform nor a link of a leg.
+        coordinates, the task's reference frame is not the world, or a cone's frame is unknown. In
+        closed form, if a cone is of a body that is neither the base, the platform nor a link of a
+        leg.
     InputError
-        If a cone's frame is unknown, the box is empty, has rotation vectors longer than 2 rad, or
-        the start is outside it.
+        If the box is empty or has rotation vectors longer than 2 rad, the start is outside it, a
+        round part is none of its coordinates, or there are more than 64 limits and cones.
     ClosureError, SingularityError
         If the start cannot be reached from home, or is singular.
     CompileError
@@ -112,7 +112,7 @@ def certify(
     ends = checked_box(lower, upper, task.size, held=True)
     options: dict[str, Any] = {
         "undecided": undecided, "most_boxes": most_boxes, "progress": progress,
-        "balls": _balls(task, *ends, round),
+        "balls": balls_of(Box(task.coordinates, task.angular, *ends), round),
     }  # fmt: skip
     try:
         legs = point_legs(task)
@@ -122,23 +122,3 @@ def certify(
     at_start = task.home if start is None else real_vector(start, 6, "start")
     margins = LegMargins(task, legs, at_start, cones)
     return prove(margins.groups, *ends, **options)
-
-
-def _balls(task: Task, lower: Array, upper: Array, parts: Sequence[RoundPart]) -> list[Ball]:
-    """Return round parts as balls of columns; their centres are in the box."""
-    from rps_pin.task.design.region import RoundPart  # noqa: PLC0415  (design needs this module)
-
-    if not isinstance(parts, Sequence) or not all(isinstance(one, RoundPart) for one in parts):
-        raise InputError(f"round = {shown(parts)}: it must be Sequence[RoundPart]")
-    found = []
-    for part in parts:
-        for name in part.coordinates:
-            if name not in task.coordinates:
-                raise InputError(
-                    f"no coordinate {name!r} of the task; there are: {', '.join(task.coordinates)}"
-                )
-        columns, centre = [*map(task.coordinates.index, part.coordinates)], np.array(part.centre)
-        if not ((centre >= lower[columns]) & (centre <= upper[columns])).all():
-            raise InputError(f"the centre {centre.tolist()} of a round part is not in the box")
-        found.append(Ball(columns, centre.astype(np.float64), float(part.radius)))
-    return found

@@ -9,8 +9,17 @@ import pytest
 
 from rps_pin import RPSParameters, RPSRobot
 from rps_pin.errors import InputError, SingularityError
-from rps_pin.rps.workspace import CertifiedBoxes, Reason, certify, leg_grid, volume, workspace
+from rps_pin.rps.workspace import (
+    CertifiedBoxes,
+    Reason,
+    certify,
+    free_tilt,
+    leg_grid,
+    volume,
+    workspace,
+)
 from rps_pin.rps.workspace.evaluate import evaluate, side_of_singularity
+from rps_pin.task.design import RoundPart
 
 MICRO = RPSRobot.from_preset("micro").parameters
 #: Its workspace fits into this box.
@@ -141,6 +150,34 @@ def test_a_singularity_inside_is_not_certified() -> None:
     assert not inside(free, np.array([[0.0, 0.0, 0.0]])).any()
     holding = (boxes.inside[:, 0] <= 0.0).all(axis=1) & (boxes.inside[:, 1] >= 0.0).all(axis=1)
     assert not holding.any()
+
+
+def test_a_disc_of_tilts_is_inside_up_to_the_free_tilt() -> None:
+    """`free_tilt` follows rays; the corners of the disc's box are outside."""
+    free = float(free_tilt(MICRO, [0.218])[0])
+    for share, verdicts in ((0.99, {"inside"}), (1.01, {"partly", "undecided"})):
+        radius = share * free
+        box = (0.217999, -radius, -radius), (0.218001, radius, radius)
+        disc = RoundPart(["rx", "ry"], [0.0, 0.0], radius)
+        found = certify(MICRO, *box, round=[disc], undecided=0.0, most_boxes=2_000)
+        assert found.verdict in verdicts
+        assert certify(MICRO, *box, most_boxes=500).verdict == "partly"
+        pose, _ = drawn(found.inside, 20_000, 2)
+        assert inside(MICRO, pose[np.linalg.norm(pose[:, 1:], axis=1) <= radius]).all()
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["z", "rx"], "lengths and angles have no common radius"),
+        (["tilt_x", "ry"], "no coordinate 'tilt_x' of the task"),
+        (["rx", "rx"], "names a coordinate twice"),
+        (["rx", "ry"], r"the centre \(0.5, 0.5\) rad of a round part is not in the box, from"),
+    ],
+)
+def test_round_parts_that_are_none_of_the_tilts_are_refused(names: list[str], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        certify(MICRO, *BOX, round=[RoundPart(names, [0.5, 0.5], 0.1)])
 
 
 @pytest.mark.parametrize(

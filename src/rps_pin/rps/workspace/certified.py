@@ -14,7 +14,7 @@ are stored; the directions of the legs are exact.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,10 +43,12 @@ from rps_pin.rps.parameters import RPSParameters
 from rps_pin.rps.workspace.compute import level_pose, parameters_of
 from rps_pin.rps.workspace.evaluate import side_of_singularity
 from rps_pin.rps.workspace.reasons import Reason
+from rps_pin.task.certification.round_parts import Box, balls_of
 from rps_pin.validation import real_vector
 
 if TYPE_CHECKING:
     from rps_pin.rps.robot import RPSRobot
+    from rps_pin.task.design.region import RoundPart
 
 Number = Any
 
@@ -54,6 +56,7 @@ Number = Any
 _SLACK = 2 * LIMIT_TOLERANCE
 #: Largest tilt of a box along an axis, rad: the series of the tilt's functions end at 2 rad.
 LARGEST_TILT = 1.4
+_COORDINATES = ("z", "rx", "ry")
 #: cos and sin of the sixth of a turn and their like are rounded: a number that holds the exact one.
 _ROUNDED = Interval(1.0 - 2.0**-50, 1.0 + 2.0**-50)
 
@@ -65,6 +68,7 @@ def certify(
     upper: ArrayLike,
     *,
     start: ArrayLike | None = None,
+    round: Sequence[RoundPart] = (),
     undecided: float = 0.01,
     most_boxes: int = 2_000_000,
     progress: Progress = iter,
@@ -80,6 +84,10 @@ def certify(
     start
         Pose (3,) whose side of the singularities counts; by default level, with the legs at
         mid-stroke, or at the middle of the box's heights if the stroke has no end.
+    round
+        A disc of the tilts, ``[RoundPart(["rx", "ry"], [0, 0], 0.2)]``: tilts up to 0.2 rad about
+        any level axis. Points of the box outside of it do not count, so that boxes that do not meet
+        it are left out.
     undecided
         Undecided share of the volume inside at which the cutting ends.
     most_boxes
@@ -90,7 +98,8 @@ def certify(
     Raises
     ------
     InputError
-        If the box is empty, or its tilts are larger than 1.4 rad along an axis.
+        If the box is empty, its tilts are larger than 1.4 rad along an axis, or a round part is not
+        of the tilts.
     SingularityError
         If the start is singular.
     """
@@ -98,9 +107,9 @@ def certify(
     ends = checked_box(lower, upper, 3)
     _refuse_tilts(*ends)
     margins = Margins(parameters, _checked_start(parameters, ends, start))
-    return prove(
-        margins.groups, *ends, undecided=undecided, most_boxes=most_boxes, progress=progress
-    )
+    balls = balls_of(Box(_COORDINATES, (False, True, True), *ends), round)
+    options: dict[str, Any] = {"undecided": undecided, "most_boxes": most_boxes, "balls": balls}
+    return prove(margins.groups, *ends, progress=progress, **options)
 
 
 class Margins:
