@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import warnings
 from functools import cache
@@ -16,6 +17,7 @@ from rps_pin import ClosedLoopModel, InputError, MechanismError, RPSRobot, Task,
 from rps_pin.arrays import Array
 from rps_pin.codegen.build import tcc
 from rps_pin.errors import AccuracyWarning
+from rps_pin.plots import plot_tolerance_shares
 from rps_pin.task.tolerances import (
     ToleranceAnalysis,
     load_tolerances,
@@ -495,3 +497,19 @@ def test_poses_beyond_limits_are_named() -> None:
     found = tolerance(task, {"offset:*": "0.01 mm"}, [task.home, lower])
     assert found.doubts == ("1 of 2 poses are beyond joints' limits of position",)
     assert not tolerance(task, {"offset:*": "0.01 mm"}).doubts
+
+
+def test_labels_of_shares_are_inside_and_no_line_crosses_them() -> None:
+    """Of a number that makes the whole error, and of one that makes most of it."""
+    task = ClosedLoopModel.load("urdf/five_bar.yaml").task
+    for drawing in ({"offset:left_joint": 1e-4}, {"offset:left_joint": 1e-4, "offset:r*": 7e-5}):
+        figure = plot_tolerance_shares(tolerance(task, drawing))
+        figure.canvas.draw()
+        (axes,) = figure.axes
+        assert len(axes.texts) == len(drawing)
+        assert re.fullmatch(r"(100|\d\d) %", axes.texts[0].get_text())
+        for label in axes.texts:
+            patch = label.get_bbox_patch()
+            assert patch is not None
+            assert patch.get_facecolor() == (1, 1, 1, 1)
+            assert label.get_window_extent().x1 <= axes.get_window_extent().x1

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 _MOST = 12
 #: Largest over smallest error from which a map's colours are logarithmic.
 _WIDE = 5.0
+#: Of a label beside a bar: the line of all numbers does not cross it; and room to the right for it.
+_OVER_LINE = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
+_ROOM = 1.25
 _UNITS = {"position": "mm", "angle": "mrad"}
 
 
@@ -63,10 +66,15 @@ def plot_tolerance_shares(
     axes.axvline(whole, color="black", ls="--", lw=0.8)
     for place, bar, share in zip(places, bars, told, strict=True):
         axes.annotate(
-            f"{share:.2g} %", (bar, place), (3, 0), textcoords="offset points", va="center"
+            f"{share:.2g} %" if share < 99.5 else "100 %",
+            (bar, place),
+            (3, 0),
+            textcoords="offset points",
+            va="center",
+            bbox=_OVER_LINE,
         )
     label = f"{name}, 3 sigma ({_UNITS[name]})\ndashed: all together"
-    axes.set(xlim=(0, 1.08 * max(whole, *bars)), xlabel=label)
+    axes.set(xlim=(0, _ROOM * max(whole, *bars)), xlabel=label)
     axes.set_yticks(places, labels)
     axes.set_ylabel("number")
     axes.invert_yaxis()

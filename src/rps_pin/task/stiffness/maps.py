@@ -15,6 +15,7 @@ from rps_pin.closed_loop.dynamics.wrenches import Wrenches
 from rps_pin.codegen.engine.batches import Errors
 from rps_pin.errors import ClosureError, InputError, SingularityError, UnreachableError
 from rps_pin.files import write_rows
+from rps_pin.plain_text import short
 from rps_pin.task.stiffness.model import StiffnessModel
 from rps_pin.validation import choice, numbers, refuse_not_finite, whole_number
 
@@ -91,8 +92,10 @@ class StiffnessMap:
             ):
                 at = self.x[some][np.argmin(values)]
                 told = ", ".join(
-                    f"{coordinate} = {float(value):.6g}"
-                    for coordinate, value in zip(self.coordinates, at, strict=True)
+                    f"{coordinate} = {short(float(value))} {'rad' if turns else 'm'}"
+                    for coordinate, value, turns in zip(
+                        self.coordinates, at, self.angular, strict=True
+                    )
                 )
                 lines.append(
                     f"{name}: {values.min():.4g} to {values.max():.4g} {unit}, the least at {told}"

@@ -13,6 +13,7 @@ import math
 import os
 from collections.abc import Mapping
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from rps_pin.arrays import Array
@@ -26,6 +27,8 @@ from rps_pin.validation import positive_number, real_array
 #: Units of readings and of deviations, and factors from SI: of lengths, and of angles.
 _READ = ("mm", 1e3), ("deg", math.degrees(1.0))
 _DEVIATION = ("um", 1e6), ("urad", 1e6)
+#: Digits after the point of planned positions: beyond, there is rounding.
+_DIGITS = 9
 
 
 def write_plan(
@@ -81,5 +84,5 @@ def _planned(model: CalibrationModel, x: Array) -> dict[str, Array]:
     found = {}
     for name, values in zip(names, q.T, strict=True):
         unit, factor = _READ[kinds[name]]
-        found[f"{PLANNED}{name}_{unit}"] = factor * values
+        found[f"{PLANNED}{name}_{unit}"] = np.round(factor * values, _DIGITS) + 0.0  # no -0
     return found
