@@ -50,7 +50,7 @@ OTHERS = (
     f".x.rps_pin-{interruption._place()}-{os.getpid()}-01234567.csv",
 )
 #: Time for processes to end, s.
-PATIENCE = 15.0
+PATIENCE = 60.0
 _PAUSE = 0.002
 
 _CIRCLE = "kind: circle\nheight: 0.223\ntilt: 0.05\nduration: 0.2\n"

@@ -6,6 +6,7 @@ that: without `start`, a test's Ctrl-C would be lost on it there.
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
@@ -67,3 +68,23 @@ def wait_for_end(processes: Sequence[int], timeout: float = 60.0) -> None:
     while living := [one for one in processes if lives(one)]:
         assert time.monotonic() < end, f"still alive: {living}"
         time.sleep(0.05)
+
+
+def wait_for_work(process: int, seconds: float, timeout: float = 240.0) -> None:
+    """Wait until a process has used so much more time of a processor.
+
+    On a loaded machine a process may do next to nothing in a second that passes.
+    """
+    wanted, end = _used(process) + seconds, time.monotonic() + timeout
+    while lives(process) and _used(process) < wanted:
+        assert time.monotonic() < end, f"process {process} does not work"
+        time.sleep(0.02)
+
+
+def _used(process: int) -> float:
+    """Return the processor's time of a process, s; infinite if it has ended."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return math.inf
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -26,7 +26,7 @@ from PIL import Image
 from rps_pin import ClosedLoopModel, RPSRobot
 from rps_pin.control import ComputedTorque, Gains
 from rps_pin.trajectories import PathSample, circle
-from tests.processes import start
+from tests.processes import start, wait_for_work
 from tests.worst import worst
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -157,7 +157,7 @@ def test_ctrl_c_ends_the_loop_and_its_view_and_leaves_the_log(example, tmp_path)
     url = process.stdout.readline().split()[-1]
     with urllib.request.urlopen(url, timeout=PATIENCE) as page:
         assert page.status == 200
-    time.sleep(1.0)
+    wait_for_work(process.pid, 0.5)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all of them
     printed, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, printed
@@ -185,7 +185,7 @@ def test_lost_packets_are_bridged_and_ctrl_c_ends_the_controller_and_its_drive(e
     process = example.start("drive_over_socket.py", *options)
     assert "the drive is at" in process.stdout.readline()
     assert len(example.alive()) == 2
-    time.sleep(1.0)
+    wait_for_work(process.pid, 0.5)
     os.killpg(process.pid, signal.SIGINT)
     printed, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, printed

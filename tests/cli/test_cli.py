@@ -218,11 +218,11 @@ def test_view_serves_this_machine_until_ctrl_c(arguments: list[str], in_page: st
         line = process.stdout.readline()
         address = line.split()[1]
         assert line.startswith("Open http://127.0.0.1:")
-        with urllib.request.urlopen(address, timeout=60) as page:
+        with urllib.request.urlopen(address, timeout=240) as page:
             assert in_page in page.read().decode().lower()
         time.sleep(0.3)
         process.send_signal(number)
-        output, errors = process.communicate(timeout=60)
+        output, errors = process.communicate(timeout=240)
     finally:
         process.kill()
     assert process.returncode == 0
@@ -257,7 +257,7 @@ def test_a_command_that_a_signal_ends_leaves_no_half_result(
     assert process.stdout.readline() == "under way\n"
     assert len(list(tmp_path.iterdir())) == 1
     process.send_signal(number)
-    _, errors = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=240)
     assert process.returncode == status
     assert "Traceback" not in errors
     assert list(tmp_path.iterdir()) == []

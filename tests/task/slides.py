@@ -26,4 +26,4 @@ def slide(axis: str = "1 0 0", damping: float = 0.0) -> Task:
         closures=[],
         actuated=["slide"],
     )
-    return Task(mechanism, joints=["slide"]).compile()
+    return Task(mechanism, joints=["slide"]).compile(compiler="tcc")

@@ -171,7 +171,10 @@ def test_friction_and_a_wrench_are_overcome() -> None:
     rough = ClosedLoopModel(
         plain.model, plain.closures, plain.actuated, home=plain.home, effects=effects
     )
-    task, wrench = Task(rough, "left_tip", ["x", "z"]).compile(), [3.0, 0.0, -6.0, 0.0, 0.0, 0.0]
+    task, wrench = (
+        Task(rough, "left_tip", ["x", "z"]).compile(compiler="tcc"),
+        [3.0, 0.0, -6.0, 0.0, 0.0, 0.0],
+    )
     line = LineCurve(task.home, task.home + np.array([0.02, 0.01]))
     limits = MotionLimits(jerk=3e4)
     found = time_optimal(task, line, limits=limits, wrench=wrench, intervals=30)

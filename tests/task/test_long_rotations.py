@@ -37,7 +37,7 @@ def task(interpreted: Task, request: pytest.FixtureRequest) -> Task:
     if request.param == "Pinocchio":
         return interpreted
     pytest.importorskip("casadi")
-    return interpreted.compile()
+    return interpreted.compile(compiler="tcc")
 
 
 @pytest.mark.parametrize("angle", ANGLES)

@@ -25,15 +25,15 @@ def test_a_delta_does_not_change_its_elbow() -> None:
 
 
 def test_both_engines_agree_on_ways_beside_it() -> None:
+    """Some of the ways that generated code refuses, and some of those that it goes."""
     random = np.random.default_rng(21)
     slow, fast = task("delta"), compiled("delta")
     start = np.array(slow.mechanism.close(BESIDE, within_limits=False))
     goals = slow.at(start) + random.uniform(-0.06, 0.06, (60, 3))
-    one, other = (
-        each.configuration(goals, start, within_limits=False, errors="mask")
-        for each in (slow, fast)
-    )
-    refused = np.isnan(one[:, 0])
+    other = fast.configuration(goals, start, within_limits=False, errors="mask")
+    refused = np.isnan(other[:, 0])
     assert 5 < refused.sum() < 58
-    assert (np.isnan(other[:, 0]) == refused).all()
-    assert np.abs(one - other)[~refused].max() < 1e-8
+    some = np.concatenate([np.flatnonzero(refused)[:12], np.flatnonzero(~refused)[:8]])
+    one = slow.configuration(goals[some], start, within_limits=False, errors="mask")
+    assert (np.isnan(one[:, 0]) == refused[some]).all()
+    assert np.abs(one - other[some])[~refused[some]].max() < 1e-8

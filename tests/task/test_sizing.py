@@ -62,7 +62,7 @@ def damped(name: str) -> Task:
     again = ClosedLoopModel(
         mechanism.model, mechanism.closures, mechanism.actuated, home=mechanism.home, **options
     )
-    return again.task.compile()
+    return again.task.compile(compiler="tcc")
 
 
 # The sheet ----------------------------------------------------------------------------------------
@@ -119,7 +119,7 @@ def test_the_3_rps_s_sheet_and_causes_come_out_without_closed_forms(seed: int) -
     payload = Payload(2.0, [0.02, -0.01, 0.1], np.diag([0.02, 0.03, 0.04]))
     bare = RPSRobot(parameters)
     robot = bare.with_payload(payload)
-    one = Task(bare.mechanism, "platform", ["z", "rx", "ry"]).compile()
+    one = Task(bare.mechanism, "platform", ["z", "rx", "ry"]).compile(compiler="tcc")
     height = 1.2 * parameters.base_radius
     time = np.linspace(0, 1, 41)
     path = swinging([height, 0.05, 0.1], [0.1 * height, 0.3, -0.2], 4.0, 1.0)
@@ -151,7 +151,7 @@ def test_the_actuators_work_is_the_change_of_energy(name: str) -> None:
     one = task(name)
     if one.mechanism.effects is not None:
         one = one.mechanism.without_effects().task
-    one = one.compile()
+    one = one.compile(compiler="tcc")
     motion = run_motion(one, swing(one), 200.0)
     work = simpson(motion.power.sum(axis=-1), x=motion.time)
     q, v, _ = motion.state
@@ -226,7 +226,8 @@ def test_a_wrench_is_borne_as_the_task_says_and_counts_at_the_output_frame() -> 
     mechanism = ClosedLoopModel.load("urdf/stewart.yaml")
     offset = np.eye(4)
     offset[:3, 3] = [0.1, -0.2, 0.3]
-    one = Task(mechanism, "platform", ["x", "y", "z", "rx", "ry", "rz"], placement=offset).compile()
+    plain = Task(mechanism, "platform", ["x", "y", "z", "rx", "ry", "rz"], placement=offset)
+    one = plain.compile(compiler="tcc")
     motion = swing(one).sample(np.linspace(0, 1, 5))
     q = one.follow(motion.pose)
     wrench = np.random.default_rng(0).normal(size=(5, 6))

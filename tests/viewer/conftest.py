@@ -58,7 +58,7 @@ class Watched:
     requests: list[str] = field(default_factory=list)
     complaints: list[str] = field(default_factory=list)
 
-    def wait(self, expression: str, seconds: float = 60.0) -> None:
+    def wait(self, expression: str, seconds: float = 120.0) -> None:
         """Wait until a JavaScript expression is true.
 
         Playwright's own wait_for_function evaluates text inside the page, which the pages'
@@ -82,6 +82,7 @@ PANELS_HIDDEN = "#caption, .dg { visibility: hidden !important; }"
 def watching(browser: Browser) -> Watched:
     """Open an empty page and watch it."""
     page = browser.new_page(viewport={"width": 800, "height": 600})
+    page.set_default_timeout(120_000)
     watch = Watched(page)
     page.on("request", lambda request: watch.requests.append(request.url))
     page.on("pageerror", lambda error: watch.complaints.append(f"error: {error}"))
