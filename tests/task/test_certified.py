@@ -136,6 +136,9 @@ def test_a_ball_of_turns_is_inside_where_its_box_is_not() -> None:
     assert part.verdict == "inside"
     with pytest.raises(InputError, match="'phi'"):
         certify(TASK, *box, round=[RoundPart(["rx", "phi"], [0, 0], 0.3)])
+    for bad in (math.nan, "a"):
+        with pytest.raises(InputError, match="the centre's ry"):
+            RoundPart(["rx", "ry"], [0, bad], 0.3)  # type: ignore[list-item]
     with pytest.raises(InputError, match="is not in the box"):
         certify(TASK, *box, round=[RoundPart(["rx", "ry"], [0, 1], 0.3)])
 

@@ -40,6 +40,8 @@ class RoundPart:
     def __post_init__(self) -> None:
         if len(self.coordinates) not in (2, 3) or len(self.centre) != len(self.coordinates):
             raise InputError("a round part has two or three coordinates, and as many of its centre")
+        for name, one in zip(self.coordinates, self.centre, strict=True):
+            finite_number(one, f"the centre's {name}")
         positive_number(self.radius, "radius")
 
     def points(self, shells: int) -> Array:
