@@ -12,6 +12,7 @@ import pytest
 from rps_pin.errors import InputError
 from rps_pin.numerics.bits import distinct, holds
 from rps_pin.task import Task, certify
+from rps_pin.task.certification import reasons
 from rps_pin.task.certification.equations import Equations
 from rps_pin.task.certification.exclusion import Exclusion
 from rps_pin.task.certification.leg_angles import AngleRoom
@@ -73,6 +74,27 @@ def test_limits_of_six_legs() -> None:
             for name in set(found.reasons) - {SINGULAR}:
                 assert not broken(moved, limits, name)(points).any(), name
     assert len([name for name in seen if "cross" in name or "cylinder" in name]) > 15
+
+
+@pytest.mark.parametrize("most", [20, 3])
+def test_too_many_limits_share_their_words(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
+    """The limits of a joint, or those of all: the boxes are the same, and what is said is true."""
+    one = six_ups.TASK
+    half = np.array([0.7, 0.7, 0.5, 0.0, 0.0, 0.0])
+    limits = dict.fromkeys(one.mechanism.actuated, (0.2, 1.1))
+    limited = with_limits(one, limits)
+    before = certify(limited, one.home - half, one.home + half, most_boxes=30)
+    monkeypatch.setattr(reasons, "_MOST_TOLD", most)
+    after = certify(limited, one.home - half, one.home + half, most_boxes=30)
+    np.testing.assert_array_equal(after.outside, before.outside)
+    shared: dict[str, list[np.ndarray]] = {}
+    for name in set(before.reasons) - {SINGULAR}:
+        who = name.split()[0] if most == 20 else "a joint"
+        shared.setdefault(f"{who} beyond a limit", []).append(before.mask(name))
+    assert set(after.reasons) == {*shared, SINGULAR}
+    for name, masks in shared.items():
+        np.testing.assert_array_equal(after.mask(name), np.any(masks, axis=0))
+    assert len(before.outside)
 
 
 def broken(one: Task, limits: dict[str, tuple[float, float]], reason: str) -> Truth:

@@ -89,11 +89,11 @@ def clearance(robot: ClosedLoopModel, points: Array) -> float:
 
 
 def test_the_clearance_of_candidates_is_that_of_their_robots() -> None:
-    measuring = Measuring(space(), Requirements(REGION, rods=RODS), "tcc")
+    measuring = Measuring(space(), Requirements(REGION, rods=RODS))
     values = np.random.default_rng(2).uniform([0.4, 0.18], [0.6, 0.35], (3, 2))
     found = measuring(values)
     some = np.random.default_rng(3).permutation(len(measuring.points))[:8]
-    few = Measuring(space(), Requirements(REGION, rods=RODS), "tcc")
+    few = Measuring(space(), Requirements(REGION, rods=RODS))
     few.points = np.vstack([few.points[:1], few.points[some]])
     part = few(values)
     for k, row in enumerate(values):
@@ -105,9 +105,8 @@ def test_the_clearance_of_candidates_is_that_of_their_robots() -> None:
 
 def test_a_front_keeps_the_clearance_and_says_that_it_binds() -> None:
     asked = Requirements(REGION, rods=RODS, min_clearance=0.06)
-    small = {"candidates": 200, "population": 40, "compiler": "tcc"}
-    free = design(space(), Requirements(REGION, rods=RODS), "size", **small)
-    found = design(space(), asked, "size", **small)
+    free = design(space(), Requirements(REGION, rods=RODS), "size", candidates=200, population=40)
+    found = design(space(), asked, "size", candidates=200, population=40)
     # The smallest robot whose legs may touch has less clearance than asked for.
     assert free.measures.clearance[free.front[0]] < 0.06
     assert found.measures.clearance[found.front[0]] >= 0.06 - 1e-12

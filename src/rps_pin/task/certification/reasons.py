@@ -12,6 +12,9 @@ from rps_pin.task.paths.limits import Cone, ConeRooms, JointRooms
 from rps_pin.task.task import Task
 from rps_pin.task.workspace.reasons import limit_names
 
+#: Limits and cones that are told apart, at most: other reasons need bits too.
+_MOST_TOLD = 40
+
 
 class LimitWords(NamedTuple):
     """Limits in words, as in `rps_pin.task.workspace`."""
@@ -28,6 +31,9 @@ class LimitWords(NamedTuple):
 def limit_words(task: Task, cones: Sequence[Cone]) -> LimitWords:
     """Return the limits of a task's joints and cones in words.
 
+    Where there are too many to tell them apart, both limits of a joint have one word, or else those
+    of all joints.
+
     Raises
     ------
     MechanismError
@@ -36,6 +42,10 @@ def limit_words(task: Task, cones: Sequence[Cone]) -> LimitWords:
     joints, of_cones = JointRooms(task.mechanism), ConeRooms(task.mechanism, cones)
     names = limit_names([*joints.signals, *of_cones.signals])
     count = len(joints.signals)
+    if len(names) > _MOST_TOLD:
+        names[:count] = [f"{one.joint} beyond a limit" for one in joints.signals]
+    if len(set(names)) > _MOST_TOLD:
+        names[:count] = ["a joint beyond a limit"] * count
     keys = [(int(q), one.side) for q, one in zip(joints.q, joints.signals, strict=True)]
     return LimitWords(dict(zip(keys, names, strict=False)), tuple(names[count:]))
 
