@@ -243,7 +243,7 @@ def test_another_program_is_no_faster(name: str) -> None:
 @cache
 def without_closed_forms() -> Task:
     plain = Task(RPSRobot.from_preset("sokolov").mechanism, "platform", ["z", "rx", "ry"])
-    return plain.compile(functions=("kinematics", "closing", "dynamics"), compiler="tcc")
+    return plain.compile(functions=("kinematics", "closing", "dynamics"))
 
 
 @pytest.mark.parametrize("force", [20.0, 100.0])
