@@ -388,7 +388,7 @@ def test_faults_of_a_calibration() -> None:
         CalibrationModel(case.task, [], ["x"], offsets=["z"])
     with pytest.raises(InputError, match="the model's sensors are"):
         calibrate(case.model, readings(case.task, {"x": values[:, 2]}, {"x": 1e-3}))
-    with pytest.raises(InputError, match="8 readings at 2 poses leave nothing"):
+    with pytest.raises(InputError, match="8 readings, poses: 2, leave nothing"):
         calibrate(case.model, read(values[:2]))
     with pytest.raises(InputError, match="no parameter 'closure:tip'"):
         calibrate(case.model, read(values), priors={"closure:tip": 1e-3})

@@ -440,7 +440,6 @@ def written_plan(header: list[str], rows: list[list[str]], values: Array) -> str
         (["--over", "x=0.1:0.3"], "say what will be read.*--deviation SENSOR=VALUE"),
         (["--over", "x=0.1:0.3", "--deviation", "q=1"], "called 'q'"),
         (["--over", "x=0.1:0.3", "--deviation", "x=1e-5", "--folds", "3"], "calibrates nothing"),
-        (["--over", "x=3:4", "--deviation", "x=1e-5"], "none of 300 random poses"),
     ],
 )
 def test_faults_of_a_plan(words: list[str], told: str, tmp_path: Path) -> None:
