@@ -167,9 +167,14 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
 
 def write_rows(path: str | os.PathLike[str], rows: Iterable[Iterable[object]]) -> None:
     """Write rows of cells as CSV, with commas, whole or not at all; see `whole_file`."""
+    write_text(path, csv_of(rows))
+
+
+def csv_of(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows of cells as CSV, with commas."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
-    write_text(path, text.getvalue())
+    return text.getvalue()
 
 
 def _umask() -> int:

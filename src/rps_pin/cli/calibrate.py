@@ -12,7 +12,7 @@ import typer
 
 from rps_pin.cli import console as common
 from rps_pin.cli import mechanism_options as options
-from rps_pin.cli.calibration_plan import RANGE, PlanAsked, offsets_of, plan_calibration
+from rps_pin.cli.calibration_plan import RANGE, Chosen, PlanAsked, model_of, plan_calibration
 from rps_pin.cli.given_options import given as given_options
 from rps_pin.cli.given_options import refuse
 from rps_pin.cli.outputs import OverwriteOption, check_outputs
@@ -151,13 +151,15 @@ def calibrate_command(
     - `rps-pin calibrate --plan 12 --mechanism five_bar --over x=0.1:0.3 --over z=0.4:0.6
     --deviation left_joint=1e-4 --deviation right_joint=1e-4 --deviation x=3e-5 --deviation z=3e-5`
     """
+    chosen = Chosen(parameters, offsets, scales)
     if plan is not None:
         refuse(context, "a --plan calibrates nothing", "folds")
         plan_calibration(
             PlanAsked(plan, mechanism, data, tuple(over or ()), instruments, output),
             options.by_joint(deviations or (), "--deviation"),
             options.by_joint(priors or (), "--prior"),
-            {"parameters": parameters, "offsets": offsets, "scales": scales, "widest": widest},
+            chosen,
+            widest,
             overwrite,
             as_json,
         )
@@ -181,14 +183,7 @@ def calibrate_command(
         folds = min(folds, poses)
     elif folds and not 2 <= folds <= poses:
         raise InputError(f"--folds {folds}: 2 to {poses}, the poses; 0: none")
-    model = of_tasks.CalibrationModel(
-        task,
-        parameters or of_tasks.geometric_groups(task),
-        read.sensors,
-        offsets_of(task, read.sensors, offsets),
-        scales or (),
-        others,
-    )
+    model = model_of(task, read.sensors, chosen, others)
     console = common.text_console(as_json)
     known = options.by_joint(priors or (), "--prior")
     with console.status("calibrating"):

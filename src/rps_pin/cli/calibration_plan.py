@@ -26,6 +26,14 @@ RANGE = "NAME=FROM:TO"
 _TRIED, _TRIED_EACH = 300, 10
 
 
+class Chosen(NamedTuple):
+    """Which parameters there are, as options say it; None: those by default."""
+
+    parameters: Sequence[str] | None
+    offsets: Sequence[str] | None
+    scales: Sequence[str] | None
+
+
 class PlanAsked(NamedTuple):
     """What a plan is made for."""
 
@@ -41,7 +49,8 @@ def plan_calibration(
     asked: PlanAsked,
     deviations: dict[str, float],
     priors: dict[str, float],
-    chosen: Mapping[str, Any],
+    chosen: Chosen,
+    widest: float | None,
     overwrite: bool,
     as_json: bool,
 ) -> None:
@@ -54,14 +63,7 @@ def plan_calibration(
     others = of_tasks.load_instruments(asked.instruments, task) if asked.instruments else ()
     read = _measured(asked.data, task, deviations, others)
     spread = _deviations(task, read, deviations, others)
-    model = of_tasks.CalibrationModel(
-        task,
-        chosen["parameters"] or of_tasks.geometric_groups(task),
-        tuple(spread),
-        offsets_of(task, tuple(spread), chosen["offsets"]),
-        chosen["scales"] or (),
-        others,
-    )
+    model = model_of(task, tuple(spread), chosen, others)
     console = common.text_console(as_json)
     with console.status("looking for poses in the workspace"):
         tried = max(_TRIED, _TRIED_EACH * asked.poses)
@@ -78,7 +80,7 @@ def plan_calibration(
         spread,
         priors=priors,
         measured=None if read is None else _of_all(read, model.sensors),
-        widest=chosen["widest"],
+        widest=widest,
         progress=common.progress_bar(console, "choosing poses"),
     )
     asked.output.mkdir(parents=True, exist_ok=True)
@@ -98,7 +100,21 @@ def plan_calibration(
     console.print(f"  rps-pin calibrate {path} -m {asked.mechanism}{more}", soft_wrap=True)
 
 
-def offsets_of(task: Task, sensors: Sequence[str], given: Sequence[str] | None) -> Sequence[str]:
+def model_of(
+    task: Task, sensors: Sequence[str], chosen: Chosen, others: Sequence[Instrument]
+) -> of_tasks.CalibrationModel:
+    """Return the model of a calibration; by default of all geometry and the actuators' offsets."""
+    return of_tasks.CalibrationModel(
+        task,
+        chosen.parameters or of_tasks.geometric_groups(task),
+        sensors,
+        _offsets(task, sensors, chosen.offsets),
+        chosen.scales or (),
+        others,
+    )
+
+
+def _offsets(task: Task, sensors: Sequence[str], given: Sequence[str] | None) -> Sequence[str]:
     """Return the sensors of ``--offset``; by default the actuators' that are read."""
     if given is None:
         return [name for name in task.mechanism.actuated if name in sensors]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,7 +18,7 @@ from rps_pin.cli.region_options import cones_of, round_parts
 from rps_pin.cli.task_options import in_unit, unit_of
 from rps_pin.cli.task_workspace import grid_of
 from rps_pin.errors import InputError
-from rps_pin.files import write_text
+from rps_pin.files import write_rows
 from rps_pin.numerics.boxes import CertifiedBoxes
 from rps_pin.rps.robot_file import kind_of_file
 from rps_pin.rps.workspace import certify as certify_rps
@@ -90,7 +88,7 @@ def certify_boxes(
     console = common.text_console(as_json)
     with console.status("proving boxes"):
         found = prove(of, lower, upper, **demands)
-        write_text(file, boxes_csv(found, task, degrees))
+        write_rows(file, _table(found, task, degrees))
     summary = _summary(found, task, name or "mechanism", degrees)
     if as_json:
         common.print_json(summary | {"files": [file]})
@@ -99,14 +97,12 @@ def certify_boxes(
     common.print_files(console, [file])
 
 
-def boxes_csv(found: CertifiedBoxes, task: Task, degrees: bool = False) -> str:
+def _table(found: CertifiedBoxes, task: Task, degrees: bool) -> list[list[str]]:
     """Return the boxes as a table: what each is, and its least and largest coordinates.
 
     Of an undecided box, two columns are the parts of it that are proven inside and outside; of one
     outside, the last column has the reasons, with semicolons between them.
     """
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
     columns = zip(task.coordinates, task.angular, strict=True)
     names = [f"{one}_{end}_{unit_of(turns, False)}" for one, turns in columns
              for end in ("least", "most")]  # fmt: skip
@@ -117,10 +113,11 @@ def boxes_csv(found: CertifiedBoxes, task: Task, degrees: bool = False) -> str:
     numbers = np.concatenate(rows)
     if degrees:
         names, numbers = table_in_degrees(names, numbers)
-    table.writerow(["verdict", *names, "reasons"])
-    for verdict, row, reasons in zip(verdicts, numbers.tolist(), told, strict=True):
-        table.writerow([verdict, *map(repr, row), reasons])
-    return text.getvalue()
+    rows_of_text = [
+        [str(verdict), *map(repr, row), reasons]
+        for verdict, row, reasons in zip(verdicts, numbers.tolist(), told, strict=True)
+    ]
+    return [["verdict", *names, "reasons"], *rows_of_text]
 
 
 def _rows_of(found: CertifiedBoxes, verdict: str) -> Array:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from rps_pin.cli import console as common
 from rps_pin.cli.outputs import check_outputs, figures_in
@@ -67,20 +66,16 @@ def _figures(found: StiffnessMap, folder: Path) -> list[Path]:
 def _summary(found: StiffnessMap) -> dict[str, Any]:
     some = found.reached
     answer: dict[str, Any] = {"points": int(some.size), "reached": int(some.sum())}
-    for name, unit, values in (
-        ("least_stiffness", found.unit, found.softest[some]),
-        ("lowest_frequency", "Hz", found.frequencies[some][:, 0]),
-    ):
-        at = found.x[some][int(np.argmin(values))]
-        answer[name] = {
-            "unit": unit,
-            "least": _number(values.min()),
-            "most": _number(values.max()),
-            "least_at": dict(zip(found.coordinates, at.tolist(), strict=True)),
+    for one in found.spans():
+        answer[one.name.replace(" ", "_")] = {
+            "unit": one.unit,
+            "least": _number(one.least),
+            "most": _number(one.most),
+            "least_at": dict(zip(found.coordinates, one.at.tolist(), strict=True)),
         }
     return answer
 
 
 def _number(value: float) -> float | None:
     """Return a number for JSON, which has no infinity."""
-    return float(value) if np.isfinite(value) else None
+    return value if math.isfinite(value) else None

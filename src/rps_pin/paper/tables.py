@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import chain
 
+from rps_pin.files import csv_of
 from rps_pin.paper.comparison import OUT_OF_REACH, SINGULAR, Comparison, PathResult, distance
 from rps_pin.paper.compute import COLUMNS, Reproduction
 from rps_pin.paper.interpretations import BODIES, PathInterpretation
@@ -215,21 +214,19 @@ def probes(found: Reproduction) -> str:
 
 def interpretations_csv(found: Reproduction) -> str:
     """Return every interpretation as CSV, the closest to Table 2 first and those refused last."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     path = ["z_0", "r_h_p_h", "g_h", "branch", "eq_5", "eq_29"]
     columns = [f"F{leg}_{which}_N" for which in ("min", "max") for leg in (1, 2, 3)]
     last = ["distance", "distance_any_labels", "labels", "refused", "singular_at_s"]
-    writer.writerow([*path, "bodies", "gravity", "eq_14", "nearest", *columns, *last])
+    rows = [[*path, "bodies", "gravity", "eq_14", "nearest", *columns, *last]]
     for row in found.comparisons:
         numbers = [f"{x:.4g}" for x in row.forces.numbers()]
         ends = [f"{row.distance:.4f}", f"{row.distance_relabelled:.4f}", str(row.labels), "", ""]
-        writer.writerow([*_fields(row.path), *row.body, f"{row.nearest:.3g}", *numbers, *ends])
+        rows.append([*_fields(row.path), *row.body, f"{row.nearest:.3g}", *numbers, *ends])
     for result in found.paths:
         if result.refused:
             times = " ".join(f"{time:.4f}" for time in result.crossings)
-            writer.writerow([*_fields(result.interpretation), *[""] * 13, result.refused, times])
-    return text.getvalue()
+            rows.append([*_fields(result.interpretation), *[""] * 13, result.refused, times])
+    return csv_of(rows)
 
 
 def path_words(path: PathInterpretation) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +11,7 @@ import numpy as np
 
 from rps_pin.arrays import Array, Bools, Indices
 from rps_pin.errors import InputError
-from rps_pin.files import write_text
+from rps_pin.files import csv_of, write_text
 from rps_pin.task.design.measures import Measures, Measuring
 from rps_pin.task.design.requirements import Objective
 from rps_pin.task.design.violations import WITHOUT_ROOM
@@ -171,11 +169,8 @@ class DesignResult:
     def csv_text(self) -> str:
         """Return the front as CSV, SI units."""
         columns, rows = self.table()
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([[repr(c) if isinstance(c, float) else c for c in row] for row in rows])
-        return text.getvalue()
+        cells = [[repr(c) if isinstance(c, float) else c for c in row] for row in rows]
+        return csv_of([columns, *cells])
 
     def sheet(self, chosen: Sequence[Chosen]) -> str:
         """Return a text that says of each chosen robot how it meets each requirement."""

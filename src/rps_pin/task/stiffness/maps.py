@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,17 @@ from rps_pin.validation import choice, numbers, refuse_not_finite, whole_number
 
 #: Directions of the output that are shifts of a frame.
 _SHIFTS = ("x", "y", "z")
+
+
+class Span(NamedTuple):
+    """What a quantity is over the poses of a map that are reached."""
+
+    name: str
+    unit: str
+    least: float
+    most: float
+    at: Array
+    """Task coordinates where it is least, shape (m,), m and rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,25 +92,32 @@ class StiffnessMap:
             found[some] = 1 / np.maximum(np.linalg.eigvalsh(part[some])[..., -1], 0.0)
         return found
 
+    def spans(self) -> list[Span]:
+        """Return what the least stiffness and the lowest frequency are over the poses reached."""
+        some = self.reached
+        if not some.any():
+            return []
+        return [
+            Span(
+                name, unit, float(values.min()), float(values.max()), self.x[some][values.argmin()]
+            )
+            for name, unit, values in (
+                ("least stiffness", self.unit, self.softest[some]),
+                ("lowest frequency", "Hz", self.frequencies[some][:, 0]),
+            )
+        ]
+
     def summary(self) -> str:
         """Return the least and largest stiffness and frequency, in a line each, and where."""
         some = self.reached
         lines = [f"{int(some.sum())} of {some.size} poses"]
-        if some.any():
-            for name, unit, values in (
-                ("least stiffness", self.unit, self.softest[some]),
-                ("lowest frequency", "Hz", self.frequencies[some][:, 0]),
-            ):
-                at = self.x[some][np.argmin(values)]
-                told = ", ".join(
-                    f"{coordinate} = {short(float(value))} {'rad' if turns else 'm'}"
-                    for coordinate, value, turns in zip(
-                        self.coordinates, at, self.angular, strict=True
-                    )
-                )
-                lines.append(
-                    f"{name}: {values.min():.4g} to {values.max():.4g} {unit}, the least at {told}"
-                )
+        for one in self.spans():
+            told = ", ".join(
+                f"{name} = {short(float(value))} {'rad' if turns else 'm'}"
+                for name, value, turns in zip(self.coordinates, one.at, self.angular, strict=True)
+            )
+            ends = f"{one.least:.4g} to {one.most:.4g} {one.unit}"
+            lines.append(f"{one.name}: {ends}, the least at {told}")
         return "\n".join(lines)
 
 
