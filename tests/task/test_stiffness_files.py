@@ -21,9 +21,11 @@ from rps_pin.task.stiffness import (
     Compliances,
     Material,
     Section,
+    StiffnessMap,
     StiffnessModel,
     load_compliances,
     stiffness_map,
+    write_map,
 )
 
 ROOT = Path(__file__).parents[2]
@@ -231,3 +233,24 @@ def test_a_map_of_a_task_of_joints_has_units_of_turns() -> None:
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert "least stiffness (N m/rad)" in labels
     assert [figure.axes[0].get_xlabel(), labels[0]] == [f"{one} (°)" for one in task.coordinates]
+
+
+@pytest.mark.parametrize(
+    ("turns", "column"),
+    [
+        ((False, False), "least_stiffness_N_per_m"),
+        ((True, True), "least_stiffness_Nm_per_rad"),
+        ((False, True), "least_stiffness_mixed_units"),
+    ],
+)
+def test_columns_of_a_map_name_their_unit(
+    turns: tuple[bool, bool], column: str, tmp_path: Path
+) -> None:
+    """Of a task of joints: slides, hinges, or both."""
+    joints = ("left", "right")
+    place, C = np.array([[0.1, 0.2]]), 1e-5 * np.eye(2)[None]
+    found = StiffnessMap(joints, place, joints, C, place, np.ones((1, 1)), turns, turns)
+    write_map(found, tmp_path / "map.csv")
+    with (tmp_path / "map.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert float(row[column]) == pytest.approx(1e5, rel=1e-8)

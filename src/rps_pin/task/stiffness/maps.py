@@ -21,6 +21,8 @@ from rps_pin.validation import choice, numbers, refuse_not_finite, whole_number
 
 #: Directions of the output that are shifts of a frame.
 _SHIFTS = ("x", "y", "z")
+#: The units of `StiffnessMap.unit` in names of columns.
+_COLUMNS = {"N/m": "N_per_m", "N m/rad": "Nm_per_rad", "of mixed units": "mixed_units"}
 
 
 class Span(NamedTuple):
@@ -198,7 +200,7 @@ def write_map(found: StiffnessMap, path: str | os.PathLike[str]) -> None:
     """
     units = dict(zip(found.coordinates, found.angular, strict=True))
     header = [f"{name}_{'rad' if turns else 'm'}" for name, turns in units.items()]
-    header.append(f"least_stiffness_{found.unit.replace(' m', 'm').replace('/', '_per_')}")
+    header.append(f"least_stiffness_{_COLUMNS[found.unit]}")
     out = list(zip(found.output, found.output_angular, strict=True))
     header += [f"displacement_{name}_{'rad' if turns else 'm'}" for name, turns in out]
     header += [f"compliance_{name}_{'rad_per_Nm' if turns else 'm_per_N'}" for name, turns in out]
